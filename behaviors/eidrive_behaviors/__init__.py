@@ -1,0 +1,1 @@
+"""OpenSCENARIO actions as py_trees behaviours, OpenSCENARIO conditions as predicates."""

@@ -1,0 +1,1 @@
+"""An OpenSCENARIO engine and test harness for cooperative perception."""

@@ -1,0 +1,44 @@
+"""What a station perceives: boxes of objects, as arrays. Detectors make them, messages carry them, fusion joins them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
+
+
+@dataclass(frozen=True)
+class Detections:
+    """Perceived objects at one instant.
+
+    boxes       (N, 7) x y z l w h yaw of the box centre in the world frame [m, rad]
+    scores      (N,) confidence in [0, 1]
+    classes     (N,) names out of CLASSES
+    velocity    (N, 2) world frame [m/s], NaN where unknown
+    covariance  (N, 2, 2) of the position x y [m²], NaN where unknown
+    """
+
+    time: float
+    boxes: Array = field(default_factory=lambda: np.empty((0, 7)))
+    scores: Array = field(default_factory=lambda: np.empty(0))
+    classes: tuple[str, ...] = ()
+    velocity: Array = field(default_factory=lambda: np.empty((0, 2)))
+    covariance: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
+
+    def __post_init__(self) -> None:
+        count = len(self.boxes)
+        if self.boxes.shape != (count, 7):
+            raise ValueError(f"boxes have shape {self.boxes.shape}, expected (N, 7)")
+        for name, shape in (("scores", (count,)), ("velocity", (count, 2)), ("covariance", (count, 2, 2))):
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name} has shape {getattr(self, name).shape}, expected {shape}")
+        if len(self.classes) != count:
+            raise ValueError(f"{len(self.classes)} classes for {count} boxes")
+
+    def __len__(self) -> int:
+        return len(self.boxes)

@@ -1,0 +1,1 @@
+"""From the route to the pedals, and the agent that ties a station together."""

@@ -1,0 +1,50 @@
+"""What a station's agent is asked to do, and what it did in one tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.message import Message, Received
+from eidrive_scenario.world.actor import Control
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What the storyboard asks of a driven vehicle; None leaves it to the agent's own settings.
+
+    speed      to reach and keep [m/s]
+    waypoints  (M, 3) points to pass, the last is the destination [m], world frame
+    """
+
+    speed: float | None = None
+    waypoints: Array | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A trajectory: points (M, 2) [m] and the speed at each (M,) [m/s], and why it looks as it does."""
+
+    points: Array
+    speeds: Array
+    reason: str
+    braking: float | None = None
+    """A deceleration to apply whatever the speeds say [m/s²]."""
+
+
+@dataclass(frozen=True)
+class AgentStep:
+    """One tick of one station: what it saw, heard, concluded, planned and did."""
+
+    detections: Detections
+    inbox: tuple[Received, ...]
+    fused: Detections
+    plan: Plan | None
+    control: Control | None
+    """None for a station that does not drive (a roadside unit)."""
+    outbox: tuple[Message, ...]

@@ -1,0 +1,81 @@
+"""Everything that this package raises on purpose.
+
+EidriveError
+├── InputError           what a person typed is wrong: one or many Problems, each with file, line and remedy
+│   ├── ScenarioError    an OpenSCENARIO file
+│   ├── RoadError        an OpenDRIVE file
+│   └── SettingError     an option, a controller's property, a channel profile
+├── RegistryError        two extensions claim one name, or one does not load
+└── SimulationError      the run itself broke
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with an input, where it stands, and what would be right."""
+
+    message: str
+    remedy: str = ""
+    source: str = ""
+    line: int | None = None
+
+    def __str__(self) -> str:
+        place = f"{self.source}:{self.line}" if self.line is not None else self.source
+        head = f"{place}: {self.message}" if place else self.message
+        return f"{head}; {self.remedy}" if self.remedy else head
+
+
+class EidriveError(Exception):
+    """Base of all errors of this package."""
+
+
+class InputError(EidriveError):
+    """The input is wrong. `problems` lists every finding, in the order of the file."""
+
+    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
+        self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Problem, ...]]]:
+        return type(self), (self.problems,)
+
+
+class ScenarioError(InputError):
+    """An OpenSCENARIO file is wrong."""
+
+
+class RoadError(InputError):
+    """An OpenDRIVE file is wrong."""
+
+
+class SettingError(InputError):
+    """An option, a controller's property or a profile is wrong."""
+
+
+class RegistryError(EidriveError):
+    """Two extensions claim one name, or an extension does not load."""
+
+
+class SimulationError(EidriveError):
+    """The run itself broke."""
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """What would be right in place of `word`: the nearest of `known`, or all of them when none is near."""
+    candidates = sorted(known)
+    near = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
+    if not near:
+        lowered = {candidate.lower(): candidate for candidate in candidates}
+        near = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
+    if near:
+        return f"did you mean {near[0]!r}?"
+    if not candidates:
+        return "none is known here"
+    shown = ", ".join(candidates[:12]) + (", …" if len(candidates) > 12 else "")
+    return f"known: {shown}"

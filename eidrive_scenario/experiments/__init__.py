@@ -1,0 +1,1 @@
+"""Repetitions, statistics, and the paper's tables."""

@@ -1,0 +1,1 @@
+"""Boxes of several senders become one picture."""

@@ -1,0 +1,1 @@
+"""From readings to detections. The only room that imports torch."""

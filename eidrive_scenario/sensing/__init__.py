@@ -1,0 +1,1 @@
+"""Sensors: with the criteria, the only readers of the world's truth."""

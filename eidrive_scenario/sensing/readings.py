@@ -1,0 +1,77 @@
+"""What the sensors of one station gave at one instant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EgoState:
+    """The station's own motion as it knows it: reference point (3,) [m], angles [rad], speed along heading [m/s]."""
+
+    time: float
+    position: Array
+    yaw: float
+    pitch: float
+    roll: float
+    speed: float
+    yaw_rate: float
+    acceleration: float
+    """Along the heading [m/s²]."""
+
+
+@dataclass(frozen=True)
+class TruthReading:
+    """Objects in the line of sight of a truth sensor: the input of the oracle detector.
+
+    names (N,), categories (N,), boxes (N, 7) in the world frame [m, rad], velocity (N, 2) [m/s],
+    visibility (N,) share of the sampled points of each object that are in sight, in (0, 1]
+    """
+
+    names: tuple[str, ...]
+    categories: tuple[str, ...]
+    boxes: Array
+    velocity: Array
+    visibility: Array
+
+
+@dataclass(frozen=True)
+class CameraReading:
+    """A picture and where it was taken.
+
+    rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor
+    in the world's view, -1 for everything else; intrinsics (3, 3) [px]; pose (4, 4) camera to world, camera frame
+    x right, y down, z forward
+    """
+
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    segmentation: NDArray[np.int32]
+    intrinsics: Array
+    pose: Array
+
+
+@dataclass(frozen=True)
+class LidarReading:
+    """A LiDAR sweep: points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world."""
+
+    points: Array
+    intensity: Array
+    pose: Array
+
+
+@dataclass(frozen=True)
+class Readings:
+    """All sensors of one station; a sensor that was not due this tick is missing."""
+
+    time: float
+    ego: EgoState
+    truth: TruthReading | None = None
+    cameras: Mapping[str, CameraReading] = field(default_factory=dict)
+    lidars: Mapping[str, LidarReading] = field(default_factory=dict)

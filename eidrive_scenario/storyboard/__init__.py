@@ -1,0 +1,1 @@
+"""The standard's state machine on py_trees."""

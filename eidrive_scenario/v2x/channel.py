@@ -1,0 +1,31 @@
+"""The seam between stations and the radio: a Channel takes messages and gives them out when they arrive."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+
+
+class Channel(ABC):
+    """Carries messages between stations. Nobody hears a message before it has arrived, nor in the tick it was said.
+
+    Loss and delay are drawn once per message and link, at sending, from a generator keyed by
+    (seed, purpose, sender, receiver, message number).
+    """
+
+    own_perception: bool = False
+    """True: a station's own detections travel this channel too, as a link from the station to itself."""
+
+    @abstractmethod
+    def send(self, message: Message, receivers: Sequence[str], now: float) -> tuple[LinkEvent, ...]:
+        """Put a message on its links; the answer says what becomes of it on each."""
+
+    @abstractmethod
+    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+        """What has arrived at `receiver` by `now` [s] and was not given out yet, in order of arrival."""
+
+    @abstractmethod
+    def in_flight(self) -> int:
+        """How many messages are on their way."""

@@ -1,0 +1,82 @@
+"""The truth at one instant, frozen, as a struct of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two boxes began to touch during the step that led to this view."""
+
+    first: str
+    second: str
+    position: tuple[float, float, float]
+    """Point of touch in the world frame [m]."""
+    closing_speed: float
+    """Speed of approach at the first touch, along the line of centres, at least 0 [m/s]."""
+
+
+@dataclass(frozen=True)
+class WorldView:
+    """All actors at time `time` [s]; one row per actor, in the order in which they entered the world.
+
+    position      (N, 3) of the reference point (OpenSCENARIO: rear axle centre on the ground for vehicles) [m]
+    yaw pitch roll  (N,) [rad]; right-handed, x forward, y left, z up; pitch positive nose down (z-y'-x'' rotation)
+    velocity      (N, 3) of the reference point, world frame [m/s]
+    acceleration  (N, 3) world frame [m/s²]
+    yaw_rate      (N,) [rad/s]
+    speed         (N,) along the heading, negative backwards [m/s]
+    size          (N, 3) length, width, height of the bounding box [m]
+    offset        (N, 3) box centre in the actor's frame [m]
+    """
+
+    time: float
+    tick: int
+    names: tuple[str, ...]
+    categories: tuple[str, ...]
+    position: Array
+    yaw: Array
+    pitch: Array
+    roll: Array
+    velocity: Array
+    acceleration: Array
+    yaw_rate: Array
+    speed: Array
+    size: Array
+    offset: Array
+    contacts: tuple[Contact, ...] = ()
+
+    @cached_property
+    def rows(self) -> Mapping[str, int]:
+        """Name to row."""
+        return {name: row for row, name in enumerate(self.names)}
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.rows
+
+    def row(self, name: str) -> int:
+        """The row of an actor. Raises KeyError, naming the actor, if it is not in the world."""
+        try:
+            return self.rows[name]
+        except KeyError:
+            raise KeyError(f"actor {name!r} is not in the world at {self.time:.2f} s") from None
+
+    @cached_property
+    def centres(self) -> Array:
+        """(N, 3) centres of the bounding boxes in the world frame [m]; pitch and roll neglected."""
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        x, y, z = self.offset.T
+        return self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+
+    @cached_property
+    def boxes(self) -> Array:
+        """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
+        return np.concatenate([self.centres, self.size, self.yaw[:, None]], axis=1)
