@@ -1,4 +1,4 @@
-"""What a station perceives: boxes of objects, as arrays. Detectors make them, messages carry them, fusion joins them."""
+"""What a station perceives: boxes of objects, as arrays; made by detectors, carried by messages, joined by fusion."""
 
 from __future__ import annotations
 
