@@ -1,0 +1,215 @@
+"""Plane and solid geometry of oriented boxes: corners, overlap, distance, intersection over union.
+
+A box is seven numbers `x y z l w h yaw`: centre, length, width, height [m] and heading [rad]; it stands upright.
+All of it is exact up to rounding. The functions for two single boxes work on plain floats, as a handful of actors does
+not pay for numpy; those for arrays broadcast.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Box = Sequence[float] | Array
+
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+
+
+@overload
+def wrap_angle(angle: float) -> float: ...
+@overload
+def wrap_angle(angle: Array) -> Array: ...
+def wrap_angle(angle: Any) -> Any:
+    """The same angle in (-pi, pi] [rad]; a float or an array."""
+    if isinstance(angle, np.ndarray):
+        return np.pi - (np.pi - angle) % (2 * np.pi)
+    return math.pi - (math.pi - angle) % (2 * math.pi)
+
+
+def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
+    """(..., 3, 3) rotations that take the body's axes to the world's: yaw, then pitch, then roll (z-y'-x'')."""
+    yaw, pitch, roll = np.broadcast_arrays(yaw, pitch, roll)
+    cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def footprint(boxes: Array) -> Array:
+    """(..., 4, 2) corners seen from above, counter-clockwise from the front left, of boxes (..., 7)."""
+    boxes = np.asarray(boxes, dtype=float)
+    local = _CORNERS * boxes[..., None, 3:5]
+    cos, sin = np.cos(boxes[..., 6:7]), np.sin(boxes[..., 6:7])
+    x, y = local[..., 0], local[..., 1]
+    return np.stack([cos * x - sin * y + boxes[..., 0:1], sin * x + cos * y + boxes[..., 1:2]], axis=-1)
+
+
+def box_corners(boxes: Array) -> Array:
+    """(..., 8, 3) corners of boxes (..., 7): the four of the bottom as in `footprint`, then the four of the top."""
+    boxes = np.asarray(boxes, dtype=float)
+    plan = footprint(boxes)
+    bottom, top = boxes[..., 2:3] - boxes[..., 5:6] / 2, boxes[..., 2:3] + boxes[..., 5:6] / 2
+    heights = np.concatenate([np.repeat(bottom, 4, axis=-1), np.repeat(top, 4, axis=-1)], axis=-1)
+    return np.concatenate([np.concatenate([plan, plan], axis=-2), heights[..., None]], axis=-1)
+
+
+def box_distance(a: Box, b: Box) -> float:
+    """Distance between two boxes (7,) [m]; 0 where they touch or overlap."""
+    a, b = _plain(a), _plain(b)
+    gap = max(abs(a[2] - b[2]) - (a[5] + b[5]) / 2, 0.0)
+    plan = footprint_distance(a, b)
+    return math.hypot(plan, gap) if gap else plan
+
+
+def footprint_distance(a: Box, b: Box) -> float:
+    """Distance between two boxes (7,) seen from above [m]; 0 where they touch or overlap."""
+    a, b = _plain(a), _plain(b)
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    cos_a, sin_a, cos_b, sin_b = math.cos(a[6]), math.sin(a[6]), math.cos(b[6]), math.sin(b[6])
+    if _plan_overlap(a, b, dx, dy, cos_a, sin_a, cos_b, sin_b):
+        return 0.0
+    return math.sqrt(
+        min(
+            _nearest_corner(a, b, dx, dy, cos_a, sin_a, cos_b, sin_b),
+            _nearest_corner(b, a, -dx, -dy, cos_b, sin_b, cos_a, sin_a),
+        )
+    )
+
+
+def overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes (7,) share a point, heights included. Separating axes (Gottschalk et al., OBBTree, 1996)."""
+    a, b = _plain(a), _plain(b)
+    if abs(a[2] - b[2]) > (a[5] + b[5]) / 2:
+        return False
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return _plan_overlap(a, b, dx, dy, math.cos(a[6]), math.sin(a[6]), math.cos(b[6]), math.sin(b[6]))
+
+
+def boxes_distance(a: Array, b: Array) -> Array:
+    """(...) distances between boxes (..., 7) and (..., 7), broadcast [m]; 0 where they touch or overlap."""
+    a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+    gap = np.maximum(np.abs(a[..., 2] - b[..., 2]) - (a[..., 5] + b[..., 5]) / 2, 0.0)
+    return np.hypot(_footprints_distance(a, b), gap)
+
+
+def iou_bev(a: Array, b: Array) -> Array:
+    """(N, M) intersection over union, seen from above, of boxes (N, 7) and (M, 7)."""
+    a, b = np.reshape(a, (-1, 7)), np.reshape(b, (-1, 7))
+    shared = _intersection_area(footprint(a)[:, None], b[None, :])
+    area_a, area_b = a[:, 3] * a[:, 4], b[:, 3] * b[:, 4]
+    union = area_a[:, None] + area_b[None, :] - shared
+    return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
+
+
+def points_in_polygon(points: Array, polygon: Array) -> NDArray[np.bool_]:
+    """(...) whether points (..., 2) lie inside a polygon (M, 2), convex or not, by the even-odd rule."""
+    points, polygon = np.asarray(points, dtype=float), np.asarray(polygon, dtype=float)
+    x, y = points[..., 0:1], points[..., 1:2]
+    x0, y0 = polygon[:, 0], polygon[:, 1]
+    x1, y1 = np.roll(x0, -1), np.roll(y0, -1)
+    straddles = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    inside: NDArray[np.bool_] = np.count_nonzero(straddles & (x < x0 + (y - y0) / rise * (x1 - x0)), axis=-1) % 2 == 1
+    return inside
+
+
+def points_in_box(points: Array, box: Box) -> NDArray[np.bool_]:
+    """(...) whether points (..., 3) lie inside a box (7,), its surface included."""
+    x, y, z, length, width, height, yaw = _plain(box)
+    offset = np.asarray(points, dtype=float) - (x, y, z)
+    along = math.cos(yaw) * offset[..., 0] + math.sin(yaw) * offset[..., 1]
+    across = math.cos(yaw) * offset[..., 1] - math.sin(yaw) * offset[..., 0]
+    inside: NDArray[np.bool_] = (
+        (np.abs(along) <= length / 2) & (np.abs(across) <= width / 2) & (np.abs(offset[..., 2]) <= height / 2)
+    )
+    return inside
+
+
+def _plain(box: Box) -> Sequence[float]:
+    if isinstance(box, np.ndarray):
+        plain: list[float] = box.tolist()
+        return plain
+    return box
+
+
+def _plan_overlap(
+    a: Sequence[float], b: Sequence[float], dx: float, dy: float, ca: float, sa: float, cb: float, sb: float
+) -> bool:
+    cos, sin = abs(ca * cb + sa * sb), abs(sa * cb - ca * sb)
+    la, wa, lb, wb = a[3] / 2, a[4] / 2, b[3] / 2, b[4] / 2
+    return (
+        abs(dx * ca + dy * sa) <= la + lb * cos + wb * sin
+        and abs(dy * ca - dx * sa) <= wa + lb * sin + wb * cos
+        and abs(dx * cb + dy * sb) <= lb + la * cos + wa * sin
+        and abs(dy * cb - dx * sb) <= wb + la * sin + wa * cos
+    )
+
+
+def _nearest_corner(
+    a: Sequence[float], b: Sequence[float], dx: float, dy: float, ca: float, sa: float, cb: float, sb: float
+) -> float:
+    """Square of the distance from rectangle a to the nearest corner of b; between disjoint rectangles the shortest
+    connection ends at a corner of one of them."""
+    x, y = dx * ca + dy * sa, dy * ca - dx * sa
+    cos, sin = ca * cb + sa * sb, ca * sb - sa * cb
+    lx, ly, wx, wy = cos * b[3] / 2, sin * b[3] / 2, -sin * b[4] / 2, cos * b[4] / 2
+    half_length, half_width = a[3] / 2, a[4] / 2
+    nearest = math.inf
+    for px, py in ((x + lx + wx, y + ly + wy), (x - lx + wx, y - ly + wy),
+                   (x - lx - wx, y - ly - wy), (x + lx - wx, y + ly - wy)):  # fmt: skip
+        ex, ey = max(abs(px) - half_length, 0.0), max(abs(py) - half_width, 0.0)
+        nearest = min(nearest, ex * ex + ey * ey)
+    return nearest
+
+
+def _footprints_distance(a: Array, b: Array) -> Array:
+    plan_a, plan_b = footprint(a), footprint(b)
+    beside_a, beside_b = _in_frame(plan_b, a), _in_frame(plan_a, b)
+    disjoint = np.zeros(a.shape[:-1], dtype=bool)
+    nearest = np.full(a.shape[:-1], np.inf)
+    for corners, box in ((beside_a, a), (beside_b, b)):
+        half = box[..., 3:5] / 2
+        disjoint |= np.any((corners.min(axis=-2) > half) | (corners.max(axis=-2) < -half), axis=-1)
+        excess = np.maximum(np.abs(corners) - half[..., None, :], 0.0)
+        nearest = np.minimum(nearest, np.hypot(excess[..., 0], excess[..., 1]).min(axis=-1))
+    return np.where(disjoint, nearest, 0.0)
+
+
+def _in_frame(points: Array, box: Array) -> Array:
+    """Points (..., K, 2) in the frame of boxes (..., 7): x along, y to the left, from the centre."""
+    offset = points - box[..., None, 0:2]
+    cos, sin = np.cos(box[..., 6:7]), np.sin(box[..., 6:7])
+    along = cos * offset[..., 0] + sin * offset[..., 1]
+    return np.stack([along, cos * offset[..., 1] - sin * offset[..., 0]], axis=-1)
+
+
+def _intersection_area(polygon: Array, boxes: Array) -> Array:
+    """Area shared by polygons (..., 4, 2), counter-clockwise, and boxes (..., 7).
+
+    Green's theorem: the area is the integral of clamp(x, -l/2, l/2) dy along the part of the outline with |y| <= w/2,
+    in the frame of the box. Each edge is cut where an integrand has a kink, so the trapezoidal rule is exact; and the
+    sum is continuous in its input, unlike a list of crossing points, so that edges which coincide do no harm.
+    """
+    start = _in_frame(polygon, boxes)
+    edge = np.roll(start, -1, axis=-2) - start
+    x, y, run, rise = start[..., 0], start[..., 1], edge[..., 0], edge[..., 1]
+    half_length, half_width = boxes[..., 3:4] / 2, boxes[..., 4:5] / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        enter, leave = (-np.copysign(half_width, rise) - y) / rise, (np.copysign(half_width, rise) - y) / rise
+        low, high = (-np.copysign(half_length, run) - x) / run, (np.copysign(half_length, run) - x) / run
+    t0 = np.where(rise == 0, 0.0, np.clip(enter, 0.0, 1.0))
+    t3 = np.where(rise == 0, 0.0, np.clip(leave, 0.0, 1.0))
+    t1 = np.where(run == 0, t0, np.clip(low, t0, t3))
+    t2 = np.where(run == 0, t0, np.clip(high, t0, t3))
+    cuts = np.stack([t0, t1, t2, t3], axis=-1)
+    clamped = np.clip(x[..., None] + cuts * run[..., None], -half_length[..., None], half_length[..., None])
+    area: Array = np.sum(rise[..., None] * np.diff(cuts) * (clamped[..., 1:] + clamped[..., :-1]) / 2, axis=(-1, -2))
+    return np.maximum(area, 0.0)
