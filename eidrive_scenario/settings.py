@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -45,8 +46,15 @@ def parse_settings(
                 message, remedy = f"unknown setting {path!r}", suggestion(str(finding["loc"][-1]), known)
             elif finding["type"] == "missing":
                 message, remedy = f"setting {path!r} is missing", "add it"
+            elif finding["type"] == "union_tag_invalid":
+                word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
+                message = f"setting {path + '.' + key!r} is {word!r}"
+                remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
             else:
-                message, remedy = f"setting {path!r} is {finding['input']!r}", finding["msg"].lower()
+                message, remedy = (
+                    f"setting {path!r} is {finding['input']!r}",
+                    finding["msg"].removeprefix("Value error, ").lower(),
+                )
             problems.append(Problem(message, remedy, source, place))
         raise SettingError(problems) from error
 
@@ -55,15 +63,22 @@ def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str
     """The keys allowed at `path` inside `model`; all of them when the path leads through a union."""
     current: Any = model
     for part in path:
-        field = current.model_fields.get(part) if isinstance(current, type) and issubclass(current, BaseModel) else None
-        if field is None:
-            continue
-        current = field.annotation
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            field = current.model_fields.get(str(part))
+            current = field.annotation if field is not None else current
+        else:
+            current = next((member for member in get_args(current) if _tagged(member, part)), current)
     if isinstance(current, type) and issubclass(current, BaseModel):
         return [name for name, field in current.model_fields.items()] + [
             field.alias for field in current.model_fields.values() if field.alias
         ]
     return []
+
+
+def _tagged(member: Any, tag: int | str) -> bool:
+    """Whether a member of a tagged union is the one of this tag."""
+    fields = getattr(member, "model_fields", {})
+    return any(tag in get_args(field.annotation) for field in fields.values())
 
 
 def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:

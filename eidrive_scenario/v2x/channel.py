@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from eidrive_scenario.v2x.links import LinkStatistics
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 
 
@@ -13,6 +14,8 @@ class Channel(ABC):
 
     Loss and delay are drawn once per message and link, at sending, from a generator keyed by
     (seed, purpose, sender, receiver, message number).
+
+    A model is a class with `settings`, the ChannelProfile that it reads, and is built as `Model(profile, seed)`.
     """
 
     own_perception: bool = False
@@ -20,7 +23,11 @@ class Channel(ABC):
 
     @abstractmethod
     def send(self, message: Message, receivers: Sequence[str], now: float) -> tuple[LinkEvent, ...]:
-        """Put a message on its links; the answer says what becomes of it on each."""
+        """Put a message on its links; the answer says what becomes of it on each.
+
+        A link from a station to itself is one like any other: list the sender among the receivers where
+        `own_perception` asks for it.
+        """
 
     @abstractmethod
     def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
@@ -29,3 +36,11 @@ class Channel(ABC):
     @abstractmethod
     def in_flight(self) -> int:
         """How many messages are on their way."""
+
+    @abstractmethod
+    def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
+        """The books of every link so far, by (sender, receiver)."""
+
+    @abstractmethod
+    def take_over(self, previous: Channel) -> None:
+        """Carry on for a channel replaced during a run: what it has on its way arrives by its old fate."""

@@ -1,0 +1,116 @@
+"""Channel profiles: what a person writes about the radio, and the channel made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
+from eidrive_scenario.registry import registry
+from eidrive_scenario.settings import Settings, load_yaml, load_yaml_file, parse_settings
+from eidrive_scenario.v2x.channel import Channel
+
+NO_COOPERATION = "none"
+"""The profile without any channel: stations hear nobody, and see with their own sensors undisturbed."""
+
+SUFFIXES = (".yaml", ".yml")
+
+
+class ChannelProfile(Settings):
+    """What every channel model has in common; each model adds its own settings in a class of its own.
+
+    model           name of the channel model (entry point `eidrive_scenario.channels`)
+    own_perception  true: a station's own detections travel the channel too, as a link from the station to itself, and
+                    are delayed and lost like those of others; then not even they are heard in the tick they were said
+    """
+
+    model: str = "composed"
+    name: str = ""
+    description: str = ""
+    own_perception: bool = False
+
+
+def load_profile(
+    source: str | Path | Mapping[str, Any],
+    folders: Sequence[Path] = (),
+    *,
+    origin: str = "",
+    line: int | None = None,
+) -> ChannelProfile | None:
+    """A checked profile: by name, by path, from YAML text, or from a mapping. None stands for no cooperation.
+
+    A text that is a mapping in YAML (`{delay: {kind: constant, seconds: 0.3}}`) is read as such; any other is the name
+    of a `.yaml` file in one of `folders` (first match), or a path, relative to them or to the working directory.
+    `origin` and `line` say where the source itself was written. Raises SettingError with file, line and key.
+    """
+    if isinstance(source, Mapping):
+        return _parse(source, "custom", origin or "channel", line, {})
+    if isinstance(source, str):
+        text = source.strip()
+        if text == NO_COOPERATION:
+            return None
+        if "{" in text or "\n" in text or ": " in text:
+            data = load_yaml(text, source=origin or "channel", line=line)
+            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, {})
+        source = Path(text)
+    path = _find(source, folders)
+    if path is None:
+        names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
+        raise SettingError(Problem(f"no channel profile {str(source)!r}", suggestion(str(source), names), origin, line))
+    data, lines = load_yaml_file(path)
+    return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines)
+
+
+def profile_names(folder: Path) -> tuple[str, ...]:
+    """The names of the profiles in a folder, sorted; `none` is always there."""
+    return tuple(sorted({NO_COOPERATION, *(path.stem for path in _profiles(folder))}))
+
+
+def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel | None = None) -> Channel | None:
+    """The channel of a profile, None where there is none.
+
+    `previous` is the channel that this one replaces during a run: what is on its way there arrives by its old fate.
+    """
+    if profile is None:
+        return None
+    channel: Channel = registry("channels").load(profile.model)(profile, seed)
+    if previous is not None:
+        channel.take_over(previous)
+    return channel
+
+
+def _profiles(folder: Path) -> list[Path]:
+    return [path for suffix in SUFFIXES for path in folder.glob(f"*{suffix}")]
+
+
+def _find(source: Path, folders: Sequence[Path]) -> Path | None:
+    if source.suffix in SUFFIXES:
+        candidates = [source, *(folder / source for folder in folders)]
+    else:
+        candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
+    if not isinstance(data, Mapping):
+        found = f"found {data!r}" if data is not None else "it is empty"
+        raise SettingError(Problem(f"a channel profile is a mapping, {found}", "write `model: composed`", source, line))
+    return data
+
+
+def _parse(
+    data: Mapping[str, Any], name: str, source: str, line: int | None, lines: Mapping[str, int]
+) -> ChannelProfile:
+    model = data.get("model", ChannelProfile.model_fields["model"].default)
+    models = registry("channels")
+    if not isinstance(model, str) or model not in models:
+        problem = Problem(
+            f"unknown channel model {model!r}", suggestion(str(model), models), source, lines.get("model", line)
+        )
+        raise SettingError(problem)
+    settings = getattr(models.load(model), "settings", None)
+    if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
+        raise RegistryError(f"the channel model {model!r} has no `settings`, a class derived from ChannelProfile")
+    profile = parse_settings(settings, data, source=source, line=line, lines=lines)
+    return profile if profile.name else profile.model_copy(update={"name": name})
