@@ -51,10 +51,9 @@ def parse_settings(
                 message = f"setting {path + '.' + key!r} is {word!r}"
                 remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
             else:
-                message, remedy = (
-                    f"setting {path!r} is {finding['input']!r}",
-                    finding["msg"].removeprefix("Value error, ").lower(),
-                )
+                own = finding["type"] == "value_error"
+                remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
+                message = f"setting {path!r} is {finding['input']!r}"
             problems.append(Problem(message, remedy, source, place))
         raise SettingError(problems) from error
 
