@@ -1,0 +1,183 @@
+"""Distributions of parameter values over runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice, choice, sequence
+from eidrive_scenario.openscenario.model.declarations import ParameterAssignment
+from eidrive_scenario.openscenario.model.element import Element, child, text
+from eidrive_scenario.openscenario.model.properties import File
+from eidrive_scenario.openscenario.model.scalars import UnsignedInt
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range(Element):
+    """From a lower to an upper limit."""
+
+    lower_limit: float
+    upper_limit: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistributionSetElement(Element):
+    """A value."""
+
+    value: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistributionSet(Element):
+    """Values, one run each."""
+
+    element: tuple[DistributionSetElement, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistributionRange(Element, content=ALL):
+    """Values from a range, at a step."""
+
+    step_width: float
+    range: Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class UserDefinedDistribution(Element):
+    """A distribution that a tool knows."""
+
+    type: str
+    content: str = text()
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeterministicSingleParameterDistribution(Element, content=CHOICE):
+    """Values of one parameter."""
+
+    parameter_name: str
+    distribution_set: DistributionSet | None = None
+    distribution_range: DistributionRange | None = None
+    user_defined_distribution: UserDefinedDistribution | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterValueSet(Element):
+    """Values of several parameters for one run."""
+
+    parameter_assignment: tuple[ParameterAssignment, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValueSetDistribution(Element):
+    """Sets of values, one run each."""
+
+    parameter_value_set: tuple[ParameterValueSet, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeterministicMultiParameterDistribution(Element):
+    """Values of several parameters at once."""
+
+    value_set_distribution: ValueSetDistribution
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deterministic(Element, content=Choice(minimum=0, maximum=None)):
+    """All combinations of the given values."""
+
+    deterministic_multi_parameter_distribution: tuple[DeterministicMultiParameterDistribution, ...] = ()
+    deterministic_single_parameter_distribution: tuple[DeterministicSingleParameterDistribution, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbabilityDistributionSetElement(Element):
+    """A value and its weight."""
+
+    value: str
+    weight: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbabilityDistributionSet(Element):
+    """Values by their weights."""
+
+    element: tuple[ProbabilityDistributionSetElement, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NormalDistribution(Element):
+    """Gauss's distribution, cut off at a range."""
+
+    expected_value: float
+    variance: float
+    range: Range | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogNormalDistribution(Element):
+    """A value whose logarithm is normally distributed, cut off at a range."""
+
+    expected_value: float
+    variance: float
+    range: Range | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class UniformDistribution(Element):
+    """All values of a range alike."""
+
+    range: Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoissonDistribution(Element):
+    """Numbers of events, cut off at a range."""
+
+    expected_value: float
+    range: Range | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HistogramBin(Element):
+    """A range and its weight."""
+
+    weight: float
+    range: Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class Histogram(Element):
+    """Ranges by their weights."""
+
+    bin: tuple[HistogramBin, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StochasticDistribution(Element, content=CHOICE):
+    """How one parameter is drawn."""
+
+    parameter_name: str
+    probability_distribution_set: ProbabilityDistributionSet | None = None
+    normal_distribution: NormalDistribution | None = None
+    log_normal_distribution: LogNormalDistribution | None = child(since="1.3")
+    uniform_distribution: UniformDistribution | None = None
+    poisson_distribution: PoissonDistribution | None = None
+    histogram: Histogram | None = None
+    user_defined_distribution: UserDefinedDistribution | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stochastic(Element):
+    """Values drawn at random, for a number of runs."""
+
+    number_of_test_runs: UnsignedInt
+    random_seed: float | None = None
+    stochastic_distribution: tuple[StochasticDistribution, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterValueDistribution(Element, content=sequence("scenario_file", choice("deterministic", "stochastic"))):
+    """Over which values of its parameters a scenario is run."""
+
+    scenario_file: File
+    deterministic: Deterministic | None = None
+    stochastic: Stochastic | None = None

@@ -1,0 +1,96 @@
+"""The file: its header, and which of the three kinds of document it holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from eidrive_scenario.openscenario.model.catalogs import Catalog, CatalogLocations
+from eidrive_scenario.openscenario.model.content import choice, sequence
+from eidrive_scenario.openscenario.model.declarations import (
+    MonitorDeclarations,
+    ParameterDeclarations,
+    VariableDeclarations,
+)
+from eidrive_scenario.openscenario.model.distributions import ParameterValueDistribution
+from eidrive_scenario.openscenario.model.element import Element, child, children, text
+from eidrive_scenario.openscenario.model.entities import Entities
+from eidrive_scenario.openscenario.model.positions import Position
+from eidrive_scenario.openscenario.model.properties import File, Properties
+from eidrive_scenario.openscenario.model.scalars import UnsignedShort
+from eidrive_scenario.openscenario.model.signals import TrafficSignals
+from eidrive_scenario.openscenario.model.storyboard import Storyboard
+
+
+@dataclass(frozen=True, kw_only=True)
+class License(Element):
+    """Under which licence the file stands; its text, if it is here."""
+
+    name: str
+    resource: str | None = None
+    spdx_id: str | None = None
+    content: str = text()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileHeader(Element):
+    """Who wrote the file, when, and for which revision of the standard."""
+
+    author: str
+    date: datetime
+    description: str
+    rev_major: UnsignedShort
+    rev_minor: UnsignedShort
+    license: License | None = child(since="1.1")
+    properties: Properties | None = child(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UsedArea(Element):
+    """The part of the world that the scenario needs."""
+
+    position: tuple[Position, ...] = children(minimum=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadNetwork(Element):
+    """The road file, the scene's model and the traffic signals."""
+
+    logic_file: File | None = None
+    scene_graph_file: File | None = None
+    traffic_signals: TrafficSignals | None = None
+    used_area: UsedArea | None = child(since="1.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenScenario(
+    Element,
+    content=sequence(
+        "file_header",
+        choice(
+            sequence(
+                "parameter_declarations",
+                "variable_declarations",
+                "monitor_declarations",
+                "catalog_locations",
+                "road_network",
+                "entities",
+                "storyboard",
+            ),
+            "catalog",
+            "parameter_value_distribution",
+        ),
+    ),
+):
+    """A scenario, a catalog, or a distribution of parameter values."""
+
+    file_header: FileHeader
+    parameter_declarations: ParameterDeclarations | None = None
+    variable_declarations: VariableDeclarations | None = child(since="1.2")
+    monitor_declarations: MonitorDeclarations | None = child(since="1.3")
+    catalog_locations: CatalogLocations | None = child(required=True)
+    road_network: RoadNetwork | None = child(required=True)
+    entities: Entities | None = child(required=True)
+    storyboard: Storyboard | None = child(required=True)
+    catalog: Catalog | None = None
+    parameter_value_distribution: ParameterValueDistribution | None = child(since="1.1")

@@ -1,0 +1,234 @@
+"""Conditions on entities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.content import ALL, Choice
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
+from eidrive_scenario.openscenario.model.enumerations import (
+    AngleType,
+    CoordinateSystem,
+    DirectionalDimension,
+    RelativeDistanceType,
+    RoutingAlgorithm,
+    Rule,
+    TriggeringEntitiesRule,
+)
+from eidrive_scenario.openscenario.model.positions import Position
+from eidrive_scenario.openscenario.model.scalars import EntityName
+
+
+@dataclass(frozen=True, kw_only=True)
+class TriggeringEntities(Element):
+    """Whose state is looked at, and whether any or all of them have to fulfil the condition."""
+
+    triggering_entities_rule: TriggeringEntitiesRule
+    entity_ref: tuple[EntityRef, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EndOfRoadCondition(Element):
+    """Has been at the end of its road for a time [s]."""
+
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CollisionCondition(Element, content=Choice(empty_until="1.2")):
+    """Touches an entity, or any entity of a type."""
+
+    entity_ref: EntityRef | None = None
+    by_type: ByObjectType | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffroadCondition(Element):
+    """Has been off the road for a time [s]."""
+
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeHeadwayCondition(Element):
+    """Time until it is where the other is now [s]."""
+
+    entity_ref: EntityName
+    freespace: bool
+    rule: Rule
+    value: float
+    along_route: bool | None = attribute(deprecated="1.1", required_until="1.0")
+    coordinate_system: CoordinateSystem | None = attribute(since="1.1")
+    relative_distance_type: RelativeDistanceType | None = attribute(since="1.1")
+    routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2")):
+    """What it would collide with."""
+
+    position: Position | None = None
+    entity_ref: EntityRef | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeToCollisionCondition(Element, content=ALL):
+    """Time until a collision at the present speeds [s]."""
+
+    freespace: bool
+    rule: Rule
+    value: float
+    along_route: bool | None = attribute(deprecated="1.1", required_until="1.0")
+    relative_distance_type: RelativeDistanceType | None = attribute(since="1.1")
+    coordinate_system: CoordinateSystem | None = attribute(since="1.1")
+    routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
+    time_to_collision_condition_target: TimeToCollisionConditionTarget
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerationCondition(Element):
+    """Acceleration [m/s²]."""
+
+    rule: Rule
+    value: float
+    direction: DirectionalDimension | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandStillCondition(Element):
+    """Has stood still for a time [s]."""
+
+    duration: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedCondition(Element):
+    """Speed [m/s]."""
+
+    rule: Rule
+    value: float
+    direction: DirectionalDimension | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeSpeedCondition(Element):
+    """Speed relative to another's [m/s]."""
+
+    entity_ref: EntityName
+    rule: Rule
+    value: float
+    direction: DirectionalDimension | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraveledDistanceCondition(Element):
+    """Distance travelled since the start of the run [m]."""
+
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachPositionCondition(Element, content=ALL):
+    """Within a tolerance [m] of a position."""
+
+    tolerance: float
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistanceCondition(Element, content=ALL):
+    """Distance to a position [m]."""
+
+    freespace: bool
+    rule: Rule
+    value: float
+    along_route: bool | None = attribute(deprecated="1.1", required_until="1.0")
+    coordinate_system: CoordinateSystem | None = attribute(since="1.1")
+    relative_distance_type: RelativeDistanceType | None = attribute(since="1.1")
+    routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeDistanceCondition(Element):
+    """Distance to another entity [m]."""
+
+    entity_ref: EntityName
+    freespace: bool
+    relative_distance_type: RelativeDistanceType
+    rule: Rule
+    value: float
+    coordinate_system: CoordinateSystem | None = attribute(since="1.1")
+    routing_algorithm: RoutingAlgorithm | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeLaneRange(Element):
+    """Lanes counted from the entity's own; open where a limit is left out."""
+
+    from_: int | None = None
+    to: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeClearanceCondition(Element):
+    """Nobody is in the lanes and the stretch around [m]."""
+
+    opposite_lanes: bool
+    free_space: bool
+    distance_forward: float | None = None
+    distance_backward: float | None = None
+    relative_lane_range: tuple[RelativeLaneRange, ...] = ()
+    entity_ref: tuple[EntityRef, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleCondition(Element):
+    """An angle, within a tolerance [rad]."""
+
+    angle_type: AngleType
+    angle: float
+    angle_tolerance: float
+    coordinate_system: CoordinateSystem | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeAngleCondition(Element):
+    """An angle relative to another entity's, within a tolerance [rad]."""
+
+    entity_ref: EntityName
+    angle_type: AngleType
+    angle: float
+    angle_tolerance: float
+    coordinate_system: CoordinateSystem | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntityCondition(Element, content=Choice(empty_until="1.2")):
+    """One condition on an entity."""
+
+    end_of_road_condition: EndOfRoadCondition | None = None
+    collision_condition: CollisionCondition | None = None
+    offroad_condition: OffroadCondition | None = None
+    time_headway_condition: TimeHeadwayCondition | None = None
+    time_to_collision_condition: TimeToCollisionCondition | None = None
+    acceleration_condition: AccelerationCondition | None = None
+    stand_still_condition: StandStillCondition | None = None
+    speed_condition: SpeedCondition | None = None
+    relative_speed_condition: RelativeSpeedCondition | None = None
+    traveled_distance_condition: TraveledDistanceCondition | None = None
+    reach_position_condition: ReachPositionCondition | None = child(deprecated="1.2")
+    distance_condition: DistanceCondition | None = None
+    relative_distance_condition: RelativeDistanceCondition | None = None
+    relative_clearance_condition: RelativeClearanceCondition | None = child(since="1.2")
+    angle_condition: AngleCondition | None = child(since="1.3")
+    relative_angle_condition: RelativeAngleCondition | None = child(since="1.3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ByEntityCondition(Element, content=ALL):
+    """A condition on the state of entities."""
+
+    triggering_entities: TriggeringEntities
+    entity_condition: EntityCondition

@@ -1,0 +1,113 @@
+"""Weather, time of day and the road's state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
+from eidrive_scenario.openscenario.model.catalogs import CatalogReference
+from eidrive_scenario.openscenario.model.content import ALL, Choice
+from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.enumerations import (
+    CloudState,
+    FractionalCloudCover,
+    PrecipitationType,
+    Wetness,
+)
+from eidrive_scenario.openscenario.model.properties import File, Properties
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeOfDay(Element):
+    """Date and time, and whether it runs on."""
+
+    animation: bool
+    date_time: datetime
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sun(Element):
+    """Azimuth and elevation [rad], illuminance [lx]."""
+
+    azimuth: float
+    elevation: float
+    intensity: float | None = attribute(deprecated="1.3", required_until="1.2")
+    illuminance: float | None = attribute(since="1.3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fog(Element, content=ALL):
+    """How far one sees [m], and where."""
+
+    visual_range: float
+    bounding_box: BoundingBox | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Precipitation(Element):
+    """Rain or snow [mm/h]."""
+
+    precipitation_type: PrecipitationType
+    intensity: float | None = attribute(deprecated="1.1", required_until="1.0")
+    precipitation_intensity: float | None = attribute(since="1.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wind(Element):
+    """Where the wind blows to [rad], and its speed [m/s]."""
+
+    direction: float
+    speed: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DomeImage(Element):
+    """A picture of the sky; azimuth offset [rad]."""
+
+    azimuth_offset: float | None = None
+    dome_file: File
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weather(Element, content=ALL):
+    """Clouds, sun, fog, precipitation, wind; pressure [Pa], temperature [K]."""
+
+    cloud_state: CloudState | None = attribute(deprecated="1.2", required_until="1.0")
+    atmospheric_pressure: float | None = attribute(since="1.1")
+    temperature: float | None = attribute(since="1.1")
+    fractional_cloud_cover: FractionalCloudCover | None = attribute(since="1.2")
+    sun: Sun | None = child(required_until="1.0")
+    fog: Fog | None = child(required_until="1.0")
+    precipitation: Precipitation | None = child(required_until="1.0")
+    wind: Wind | None = child(since="1.1")
+    dome_image: DomeImage | None = child(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadCondition(Element):
+    """How slippery the road is, relative to the reference friction."""
+
+    friction_scale_factor: float
+    wetness: Wetness | None = attribute(since="1.2")
+    properties: Properties | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment(Element, content=ALL):
+    """Time of day, weather and road."""
+
+    name: str
+    parameter_declarations: ParameterDeclarations | None = None
+    time_of_day: TimeOfDay | None = child(required_until="1.0")
+    weather: Weather | None = child(required_until="1.0")
+    road_condition: RoadCondition | None = child(required_until="1.0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvironmentAction(Element, content=Choice(empty_until="1.2")):
+    """Sets the environment."""
+
+    environment: Environment | None = None
+    catalog_reference: CatalogReference | None = None

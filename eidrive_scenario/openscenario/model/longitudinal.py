@@ -1,0 +1,114 @@
+"""Longitudinal actions: speed and distance along the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.content import ALL, Choice
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.entities import EntityRef
+from eidrive_scenario.openscenario.model.enumerations import (
+    CoordinateSystem,
+    DynamicsDimension,
+    DynamicsShape,
+    FollowingMode,
+    LongitudinalDisplacement,
+    SpeedTargetValueType,
+)
+from eidrive_scenario.openscenario.model.scalars import EntityName
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicConstraints(Element):
+    """Limits: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
+
+    max_acceleration: float | None = None
+    max_deceleration: float | None = None
+    max_speed: float | None = None
+    max_acceleration_rate: float | None = attribute(since="1.2")
+    max_deceleration_rate: float | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransitionDynamics(Element):
+    """How a value goes over to its target: shape, and in time [s], distance [m] or at a rate."""
+
+    dynamics_dimension: DynamicsDimension
+    dynamics_shape: DynamicsShape
+    value: float
+    following_mode: FollowingMode | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AbsoluteTargetSpeed(Element):
+    """A speed [m/s]."""
+
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeTargetSpeed(Element):
+    """A speed relative to an entity: a difference [m/s] or a factor."""
+
+    entity_ref: EntityName
+    continuous: bool
+    speed_target_value_type: SpeedTargetValueType
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedActionTarget(Element, content=Choice(empty_until="1.2")):
+    """The speed that is aimed at."""
+
+    relative_target_speed: RelativeTargetSpeed | None = None
+    absolute_target_speed: AbsoluteTargetSpeed | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedAction(Element, content=ALL):
+    """Brings an entity to a speed."""
+
+    speed_action_dynamics: TransitionDynamics
+    speed_action_target: SpeedActionTarget
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedProfileEntry(Element):
+    """A speed [m/s] and the time that the way to it takes [s]."""
+
+    speed: float
+    time: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedProfileAction(Element):
+    """A series of speeds."""
+
+    following_mode: FollowingMode
+    entity_ref: EntityName | None = attribute(since="1.3")
+    dynamic_constraints: DynamicConstraints | None = None
+    entity_ref_element: EntityRef | None = child(until="1.2", name="EntityRef")
+    speed_profile_entry: tuple[SpeedProfileEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LongitudinalDistanceAction(Element, content=ALL):
+    """Keeps a distance [m] or a time gap [s] to an entity."""
+
+    entity_ref: EntityName
+    continuous: bool
+    freespace: bool
+    distance: float | None = None
+    time_gap: float | None = None
+    displacement: LongitudinalDisplacement | None = attribute(since="1.1")
+    coordinate_system: CoordinateSystem | None = attribute(since="1.1")
+    dynamic_constraints: DynamicConstraints | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LongitudinalAction(Element, content=Choice(empty_until="1.2")):
+    """What an entity does along its way."""
+
+    speed_action: SpeedAction | None = None
+    longitudinal_distance_action: LongitudinalDistanceAction | None = None
+    speed_profile_action: SpeedProfileAction | None = child(since="1.2")

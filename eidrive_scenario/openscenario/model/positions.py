@@ -1,0 +1,200 @@
+"""Positions in all the frames of the standard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.openscenario.model.catalogs import CatalogReference
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.enumerations import ReferenceContext
+from eidrive_scenario.openscenario.model.scalars import EntityName
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.model.routing import Route, Trajectory
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orientation(Element):
+    """Heading, pitch and roll [rad], absolute or relative to what the position refers to."""
+
+    h: float | None = None
+    p: float | None = None
+    r: float | None = None
+    type: ReferenceContext | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldPosition(Element):
+    """A point [m] and an orientation [rad] in the world's frame."""
+
+    x: float
+    y: float
+    h: float | None = None
+    p: float | None = None
+    r: float | None = None
+    z: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeWorldPosition(Element, content=ALL):
+    """A point offset from an entity along the world's axes [m]."""
+
+    entity_ref: EntityName
+    dx: float
+    dy: float
+    dz: float | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeObjectPosition(Element, content=ALL):
+    """A point offset from an entity along the entity's axes [m]."""
+
+    entity_ref: EntityName
+    dx: float
+    dy: float
+    dz: float | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadPosition(Element, content=ALL):
+    """A point in road coordinates [m]."""
+
+    road_id: str
+    s: float
+    t: float
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeRoadPosition(Element, content=ALL):
+    """A point offset from an entity in road coordinates [m]."""
+
+    entity_ref: EntityName
+    ds: float
+    dt: float
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LanePosition(Element, content=ALL):
+    """A point in a lane: s along the road, offset from the lane's centre [m]."""
+
+    lane_id: str
+    road_id: str
+    s: float
+    offset: float | None = None
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeLanePosition(Element, content=ALL):
+    """A point some lanes off an entity; ds along the road, dsLane along the lane's centre [m]."""
+
+    entity_ref: EntityName
+    d_lane: int
+    ds: float | None = attribute(required_until="1.0")
+    offset: float | None = None
+    ds_lane: float | None = attribute(since="1.1")
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionOfCurrentEntity(Element):
+    """Where an entity is on the route."""
+
+    entity_ref: EntityName
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionInRoadCoordinates(Element):
+    """A point on the route: distance along it and lateral offset [m]."""
+
+    path_s: float
+    t: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionInLaneCoordinates(Element):
+    """A point on the route: distance along it, lane, offset from the lane's centre [m]."""
+
+    lane_id: str
+    path_s: float
+    lane_offset: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InRoutePosition(Element, content=Choice(empty_until="1.2")):
+    """How a point on a route is given."""
+
+    from_current_entity: PositionOfCurrentEntity | None = None
+    from_road_coordinates: PositionInRoadCoordinates | None = None
+    from_lane_coordinates: PositionInLaneCoordinates | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteRef(Element, content=Choice(empty_until="1.2")):
+    """A route, in place or from a catalog."""
+
+    route: Route | None = None
+    catalog_reference: CatalogReference | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoutePosition(Element, content=ALL):
+    """A point on a route."""
+
+    route_ref: RouteRef
+    orientation: Orientation | None = None
+    in_route_position: InRoutePosition
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryRef(Element, content=CHOICE):
+    """A trajectory, in place or from a catalog."""
+
+    trajectory: Trajectory | None = None
+    catalog_reference: CatalogReference | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryPosition(Element, content=ALL):
+    """A point along a trajectory: s along it, t to its left [m]."""
+
+    s: float
+    t: float | None = None
+    orientation: Orientation | None = None
+    trajectory_ref: TrajectoryRef
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeoPosition(Element, content=ALL):
+    """A point on the globe: degrees and metres; the older attributes are in radians."""
+
+    latitude: float | None = attribute(deprecated="1.2", required_until="1.1")
+    longitude: float | None = attribute(deprecated="1.2", required_until="1.1")
+    height: float | None = attribute(deprecated="1.2")
+    latitude_deg: float | None = attribute(since="1.2")
+    longitude_deg: float | None = attribute(since="1.2")
+    altitude: float | None = attribute(since="1.2")
+    vertical_road_selection: int | None = attribute(since="1.3")
+    orientation: Orientation | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Position(Element, content=Choice(empty_until="1.2")):
+    """A position in one of the frames."""
+
+    world_position: WorldPosition | None = None
+    relative_world_position: RelativeWorldPosition | None = None
+    relative_object_position: RelativeObjectPosition | None = None
+    road_position: RoadPosition | None = None
+    relative_road_position: RelativeRoadPosition | None = None
+    lane_position: LanePosition | None = None
+    relative_lane_position: RelativeLanePosition | None = None
+    route_position: RoutePosition | None = None
+    geo_position: GeoPosition | None = child(since="1.1")
+    trajectory_position: TrajectoryPosition | None = child(since="1.1")

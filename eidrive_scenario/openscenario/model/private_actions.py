@@ -1,0 +1,123 @@
+"""Actions of one entity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.appearance import AppearanceAction
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
+from eidrive_scenario.openscenario.model.controllers import ActivateControllerAction, ControllerAction
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.enumerations import SpeedTargetValueType
+from eidrive_scenario.openscenario.model.lateral import LateralAction
+from eidrive_scenario.openscenario.model.longitudinal import LongitudinalAction
+from eidrive_scenario.openscenario.model.positions import Position
+from eidrive_scenario.openscenario.model.routing import RoutingAction
+from eidrive_scenario.openscenario.model.scalars import EntityName
+from eidrive_scenario.openscenario.model.sensors import SensorReferenceSet
+
+
+@dataclass(frozen=True, kw_only=True)
+class VisibilityAction(Element):
+    """Says who sees an entity: the picture, the traffic, the sensors."""
+
+    graphics: bool
+    sensors: bool
+    traffic: bool
+    sensor_reference_set: SensorReferenceSet | None = child(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AbsoluteSpeed(Element, content=Choice(minimum=0)):
+    """A final speed [m/s]."""
+
+    value: float
+    target_distance_steady_state: TargetDistanceSteadyState | None = child(since="1.1")
+    target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelativeSpeedToMaster(Element, content=Choice(minimum=0)):
+    """A final speed relative to the master's: a difference [m/s] or a factor."""
+
+    speed_target_value_type: SpeedTargetValueType
+    value: float
+    target_distance_steady_state: TargetDistanceSteadyState | None = child(since="1.1")
+    target_time_steady_state: TargetTimeSteadyState | None = child(since="1.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetDistanceSteadyState(Element):
+    """The last stretch [m] is driven at the final speed."""
+
+    distance: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetTimeSteadyState(Element):
+    """The last seconds are driven at the final speed."""
+
+    time: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinalSpeed(Element, content=Choice(empty_until="1.2")):
+    """The speed on arrival."""
+
+    absolute_speed: AbsoluteSpeed | None = None
+    relative_speed_to_master: RelativeSpeedToMaster | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SynchronizeAction(Element, content=ALL):
+    """Arrives at a position when the master arrives at its own; tolerances [m]."""
+
+    master_entity_ref: EntityName
+    target_tolerance_master: float | None = attribute(since="1.1")
+    target_tolerance: float | None = attribute(since="1.1")
+    target_position_master: Position
+    target_position: Position
+    final_speed: FinalSpeed | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TeleportAction(Element):
+    """Puts an entity at a position."""
+
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConnectTrailerAction(Element):
+    """Couples a trailer."""
+
+    trailer_ref: EntityName
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisconnectTrailerAction(Element):
+    """Uncouples the trailer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrailerAction(Element, content=CHOICE):
+    """Couples or uncouples a trailer."""
+
+    connect_trailer_action: ConnectTrailerAction | None = None
+    disconnect_trailer_action: DisconnectTrailerAction | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrivateAction(Element, content=Choice(empty_until="1.2")):
+    """What one entity does."""
+
+    longitudinal_action: LongitudinalAction | None = None
+    lateral_action: LateralAction | None = None
+    visibility_action: VisibilityAction | None = None
+    synchronize_action: SynchronizeAction | None = None
+    activate_controller_action: ActivateControllerAction | None = child(deprecated="1.1")
+    controller_action: ControllerAction | None = None
+    teleport_action: TeleportAction | None = None
+    routing_action: RoutingAction | None = None
+    appearance_action: AppearanceAction | None = child(since="1.3")
+    trailer_action: TrailerAction | None = child(since="1.3")

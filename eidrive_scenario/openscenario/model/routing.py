@@ -1,0 +1,195 @@
+"""Routes and trajectories, and the actions that follow them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.catalogs import CatalogReference
+from eidrive_scenario.openscenario.model.content import ALL, Choice
+from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.enumerations import FollowingMode, ReferenceContext, RouteStrategy
+from eidrive_scenario.openscenario.model.positions import Position, TrajectoryRef
+from eidrive_scenario.openscenario.model.scalars import UnsignedInt
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waypoint(Element):
+    """A point of a route, and how the way to it is chosen."""
+
+    route_strategy: RouteStrategy
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class Route(Element):
+    """Waypoints in their order."""
+
+    closed: bool
+    name: str
+    parameter_declarations: ParameterDeclarations | None = None
+    waypoint: tuple[Waypoint, ...] = children(minimum=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vertex(Element):
+    """A corner of a polyline; time [s]."""
+
+    time: float | None = attribute(required_until="1.0")
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polyline(Element):
+    """Straight lines from corner to corner."""
+
+    vertex: tuple[Vertex, ...] = children(minimum=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clothoid(Element):
+    """A curve of linearly changing curvature [1/m]; length [m], times [s]."""
+
+    curvature: float
+    length: float
+    curvature_dot: float | None = attribute(deprecated="1.1", required_until="1.0")
+    start_time: float | None = None
+    stop_time: float | None = None
+    curvature_prime: float | None = attribute(since="1.1")
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClothoidSplineSegment(Element):
+    """A piece of a clothoid spline: curvatures [1/m], length [m], heading offset [rad], time [s]."""
+
+    curvature_start: float
+    curvature_end: float
+    length: float
+    h_offset: float | None = None
+    time_start: float | None = None
+    position_start: Position | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClothoidSpline(Element):
+    """Clothoids, one after the other; end time [s]."""
+
+    time_end: float | None = None
+    clothoid_spline_segment: tuple[ClothoidSplineSegment, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlPoint(Element):
+    """A control point of a NURBS; time [s]."""
+
+    time: float | None = None
+    weight: float | None = None
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class Knot(Element):
+    """A value of the knot vector."""
+
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nurbs(Element):
+    """A non-uniform rational B-spline."""
+
+    order: UnsignedInt
+    control_point: tuple[ControlPoint, ...] = children(minimum=2)
+    knot: tuple[Knot, ...] = children(minimum=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape(Element, content=Choice(empty_until="1.2")):
+    """The curve of a trajectory."""
+
+    polyline: Polyline | None = None
+    clothoid: Clothoid | None = None
+    clothoid_spline: ClothoidSpline | None = child(since="1.3")
+    nurbs: Nurbs | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory(Element):
+    """A curve in space, with times where it says when."""
+
+    closed: bool
+    name: str
+    parameter_declarations: ParameterDeclarations | None = None
+    shape: Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class None_(Element):
+    """No timing: the trajectory gives the way only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing(Element):
+    """How a trajectory's times are read: scaled, shifted by an offset [s], absolute or relative."""
+
+    domain_absolute_relative: ReferenceContext
+    offset: float
+    scale: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeReference(Element, content=Choice(empty_until="1.2")):
+    """Whether a trajectory's times count."""
+
+    none: None_ | None = None
+    timing: Timing | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryFollowingMode(Element):
+    """Exactly on the curve, or as well as the vehicle can."""
+
+    following_mode: FollowingMode
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssignRouteAction(Element, content=Choice(empty_until="1.2")):
+    """Gives an entity a route."""
+
+    route: Route | None = None
+    catalog_reference: CatalogReference | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowTrajectoryAction(Element, content=ALL):
+    """Moves an entity along a trajectory; offset [m] where it begins."""
+
+    initial_distance_offset: float | None = attribute(since="1.1")
+    trajectory: Trajectory | None = child(deprecated="1.1")
+    catalog_reference: CatalogReference | None = child(deprecated="1.1")
+    time_reference: TimeReference
+    trajectory_following_mode: TrajectoryFollowingMode
+    trajectory_ref: TrajectoryRef | None = child(since="1.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AcquirePositionAction(Element, content=ALL):
+    """Routes an entity to a position."""
+
+    position: Position
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomRouteAction(Element):
+    """Lets the engine choose the way."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoutingAction(Element, content=Choice(empty_until="1.2")):
+    """Says where an entity goes."""
+
+    assign_route_action: AssignRouteAction | None = None
+    follow_trajectory_action: FollowTrajectoryAction | None = None
+    acquire_position_action: AcquirePositionAction | None = None
+    random_route_action: RandomRouteAction | None = child(since="1.3")

@@ -1,0 +1,56 @@
+"""Sensors as entities: in 1.2 only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
+from eidrive_scenario.openscenario.model.element import Element, attribute
+from eidrive_scenario.openscenario.model.enumerations import SensorCategory
+from eidrive_scenario.openscenario.model.properties import Properties
+from eidrive_scenario.openscenario.model.scalars import SensorName
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.model.positions import RelativeObjectPosition
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor(Element):
+    """A sensor and its field of view [rad]."""
+
+    sensor_category: SensorCategory
+    name: str
+    horizontal_fov: float = attribute(name="horizontalFOV", required=True)
+    vertical_fov: float = attribute(name="verticalFOV", required=True)
+    parameter_declarations: ParameterDeclarations | None = None
+    properties: Properties
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorAttachment(Element):
+    """Where on the vehicle a sensor sits."""
+
+    sensor_ref: SensorName
+    mounting_position: RelativeObjectPosition
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorAttachments(Element):
+    """The sensors of a vehicle."""
+
+    sensor_attachment: tuple[SensorAttachment, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorReference(Element):
+    """A sensor, by its name."""
+
+    name: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorReferenceSet(Element):
+    """Sensors, by their names."""
+
+    sensor_reference: tuple[SensorReference, ...]

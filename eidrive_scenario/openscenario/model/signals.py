@@ -1,0 +1,99 @@
+"""Traffic signals: controllers with phases, actions and conditions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.model.content import ALL, Choice
+from eidrive_scenario.openscenario.model.element import Element, child
+from eidrive_scenario.openscenario.model.scalars import SignalControllerName
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalState(Element):
+    """The state of one signal."""
+
+    state: str
+    traffic_signal_id: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalGroupState(Element):
+    """The state of all signals of a controller."""
+
+    state: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phase(Element):
+    """A phase of a controller; duration [s]."""
+
+    duration: float
+    name: str
+    traffic_signal_state: tuple[TrafficSignalState, ...] = ()
+    traffice_signal_group_state: TrafficSignalGroupState | None = child(since="1.2", until="1.2")
+    traffic_signal_group_state: TrafficSignalGroupState | None = child(since="1.3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalController(Element):
+    """Signals that switch together; delay [s] after the controller it refers to."""
+
+    name: str
+    delay: float | None = None
+    reference: str | None = None
+    phase: tuple[Phase, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignals(Element):
+    """The signal controllers of a scenario."""
+
+    traffic_signal_controller: tuple[TrafficSignalController, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalStateAction(Element):
+    """Sets a signal."""
+
+    name: str
+    state: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalControllerAction(Element):
+    """Sets the phase of a controller."""
+
+    traffic_signal_controller_ref: SignalControllerName
+    phase: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalAction(Element, content=Choice(empty_until="1.2")):
+    """Sets a signal or a controller."""
+
+    traffic_signal_controller_action: TrafficSignalControllerAction | None = None
+    traffic_signal_state_action: TrafficSignalStateAction | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InfrastructureAction(Element, content=ALL):
+    """What the infrastructure does."""
+
+    traffic_signal_action: TrafficSignalAction
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalCondition(Element):
+    """A signal shows a state."""
+
+    name: str
+    state: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSignalControllerCondition(Element):
+    """A controller is in a phase."""
+
+    traffic_signal_controller_ref: SignalControllerName
+    phase: str

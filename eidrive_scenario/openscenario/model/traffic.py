@@ -1,0 +1,222 @@
+"""Background traffic: who it is made of, where it comes and goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE, Choice
+from eidrive_scenario.openscenario.model.controllers import ControllerDistribution
+from eidrive_scenario.openscenario.model.element import Element, attribute, child, children
+from eidrive_scenario.openscenario.model.entities import ScenarioObjectTemplate
+from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.openscenario.model.positions import Position
+from eidrive_scenario.openscenario.model.properties import Properties
+from eidrive_scenario.openscenario.model.scalars import EntityName, UnsignedInt
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.model.distributions import Range
+
+
+@dataclass(frozen=True, kw_only=True)
+class CentralSwarmObject(Element):
+    """The entity that a swarm surrounds."""
+
+    entity_ref: EntityName
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleCategoryDistributionEntry(Element):
+    """A category of vehicles and its share."""
+
+    category: VehicleCategory
+    weight: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleCategoryDistribution(Element):
+    """Which categories of vehicles, by shares."""
+
+    vehicle_category_distribution_entry: tuple[VehicleCategoryDistributionEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleRoleDistributionEntry(Element):
+    """A role of vehicles and its share."""
+
+    role: Role
+    weight: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class VehicleRoleDistribution(Element):
+    """Which roles of vehicles, by shares."""
+
+    vehicle_role_distribution_entry: tuple[VehicleRoleDistributionEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficDefinition(Element, content=ALL):
+    """What traffic is made of (before 1.3)."""
+
+    name: str
+    vehicle_category_distribution: VehicleCategoryDistribution
+    vehicle_role_distribution: VehicleRoleDistribution | None = child(since="1.2")
+    controller_distribution: ControllerDistribution
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntityDistributionEntry(Element):
+    """A participant and its share."""
+
+    weight: float
+    scenario_object_template: ScenarioObjectTemplate
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntityDistribution(Element):
+    """Which participants, by shares."""
+
+    entity_distribution_entry: tuple[EntityDistributionEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficDistributionEntry(Element):
+    """A kind of traffic and its share."""
+
+    weight: float
+    entity_distribution: EntityDistribution
+    properties: Properties | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficDistribution(Element):
+    """What traffic is made of, by shares."""
+
+    traffic_distribution_entry: tuple[TrafficDistributionEntry, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AreaDistribution(Element):
+    """Shares of a swarm in front, behind, left and right (1.2)."""
+
+    front: float
+    rear: float
+    left: float
+    right: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectionOfTravelDistribution(Element):
+    """Shares of a swarm in the same and in the opposite direction."""
+
+    same: float
+    opposite: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSourceAction(Element, content=ALL):
+    """Makes traffic at a position: radius [m], rate [1/s], speed [m/s]."""
+
+    radius: float
+    rate: float
+    velocity: float | None = attribute(deprecated="1.2")
+    speed: float | None = attribute(since="1.2")
+    position: Position
+    traffic_definition: TrafficDefinition | None = child(deprecated="1.3", required_until="1.2")
+    traffic_distribution: TrafficDistribution | None = child(since="1.3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSinkAction(Element, content=ALL):
+    """Takes traffic away at a position: radius [m], rate [1/s]."""
+
+    radius: float
+    rate: float | None = None
+    position: Position
+    traffic_definition: TrafficDefinition | None = child(deprecated="1.3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficSwarmAction(Element, content=ALL):
+    """Keeps a swarm around an entity, between two ellipses [m]."""
+
+    inner_radius: float
+    number_of_vehicles: UnsignedInt
+    offset: float
+    semi_major_axis: float
+    semi_minor_axis: float
+    velocity: float | None = attribute(deprecated="1.2")
+    central_object: CentralSwarmObject
+    traffic_definition: TrafficDefinition | None = child(deprecated="1.3", required_until="1.2")
+    speed_range: Range | None = child(since="1.2", until="1.2")
+    area_distribution: AreaDistribution | None = child(since="1.2", until="1.2")
+    traffic_distribution: TrafficDistribution | None = child(since="1.3")
+    initial_speed_range: Range | None = child(since="1.3")
+    direction_of_travel_distribution: DirectionOfTravelDistribution | None = child(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lane(Element):
+    """A lane by its id."""
+
+    id: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadCursor(Element):
+    """A place on a road [m], and which lanes there."""
+
+    road_id: str
+    s: float | None = None
+    lane: tuple[Lane, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoadRange(Element):
+    """A stretch of road from cursor to cursor; length [m]."""
+
+    length: float | None = None
+    road_cursor: tuple[RoadCursor, ...] = children(minimum=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polygon(Element):
+    """An area by its corners."""
+
+    position: tuple[Position, ...] = children(minimum=3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficArea(Element, content=CHOICE):
+    """Where traffic is kept."""
+
+    polygon: Polygon | None = None
+    road_range: tuple[RoadRange, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficAreaAction(Element, content=ALL):
+    """Keeps a number of participants in an area."""
+
+    number_of_entities: UnsignedInt
+    continuous: bool
+    traffic_distribution: TrafficDistribution
+    traffic_area: TrafficArea
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficStopAction(Element):
+    """Ends the traffic of that name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrafficAction(Element, content=Choice(empty_until="1.2")):
+    """Starts or ends background traffic."""
+
+    traffic_name: str | None = attribute(since="1.1")
+    traffic_source_action: TrafficSourceAction | None = None
+    traffic_sink_action: TrafficSinkAction | None = None
+    traffic_swarm_action: TrafficSwarmAction | None = None
+    traffic_area_action: TrafficAreaAction | None = child(since="1.3")
+    traffic_stop_action: TrafficStopAction | None = child(since="1.1")

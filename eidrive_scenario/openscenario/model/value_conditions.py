@@ -1,0 +1,78 @@
+"""Conditions on time, parameters, variables and the storyboard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from eidrive_scenario.openscenario.model.content import Choice
+from eidrive_scenario.openscenario.model.element import Element, child
+from eidrive_scenario.openscenario.model.enumerations import Rule, StoryboardElementState, StoryboardElementType
+from eidrive_scenario.openscenario.model.scalars import ParameterName, StoryboardElementName, VariableName
+from eidrive_scenario.openscenario.model.signals import TrafficSignalCondition, TrafficSignalControllerCondition
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterCondition(Element):
+    """A parameter's value."""
+
+    parameter_ref: ParameterName
+    rule: Rule
+    value: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariableCondition(Element):
+    """A variable's value."""
+
+    variable_ref: VariableName
+    rule: Rule
+    value: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeOfDayCondition(Element):
+    """The simulated date and time."""
+
+    date_time: datetime
+    rule: Rule
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationTimeCondition(Element):
+    """Time since the start of the run [s]."""
+
+    rule: Rule
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoryboardElementStateCondition(Element):
+    """An element of the storyboard is in a state, or passes through a transition."""
+
+    storyboard_element_ref: StoryboardElementName
+    state: StoryboardElementState
+    storyboard_element_type: StoryboardElementType
+
+
+@dataclass(frozen=True, kw_only=True)
+class UserDefinedValueCondition(Element):
+    """A value that comes from outside."""
+
+    name: str
+    rule: Rule
+    value: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ByValueCondition(Element, content=Choice(empty_until="1.2")):
+    """A condition on a value."""
+
+    parameter_condition: ParameterCondition | None = None
+    time_of_day_condition: TimeOfDayCondition | None = None
+    simulation_time_condition: SimulationTimeCondition | None = None
+    storyboard_element_state_condition: StoryboardElementStateCondition | None = None
+    user_defined_value_condition: UserDefinedValueCondition | None = None
+    traffic_signal_condition: TrafficSignalCondition | None = None
+    traffic_signal_controller_condition: TrafficSignalControllerCondition | None = None
+    variable_condition: VariableCondition | None = child(since="1.2")

@@ -1,0 +1,93 @@
+"""Vehicles, their axles, limits and trailers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.openscenario.model.bounding_box import BoundingBox
+from eidrive_scenario.openscenario.model.content import ALL, CHOICE
+from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
+from eidrive_scenario.openscenario.model.element import Element, attribute, child
+from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.openscenario.model.properties import Properties
+from eidrive_scenario.openscenario.model.sensors import SensorAttachments
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario.model.entities import EntityRef, ScenarioObject
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axle(Element):
+    """One axle: largest steering angle [rad], position, track width and wheel diameter [m]."""
+
+    max_steering: float
+    position_x: float
+    position_z: float
+    track_width: float
+    wheel_diameter: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axles(Element):
+    """The axles of a vehicle."""
+
+    front_axle: Axle | None = child(required_until="1.2")
+    rear_axle: Axle
+    additional_axle: tuple[Axle, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Performance(Element):
+    """Limits of a vehicle: speed [m/s], acceleration and deceleration [m/s²], their rates [m/s³]."""
+
+    max_acceleration: float
+    max_deceleration: float
+    max_speed: float
+    max_acceleration_rate: float | None = attribute(since="1.2")
+    max_deceleration_rate: float | None = attribute(since="1.2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrailerHitch(Element):
+    """Where a trailer is hitched, from the reference point [m]."""
+
+    dx: float
+    dz: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrailerCoupler(Element):
+    """Where a trailer couples to what draws it, from the reference point [m]."""
+
+    dx: float
+    dz: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trailer(Element, content=CHOICE):
+    """What a vehicle draws."""
+
+    trailer: ScenarioObject | None = None
+    trailer_ref: EntityRef | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vehicle(Element, content=ALL):
+    """A vehicle: body, limits, axles. Mass [kg]."""
+
+    name: str
+    vehicle_category: VehicleCategory
+    mass: float | None = attribute(since="1.1")
+    model3d: str | None = attribute(since="1.1")
+    vehicle_role: Role | None = attribute(since="1.2", until="1.2")
+    role: Role | None = attribute(since="1.3")
+    parameter_declarations: ParameterDeclarations | None = None
+    bounding_box: BoundingBox
+    performance: Performance
+    axles: Axles
+    properties: Properties | None = child(required_until="1.2")
+    sensor_attachments: SensorAttachments | None = child(since="1.2", until="1.2")
+    trailer_hitch: TrailerHitch | None = child(since="1.3")
+    trailer_coupler: TrailerCoupler | None = child(since="1.3")
+    trailer: Trailer | None = child(since="1.3")

@@ -1,0 +1,92 @@
+"""Parameters that differ from seed to seed, as a scenario's `eidrive.variation` commands state them.
+
+    <CustomCommandAction type="eidrive.variation">
+        {EgoStart: {uniform: [-0.15, 0.15]}, EgoSpeedFactor: {normal: [1.0, 0.005]}}
+    </CustomCommandAction>
+
+The parameters are declared in the file as any other; their declared value is what other engines use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.openscenario.model import CustomCommandAction
+from eidrive_scenario.openscenario.scenario import Scenario
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+
+COMMAND = "eidrive.variation"
+
+
+class Distribution(Settings):
+    """How one parameter is drawn: exactly one of the two."""
+
+    uniform: tuple[float, float] | None = None
+    """Lower and upper bound."""
+    normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
+    """Mean and standard deviation, cut at three standard deviations."""
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> Distribution:
+        if (self.uniform is None) == (self.normal is None):
+            raise ValueError("give either uniform: [low, high] or normal: [mean, sd]")
+        if self.uniform is not None and self.uniform[0] > self.uniform[1]:
+            raise ValueError("the lower bound of uniform is above the upper one")
+        return self
+
+    def draw(self, seed: int, name: str) -> float:
+        """The value of the parameter `name` for this seed."""
+        random = generator(seed, "variation", name)
+        if self.uniform is not None:
+            return float(random.uniform(*self.uniform))
+        mean, sd = self.normal or (0.0, 0.0)
+        return mean + sd * min(3.0, max(-3.0, float(random.standard_normal())))
+
+
+def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
+    """The parameters that this scenario draws for `seed`. Raises SettingError with file:line."""
+    drawn: dict[str, str] = {}
+    for action in _commands(scenario):
+        data = load_yaml(action.value, source=action.source, line=action.line)
+        if not isinstance(data, dict):
+            raise SettingError(
+                Problem(
+                    f"{COMMAND} holds {data!r}",
+                    "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}",
+                    action.source,
+                    action.line,
+                )
+            )
+        for name, spec in data.items():
+            drawn[name] = repr(_distribution(scenario, action, str(name), spec).draw(seed, str(name)))
+    return drawn
+
+
+def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, spec: Any) -> Distribution:
+    if name not in scenario.parameters:
+        raise SettingError(
+            Problem(
+                f"{COMMAND} names the undeclared parameter {name!r}",
+                suggestion(name, scenario.parameters),
+                action.source,
+                action.line,
+            )
+        )
+    if not isinstance(spec, dict):
+        spec = {"": spec}
+    return parse_settings(Distribution, spec, source=action.source, line=action.line)
+
+
+def _commands(scenario: Scenario) -> Iterator[CustomCommandAction]:
+    init = scenario.storyboard.init
+    if init.actions is None:
+        return
+    for user_defined in init.actions.user_defined_action:
+        command = user_defined.custom_command_action
+        if command is not None and command.type == COMMAND:
+            yield command
