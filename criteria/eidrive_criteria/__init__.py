@@ -1,1 +1,1 @@
-"""Pass/fail criteria."""
+"""Pass/fail criteria: one per file, each a fold over frames. They import the engine's api only."""

@@ -1,1 +1,21 @@
-"""The frame: all that happened in one tick; what a run leaves behind, and reading it again."""
+"""The frame; what a run leaves behind, and reading it again."""
+
+from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
+from eidrive_scenario.recording.csv_writer import CsvWriter
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recorder import Recorder, Recording, read_recording
+from eidrive_scenario.recording.trace_hash import TraceHash
+
+__all__ = [
+    "Criterion",
+    "CriterionSettings",
+    "CsvWriter",
+    "Frame",
+    "Recorder",
+    "Recording",
+    "TraceHash",
+    "Verdict",
+    "judge",
+    "never_appeared",
+    "read_recording",
+]

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -23,10 +26,33 @@ class Verdict:
     """True ends the run as soon as it fails."""
 
 
-class Criterion(ABC):
-    """Observes every frame of a run once, in order, then answers."""
+class CriterionSettings(Settings):
+    """What every criterion may be told; a criterion's own settings add to it."""
 
+    name: str | None = None
+    """What the verdict is called; the criterion's registered name where None."""
+    fatal: bool = False
+    """End the run as soon as this criterion fails."""
+
+
+class Criterion(ABC):
+    """Observes every frame of a run once, in order, then answers.
+
+    A class is registered in the entry points `eidrive_scenario.criteria` and built as `cls(settings)`, with `settings`
+    an instance of its `settings_type`. An actor that it looks at and that never appeared is a failed verdict with the
+    reason `never_appeared`, never a pass.
+    """
+
+    settings_type: ClassVar[type[CriterionSettings]] = CriterionSettings
     name: str
+    fatal: bool = False
+    subjects: tuple[str, ...] = ()
+    """The actors that it cannot do without; whoever knows the scenario's entities checks them before the run."""
+
+    def __init__(self, settings: CriterionSettings) -> None:
+        if settings.name is not None:
+            self.name = settings.name
+        self.fatal = settings.fatal
 
     @abstractmethod
     def observe(self, frame: Frame) -> None:
@@ -35,3 +61,22 @@ class Criterion(ABC):
     @abstractmethod
     def verdict(self) -> Verdict:
         """The verdict over all frames so far; may be asked at any time."""
+
+    def metrics(self) -> Mapping[str, float]:
+        """Numbers worth keeping beside the verdict, by a name that starts with the criterion's."""
+        return {}
+
+
+def never_appeared(names: Iterable[str]) -> str:
+    """The reason of a verdict about actors that were never in the world."""
+    names = sorted(names)
+    verb = "was" if len(names) == 1 else "were"
+    return f"{' and '.join(names)} {verb} never in the world, so nothing was measured"
+
+
+def judge(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
+    """The verdicts of `criteria` over `frames`, say of a recording."""
+    for frame in frames:
+        for criterion in criteria:
+            criterion.observe(frame)
+    return tuple(criterion.verdict() for criterion in criteria)

@@ -1,0 +1,86 @@
+"""No contact between an actor and others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pydantic import Field
+
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+
+
+class CollisionSettings(CriterionSettings):
+    """`{of: Ego}` for contact with anything, `{of: Ego, with: Incoming}` or `{of: Ego, with: [A, B]}` for some."""
+
+    of: str
+    others: str | tuple[str, ...] | None = Field(default=None, alias="with")
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A first touch at `time` [s], at `x`, `y` [m], with `speed` of approach [m/s]."""
+
+    time: float
+    other: str
+    x: float
+    y: float
+    speed: float
+
+
+class Collision(Criterion):
+    """Fails with the first touch and says who hit whom, when, where and how fast; the value counts the touches."""
+
+    settings_type = CollisionSettings
+    name = "collision"
+
+    def __init__(self, settings: CollisionSettings) -> None:
+        super().__init__(settings)
+        others = settings.others
+        self._of = settings.of
+        self._others = (others,) if isinstance(others, str) else others
+        self.subjects = (self._of, *(self._others or ()))
+        self._missing = set(self.subjects)
+        self._impacts: list[Impact] = []
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        if self._missing:
+            self._missing.difference_update(view.names)
+        for contact in view.contacts:
+            if self._of not in (contact.first, contact.second):
+                continue
+            other = contact.second if contact.first == self._of else contact.first
+            if self._others is None or other in self._others:
+                x, y, _ = contact.position
+                self._impacts.append(Impact(view.time, other, x, y, contact.closing_speed))
+
+    def verdict(self) -> Verdict:
+        first = self._impacts[0] if self._impacts else None
+        if first is not None:
+            reason = (
+                f"{self._of} and {first.other} hit each other at {first.time:.2f} s at "
+                f"({first.x:.1f}, {first.y:.1f}) m with {first.speed:.1f} m/s"
+            )
+        elif self._missing:
+            reason = never_appeared(self._missing)
+        else:
+            reason = f"{self._of} touched {'none of ' + ', '.join(self._others) if self._others else 'nothing'}"
+        return Verdict(
+            name=self.name,
+            passed=first is None and not self._missing,
+            value=float(len(self._impacts)),
+            limit=0.0,
+            unit="",
+            first_violation=first.time if first is not None else None,
+            reason=reason,
+            fatal=self.fatal,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Number of touches; time [s] and speed of approach [m/s] of the first one, where there was one."""
+        found = {f"{self.name}.count": float(len(self._impacts))}
+        if self._impacts:
+            found[f"{self.name}.time"] = self._impacts[0].time
+            found[f"{self.name}.impact_speed"] = self._impacts[0].speed
+        return found

@@ -1,0 +1,61 @@
+"""An actor must not be faster than a limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+
+
+class MaxSpeedSettings(CriterionSettings):
+    """`{of: Ego, at_most: 13.9}` [m/s]; without `at_most` it measures and passes."""
+
+    of: str
+    at_most: Annotated[float, Field(gt=0)] | None = None
+
+
+class MaxSpeed(Criterion):
+    """Fails where the actor's speed along its heading, forwards or backwards, exceeds `at_most`."""
+
+    settings_type = MaxSpeedSettings
+    name = "max_speed"
+
+    def __init__(self, settings: MaxSpeedSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self.subjects = (settings.of,)
+        self._fastest, self._when = -math.inf, math.nan
+        self._violated: float | None = None
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        row = view.rows.get(self._settings.of)
+        if row is None:
+            return
+        speed, limit = abs(float(view.speed[row])), self._settings.at_most
+        if speed > self._fastest:
+            self._fastest, self._when = speed, view.time
+        if self._violated is None and limit is not None and speed > limit:
+            self._violated = view.time
+
+    def verdict(self) -> Verdict:
+        of, seen = self._settings.of, math.isfinite(self._fastest)
+        reason = f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s" if seen else never_appeared([of])
+        return Verdict(
+            name=self.name,
+            passed=seen and self._violated is None,
+            value=self._fastest if seen else None,
+            limit=self._settings.at_most,
+            unit="m/s",
+            first_violation=self._violated,
+            reason=reason,
+            fatal=self.fatal,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """The largest speed [m/s]."""
+        return {f"max_speed.{self._settings.of}": self._fastest} if math.isfinite(self._fastest) else {}

@@ -1,0 +1,76 @@
+"""An actor must come to a place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+
+
+class ReachPositionSettings(CriterionSettings):
+    """`{of: Ego, x: 42.0, y: -3.5, within: 2.0, by: 30}`: no farther than `within` [m] from there, until `by` [s].
+
+    A fatal one ends the run when `by` has passed in vain; without `by` it stays open to the end.
+    """
+
+    of: str
+    x: float
+    y: float
+    within: Annotated[float, Field(gt=0)] = 2.0
+    by: Annotated[float, Field(gt=0)] | None = None
+
+
+class ReachPosition(Criterion):
+    """Passes once the actor's reference point, seen from above, has come near enough in time."""
+
+    settings_type = ReachPositionSettings
+    name = "reach_position"
+
+    def __init__(self, settings: ReachPositionSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self.subjects = (settings.of,)
+        self._nearest = math.inf
+        self._reached: float | None = None
+        self._late = False
+
+    def observe(self, frame: Frame) -> None:
+        view, settings = frame.view, self._settings
+        row = view.rows.get(settings.of)
+        self._late = settings.by is not None and view.time > settings.by + 1e-9
+        if row is None or self._late:
+            return
+        x, y, _ = view.position[row].tolist()
+        distance = math.hypot(x - settings.x, y - settings.y)
+        self._nearest = min(self._nearest, distance)
+        if self._reached is None and distance <= settings.within:
+            self._reached = view.time
+
+    def verdict(self) -> Verdict:
+        settings = self._settings
+        place = f"({settings.x:.1f}, {settings.y:.1f})"
+        if self._reached is not None:
+            reason = f"{settings.of} reached {place} at {self._reached:.2f} s"
+        elif math.isfinite(self._nearest):
+            until = "" if settings.by is None else f" until {settings.by:.2f} s"
+            reason = f"{settings.of} came no nearer to {place} than {self._nearest:.2f} m{until}"
+        else:
+            reason = never_appeared([settings.of])
+        return Verdict(
+            name=self.name,
+            passed=self._reached is not None,
+            value=self._nearest if math.isfinite(self._nearest) else None,
+            limit=settings.within,
+            unit="m",
+            first_violation=None,
+            reason=reason,
+            fatal=self.fatal and self._late,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """When the actor arrived [s], where it did."""
+        return {} if self._reached is None else {f"{self.name}.time": self._reached}

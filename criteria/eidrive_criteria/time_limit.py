@@ -1,0 +1,46 @@
+"""The run must end by itself in time."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict
+
+
+class TimeLimitSettings(CriterionSettings):
+    """`{within: 60}`: by its stop trigger, or as its storyboard is complete, no later than that [s]."""
+
+    within: Annotated[float, Field(gt=0)]
+    fatal: bool = True
+
+
+class TimeLimit(Criterion):
+    """Fails, and by default ends the run, when it goes on after `within` [s] of simulated time."""
+
+    settings_type = TimeLimitSettings
+    name = "time_limit"
+
+    def __init__(self, settings: TimeLimitSettings) -> None:
+        super().__init__(settings)
+        self._within = settings.within
+        self._time = 0.0
+
+    def observe(self, frame: Frame) -> None:
+        self._time = frame.view.time
+
+    def verdict(self) -> Verdict:
+        # Time is tick * dt: its rounding must not fail a run that ends exactly on the limit.
+        passed = self._time <= self._within + 1e-9
+        verb = "lasted" if passed else "had not ended by itself after"
+        return Verdict(
+            name=self.name,
+            passed=passed,
+            value=self._time,
+            limit=self._within,
+            unit="s",
+            first_violation=None if passed else self._time,
+            reason=f"the run {verb} {self._time:.2f} s",
+            fatal=self.fatal,
+        )

@@ -1,0 +1,103 @@
+"""The library of scenarios, channel profiles and weather presets that travels with the engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, SettingError, suggestion
+
+Kind = Literal["channels", "weather"]
+Definition = Literal["scenario", "catalog", "distribution", "unreadable", "other"]
+
+_SUFFIX = ".xosc"
+
+
+def library_path() -> Path:
+    """The library's folder: package data of an installed wheel, `xosc` in a checkout. Raises SettingError."""
+    package = Path(__file__).parent
+    for folder in (package / "library", package.parent / "xosc"):
+        if folder.is_dir():
+            return folder
+    raise SettingError(Problem("the scenario library is missing", "install the package again", str(package)))
+
+
+def scenarios() -> list[str]:
+    """Names of the library's scenarios, such as `coop/scenario_1`, sorted."""
+    root = library_path()
+    return sorted(
+        path.relative_to(root).with_suffix("").as_posix()
+        for path in root.rglob(f"*{_SUFFIX}")
+        if definition(path) == "scenario"
+    )
+
+
+def resolve_scenario(name: str | Path) -> Path:
+    """The file of a scenario given by path or by library name; a file wins over a library's scenario of that name.
+
+    Raises SettingError, with the nearest name, if there is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    if not path.is_absolute():
+        inside = library_path() / path
+        for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
+            if candidate.is_file() and candidate.suffix == _SUFFIX:
+                return candidate
+    if path.is_dir():
+        raise SettingError(Problem(f"{str(name)!r} is a folder", "give one .xosc file"))
+    remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
+    raise SettingError(Problem(f"no scenario {str(name)!r}: neither a file nor in the library", remedy))
+
+
+def names(kind: Kind) -> list[str]:
+    """Names of the library's channel profiles or weather presets, sorted."""
+    return sorted(path.stem for path in (library_path() / kind).glob("*.yaml"))
+
+
+def resolve(kind: Kind, name: str | Path) -> Path:
+    """The file of a channel profile or weather preset given by path or name. Raises SettingError, with the nearest."""
+    path = Path(name)
+    if path.is_file():
+        return path
+    inside = library_path() / kind / f"{name}.yaml"
+    if inside.is_file():
+        return inside
+    singular = "channel profile" if kind == "channels" else "weather preset"
+    remedy = suggestion(str(name), names(kind))
+    raise SettingError(Problem(f"no {singular} {str(name)!r}: neither a file nor in the library", remedy))
+
+
+def definition(path: Path) -> Definition:
+    """What an OpenSCENARIO file defines, by its first elements, read without entities and network.
+
+    `other` is XML that is not OpenSCENARIO; `unreadable` is no XML before that could be told.
+    """
+    kinds: dict[str, Definition] = {
+        "Catalog": "catalog",
+        "ParameterValueDistribution": "distribution",
+        "RoadNetwork": "scenario",
+        "Entities": "scenario",
+        "Storyboard": "scenario",
+    }
+    try:
+        with path.open("rb") as stream:
+            depth = 0
+            for event, element in etree.iterparse(
+                stream, events=("start", "end"), resolve_entities=False, no_network=True, load_dtd=False
+            ):
+                if event == "end":
+                    depth -= 1
+                    continue
+                depth += 1
+                word = etree.QName(element).localname if isinstance(element.tag, str) else ""
+                if depth == 1 and word != "OpenSCENARIO":
+                    return "other"
+                if depth == 2 and word in kinds:
+                    return kinds[word]
+    except (OSError, etree.XMLSyntaxError):
+        return "unreadable"
+    return "scenario"

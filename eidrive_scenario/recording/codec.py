@@ -1,0 +1,135 @@
+"""Frozen dataclasses to JSON and back without loss, driven by the types of their fields.
+
+Numbers keep all 64 bits (Python writes the shortest decimal that reads back the same). What JSON has no number for is
+written as in protobuf's JSON mapping: "NaN", "Infinity", "-Infinity". Arrays are nested lists; an empty one is
+{"shape": [0, 7]}, as its shape would be lost.
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+Json = Any
+_SCALARS = {bool: "boolean", int: "integer", str: "string"}
+_NUMBER = {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
+
+
+@dataclass(frozen=True)
+class Codec:
+    """How one type is written, read again, and described by a JSON schema."""
+
+    encode: Callable[[Any], Json]
+    decode: Callable[[Json], Any]
+    schema: Mapping[str, Json]
+
+
+@cache
+def codec(kind: Any) -> Codec:
+    """The codec of a type: a scalar, an enum, an array, a tuple, a mapping, an optional one, or a dataclass of these.
+
+    Raises TypeError for any other type, when it is asked for, not when a run writes.
+    """
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is float:
+        return Codec(_encode_float, float, _NUMBER)
+    if kind in _SCALARS:
+        return Codec(kind, kind, {"type": _SCALARS[kind]})
+    if origin is Literal:
+        return Codec(_same, _same, {"enum": list(arguments)})
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return Codec(lambda member: member.value, kind, {"enum": [member.value for member in kind]})
+    if origin is np.ndarray:
+        return _array(np.dtype(get_args(arguments[1])[0]))
+    if origin in (Union, types.UnionType) and type(None) in arguments and len(arguments) == 2:
+        return _optional(codec(next(argument for argument in arguments if argument is not type(None))))
+    if origin in (tuple, frozenset):
+        return _sequence(origin, arguments)
+    if isinstance(origin, type) and issubclass(origin, Mapping) and arguments[0] is str:
+        return _mapping(codec(arguments[1]))
+    if is_dataclass(kind) and isinstance(kind, type):
+        return _record(kind)
+    raise TypeError(f"no way to write {kind!r} as JSON")
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+def _encode_float(value: float) -> Json:
+    if math.isfinite(value):
+        return float(value)
+    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+
+
+def _array(dtype: np.dtype[Any]) -> Codec:
+    def encode(array: Any) -> Json:
+        if array.size == 0:
+            return {"shape": list(array.shape)}
+        nested = array.tolist()
+        return nested if dtype.kind != "f" or np.isfinite(array).all() else _spell(nested)
+
+    def decode(data: Json) -> Any:
+        return np.empty(data["shape"], dtype) if isinstance(data, dict) else np.array(data, dtype)
+
+    empty = {"type": "object", "properties": {"shape": {"type": "array", "items": {"type": "integer"}}}}
+    return Codec(encode, decode, {"anyOf": [{"type": "array"}, empty]})
+
+
+def _spell(nested: Any) -> Json:
+    return [_spell(item) for item in nested] if isinstance(nested, list) else _encode_float(nested)
+
+
+def _optional(inner: Codec) -> Codec:
+    return Codec(
+        lambda value: None if value is None else inner.encode(value),
+        lambda data: None if data is None else inner.decode(data),
+        {"anyOf": [inner.schema, {"type": "null"}]},
+    )
+
+
+def _sequence(origin: type, arguments: tuple[Any, ...]) -> Codec:
+    if origin is frozenset or arguments[-1] is Ellipsis:
+        item = codec(arguments[0])
+        order = sorted if origin is frozenset else list
+        return Codec(
+            lambda values: [item.encode(value) for value in order(values)],
+            lambda data: origin(item.decode(value) for value in data),
+            {"type": "array", "items": item.schema},
+        )
+    items = [codec(argument) for argument in arguments]
+    return Codec(
+        lambda values: [item.encode(value) for item, value in zip(items, values, strict=True)],
+        lambda data: tuple(item.decode(value) for item, value in zip(items, data, strict=True)),
+        {"type": "array", "prefixItems": [item.schema for item in items], "minItems": len(items)},
+    )
+
+
+def _mapping(value_codec: Codec) -> Codec:
+    return Codec(
+        lambda mapping: {key: value_codec.encode(value) for key, value in mapping.items()},
+        lambda data: {key: value_codec.decode(value) for key, value in data.items()},
+        {"type": "object", "additionalProperties": value_codec.schema},
+    )
+
+
+def _record(kind: type) -> Codec:
+    hints = get_type_hints(kind)
+    codecs = {field.name: codec(hints[field.name]) for field in fields(kind)}
+    required = [f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
+
+    def encode(record: Any) -> Json:
+        return {name: field.encode(getattr(record, name)) for name, field in codecs.items()}
+
+    def decode(data: Json) -> Any:
+        return kind(**{name: codecs[name].decode(value) for name, value in data.items()})
+
+    properties = {name: field.schema for name, field in codecs.items()}
+    return Codec(encode, decode, {"type": "object", "properties": properties, "required": required})

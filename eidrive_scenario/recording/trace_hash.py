@@ -1,0 +1,57 @@
+"""A fingerprint of a run: equal where two runs did the same, bit by bit."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+
+import numpy as np
+
+from eidrive_scenario.recording.frame import Frame
+
+
+class TraceHash:
+    """SHA-256 over every frame's actors, poses, velocities, contacts, state changes and fates of messages.
+
+    Floats enter with their 64 bits, little-endian, so a difference in the last place shows. The hash is the same in
+    every process with the same scenario, seed, settings and installed versions on one kind of machine. Other processor
+    families and builds of libm, numpy or bullet may round differently; across those compare metrics, not hashes.
+    """
+
+    def __init__(self) -> None:
+        self._sha = hashlib.sha256()
+
+    def observe(self, frame: Frame) -> None:
+        """Take one frame in."""
+        view = frame.view
+        self._texts(*view.names)
+        self._floats(view.time)
+        angles = np.stack([view.yaw, view.pitch, view.roll], axis=1)
+        kinematics = np.concatenate([view.position, angles, view.velocity], axis=1)
+        self._sha.update(kinematics.astype("<f8", copy=False).tobytes())
+        for contact in view.contacts:
+            self._texts("contact", contact.first, contact.second)
+            self._floats(*contact.position, contact.closing_speed)
+        for change in frame.changes:
+            transition = change.transition.value if change.transition is not None else ""
+            self._texts("change", change.path, change.kind, change.before.value, transition, change.after.value)
+            self._floats(change.time)
+        for link in frame.links:
+            self._texts("link", link.sender, link.receiver, link.outcome, link.reason)
+            arrives = float("inf") if link.arrives is None else link.arrives
+            self._floats(link.number, link.sent, arrives, link.size)
+
+    def hexdigest(self) -> str:
+        """64 hexadecimal digits over the frames so far."""
+        return self._sha.hexdigest()
+
+    def close(self) -> None:
+        """Nothing to finish; observers have it."""
+
+    def _texts(self, *texts: str) -> None:
+        """Names with their lengths before them, so that ('ab', 'c') differs from ('a', 'bc')."""
+        encoded = [text.encode() for text in texts]
+        self._sha.update(struct.pack(f"<{len(encoded) + 1}I", len(encoded), *map(len, encoded)) + b"".join(encoded))
+
+    def _floats(self, *numbers: float) -> None:
+        self._sha.update(struct.pack(f"<{len(numbers)}d", *numbers))

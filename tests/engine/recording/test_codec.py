@@ -1,0 +1,79 @@
+"""JSON and back without loss."""
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from eidrive_scenario.recording.codec import codec
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.storyboard.states import State
+
+
+def round_trip(kind: Any, value: Any) -> Any:
+    text = json.dumps(codec(kind).encode(value), allow_nan=False)
+    return codec(kind).decode(json.loads(text))
+
+
+@given(st.floats())
+def test_a_float_keeps_its_bits(number: float) -> None:
+    assert np.float64(round_trip(float, number)).tobytes() == np.float64(number).tobytes() or np.isnan(number)
+
+
+def test_what_json_has_no_number_for_is_spelled_as_in_protobuf() -> None:
+    assert codec(float).encode(float("-inf")) == "-Infinity"
+    assert np.isnan(round_trip(float, float("nan")))
+    array = np.array([[np.nan, np.inf], [-np.inf, -0.0]])
+    assert codec(NDArray[np.float64]).encode(array) == [["NaN", "Infinity"], ["-Infinity", -0.0]]
+    assert round_trip(NDArray[np.float64], array).tobytes() == array.tobytes()
+
+
+@pytest.mark.parametrize("shape", [(0, 7), (0,), (0, 2, 2), (3, 0)])
+def test_an_empty_array_keeps_its_shape(shape: tuple[int, ...]) -> None:
+    again = round_trip(NDArray[np.float64], np.empty(shape))
+    assert again.shape == shape
+    assert again.dtype == np.float64
+
+
+def test_integers_stay_integers() -> None:
+    rows = np.array([[1, -1]], dtype=np.int32)
+    again = round_trip(NDArray[np.int32], rows)
+    assert again.dtype == np.int32
+    assert np.array_equal(again, rows)
+
+
+def test_the_other_kinds() -> None:
+    assert round_trip(State, State.RUNNING) is State.RUNNING
+    assert round_trip(float | None, None) is None
+    assert round_trip(tuple[str, ...], ("a", "b")) == ("a", "b")
+    assert round_trip(tuple[float, int], (1.5, 2)) == (1.5, 2)
+    assert round_trip(frozenset[str], frozenset({"b", "a"})) == {"a", "b"}
+    assert round_trip(dict[str, tuple[int, ...]], {"a": (1,)}) == {"a": (1,)}
+    assert round_trip(Literal["x", "y"], "x") == "x"
+
+
+def test_a_field_that_an_older_file_lacks_takes_its_default() -> None:
+    @dataclass(frozen=True)
+    class Newer:
+        old: int
+        new: float = 2.5
+
+    assert codec(Newer).decode({"old": 1}) == Newer(1, 2.5)
+    assert codec(Newer).schema["required"] == ["old"]
+
+
+def test_a_type_that_cannot_be_written_is_refused_at_once() -> None:
+    with pytest.raises(TypeError, match="no way to write"):
+        codec(complex)
+
+
+def test_the_schema_names_all_fields_of_a_frame() -> None:
+    schema = codec(Frame).schema
+    assert set(schema["properties"]) == {"view", "steps", "changes", "links"}
+    station = schema["properties"]["steps"]["additionalProperties"]
+    assert station["properties"]["outbox"]["items"]["properties"]["sender"] == {"type": "string"}

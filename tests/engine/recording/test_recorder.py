@@ -1,0 +1,99 @@
+"""What a run leaves behind can be read again, to the last bit."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.recording import Recorder, TraceHash, read_recording
+from eidrive_scenario.recording.codec import codec
+from eidrive_scenario.recording.frame import Frame
+
+MakeFrame = Callable[..., Frame]
+
+
+def record(path: Path, frames: list[Frame]) -> Path:
+    recorder = Recorder(path, metadata={"scenario": "cut_in", "seed": "7"}, attachments={"road.xodr": b"<OpenDRIVE/>"})
+    for frame in frames:
+        recorder.observe(frame)
+    recorder.close()
+    return path
+
+
+def fingerprint(frames: list[Frame]) -> str:
+    trace = TraceHash()
+    for frame in frames:
+        trace.observe(frame)
+    return trace.hexdigest()
+
+
+def test_frames_come_back_to_the_last_bit(tmp_path: Path, make_frame: MakeFrame) -> None:
+    frames = [make_frame(tick) for tick in range(20)]
+    recording = read_recording(record(tmp_path / "run.mcap", frames))
+    again = list(recording.frames())
+    assert fingerprint(again) == fingerprint(frames)
+    for first, second in zip(frames, again, strict=True):
+        assert codec(Frame).encode(first) == codec(Frame).encode(second)
+        assert first.changes == second.changes
+        assert first.links == second.links
+        assert first.view.contacts == second.view.contacts
+        assert first.view.position.tobytes() == second.view.position.tobytes()
+        assert second.steps["Ego"].detections.boxes.shape == (0, 7)
+        assert np.array_equal(first.steps["Rsu"].detections.velocity, second.steps["Rsu"].detections.velocity, True)
+
+
+def test_it_says_what_was_run(tmp_path: Path, make_frame: MakeFrame) -> None:
+    recording = read_recording(record(tmp_path / "deep" / "run.mcap", [make_frame(0), make_frame(1)]))
+    assert (recording.scenario, recording.seed, recording.frame_count) == ("cut_in", 7, 2)
+    assert recording.attachments == {"road.xodr": b"<OpenDRIVE/>"}
+    assert recording.metadata["numpy"] == np.__version__
+
+
+def test_equal_runs_give_equal_files(tmp_path: Path, make_frame: MakeFrame) -> None:
+    files = [record(tmp_path / name, [make_frame(tick) for tick in range(5)]) for name in ("a.mcap", "b.mcap")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_any_mcap_tool_reads_it(tmp_path: Path, make_frame: MakeFrame) -> None:
+    path = record(tmp_path / "run.mcap", [make_frame(3)])
+    with path.open("rb") as stream:
+        ((schema, channel, message),) = make_reader(stream).iter_messages()
+    assert schema is not None
+    assert (schema.name, schema.encoding) == ("eidrive.Frame", "jsonschema")
+    assert (channel.topic, channel.message_encoding) == ("/frame", "json")
+    assert message.log_time == 150_000_000
+    assert message.sequence == 3
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_a_file_that_was_cut_short_gives_what_it_holds(tmp_path: Path, make_frame: MakeFrame, share: float) -> None:
+    whole = record(tmp_path / "run.mcap", [make_frame(tick) for tick in range(600)]).read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: int(share * len(whole))])
+    recording = read_recording(cut)
+    ticks = [frame.view.tick for frame in recording.frames()]
+    assert ticks == list(range(len(ticks)))
+    assert len(ticks) < 600
+    assert share < 0.9 or ticks
+
+
+@pytest.mark.parametrize("content", [b"", b"not a recording", b"\x89MCAP0\r\n"])
+def test_another_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "wrong.mcap"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"wrong\.mcap"):
+        read_recording(path)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.mcap: cannot read"):
+        read_recording(tmp_path / "none.mcap")
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SettingError, match=r"run\.mcap: cannot write"):
+        Recorder(tmp_path / "file" / "run.mcap", metadata={})

@@ -1,0 +1,80 @@
+"""Equal runs, equal hashes; every difference shows."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.recording import TraceHash
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.world.view import Contact
+
+MakeFrame = Callable[..., Frame]
+
+
+def fingerprint(*frames: Frame) -> str:
+    trace = TraceHash()
+    for frame in frames:
+        trace.observe(frame)
+    return trace.hexdigest()
+
+
+def of_view(frame: Frame, **changes: Any) -> Frame:
+    return replace(frame, view=replace(frame.view, **changes))
+
+
+def nudged(array: Any) -> Any:
+    """The same array with its last number one unit in the last place higher."""
+    other = array.copy()
+    other.flat[-1] = np.nextafter(other.flat[-1], np.inf)
+    return other
+
+
+def test_equal_frames_equal_hash(make_frame: MakeFrame) -> None:
+    assert fingerprint(make_frame(1), make_frame(2)) == fingerprint(make_frame(1), make_frame(2))
+    assert fingerprint(make_frame(1), make_frame(2)) != fingerprint(make_frame(2), make_frame(1))
+
+
+@pytest.mark.parametrize("field", ["position", "yaw", "pitch", "roll", "velocity"])
+def test_the_last_bit_of_the_motion_counts(make_frame: MakeFrame, field: str) -> None:
+    frame = make_frame(1)
+    assert fingerprint(of_view(frame, **{field: nudged(getattr(frame.view, field))})) != fingerprint(frame)
+
+
+def test_names_contacts_changes_and_messages_count(make_frame: MakeFrame) -> None:
+    frame = make_frame(1)
+    others = [
+        of_view(frame, names=("Ego", "IncomingL", "öschzug")),
+        of_view(frame, contacts=()),
+        of_view(frame, contacts=(Contact("Ego", "Incoming", (1.0, 2.0, 0.3), 11.5),)),
+        replace(frame, changes=()),
+        replace(frame, links=frame.links[:1]),
+        replace(frame, links=(replace(frame.links[0], arrives=0.36), frame.links[1])),
+    ]
+    assert len({fingerprint(frame), *map(fingerprint, others)}) == 1 + len(others)
+
+
+def test_the_words_of_an_explanation_do_not_count(make_frame: MakeFrame) -> None:
+    frame = make_frame(1)
+    reworded = replace(frame, changes=(replace(frame.changes[0], why="time above 3 s"),))
+    assert fingerprint(reworded) == fingerprint(frame)
+
+
+def test_it_is_the_same_in_another_process() -> None:
+    script = (
+        "import numpy as np; from eidrive_scenario.recording import TraceHash\n"
+        "from eidrive_scenario.recording.frame import Frame; from eidrive_scenario.world.view import WorldView\n"
+        "one, three = np.ones(1), np.ones((1, 3))\n"
+        "view = WorldView(0.05, 1, ('Ego',), ('car',), three, one, one, one, three, three, one, one, three, three)\n"
+        "trace = TraceHash(); trace.observe(Frame(view)); print(trace.hexdigest())"
+    )
+    outputs = {
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    }
+    assert len(outputs) == 1
+    assert len(outputs.pop().strip()) == 64
