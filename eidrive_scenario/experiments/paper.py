@@ -29,20 +29,16 @@ SCENARIOS = {"coop/scenario_1": "Scenario 1, roadside unit", "coop/scenario_2": 
 
 @dataclass(frozen=True)
 class Arm:
-    """One row of the table. `disturbed`: its channel delays or drops, so the two rules differ."""
+    """One row of the table: the channel profile under each rule, `links` and `own`."""
 
     name: str
     title: str
-    channel: str
-    disturbed: bool = False
+    links: str
+    own: str
 
-
-ARMS = (
-    Arm("none", "no cooperation", "none"),
-    Arm("cooperation", "cooperation", "ideal"),
-    Arm("latency", "latency 0.3 s", "latency_300ms", disturbed=True),
-    Arm("error", "error 30 %", "error_30", disturbed=True),
-)
+    def channel(self, rule: Rule) -> str:
+        """The name of the profile under a rule."""
+        return self.own if rule.own_perception else self.links
 
 
 @dataclass(frozen=True)
@@ -53,6 +49,13 @@ class Rule:
     title: str
     own_perception: bool
 
+
+ARMS = (
+    Arm("none", "no cooperation", "none", "none"),
+    Arm("cooperation", "cooperation", "ideal", "paper_ideal"),
+    Arm("latency", "latency 0.3 s", "latency_300ms", "paper_latency_300ms"),
+    Arm("error", "error 30 %", "error_30pct", "paper_error_30pct"),
+)
 
 LINKS = Rule("links", "the channel acts on links only", False)
 OWN = Rule("own_perception", "the ego's own detections too, as the paper's code has it", True)
@@ -80,19 +83,10 @@ PUBLISHED = {
 }
 
 
-def run_name(arm: Arm, rule: Rule) -> str:
-    """The name under which an arm is run; an undisturbed channel is run once for both rules."""
-    return f"{arm.name}+own" if rule.own_perception and arm.disturbed else arm.name
-
-
 def run_settings(detector: str | None = None) -> dict[str, RunSettings]:
-    """The distinct runs behind both tables, by name."""
+    """The distinct runs behind both tables, by the name of their channel; no cooperation is the same under both."""
     return {
-        run_name(arm, rule): RunSettings(
-            channel=arm.channel, detector=detector, own_perception=rule.own_perception and arm.disturbed
-        )
-        for rule in RULES
-        for arm in ARMS
+        arm.channel(rule): RunSettings(channel=arm.channel(rule), detector=detector) for rule in RULES for arm in ARMS
     }
 
 
@@ -144,7 +138,7 @@ def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: Rule) -> Table:
     cells = []
     for scenario in dict.fromkeys(job.scenario for job, _ in runs):
         for arm in ARMS:
-            name = run_name(arm, rule)
+            name = arm.channel(rule)
             mine = sorted(
                 ((job.seed, result) for job, result in runs if job.scenario == scenario and job.arm == name),
                 key=lambda run: run[0],
@@ -229,7 +223,7 @@ def difference(links: Table, own: Table) -> str:
     shifts, worse = [], {LINKS.name: 0, OWN.name: 0}
     for scenario in links.scenarios:
         place = SCENARIOS[scenario].split(",")[0].lower()
-        for arm in (arm for arm in ARMS if arm.disturbed):
+        for arm in ARMS[1:]:
             before, after = links.cell(scenario, arm.name), own.cell(scenario, arm.name)
             change = after.centre.mean - before.centre.mean
             shifts.append(

@@ -1,0 +1,175 @@
+"""The page of the demo: tables beside the paper's, distances over time, and top views at the decisive instants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from eidrive_scenario.experiments.paper import ARMS, LINKS, SCENARIOS, Arm, Cell, Check, Table, checks, difference
+from eidrive_scenario.reporting.chart import Line, line_chart
+from eidrive_scenario.reporting.key_frames import Moment, Story
+from eidrive_scenario.reporting.page import png_address, write_page
+from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
+
+Array = NDArray[np.float64]
+
+COLOURS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
+DASHES = {"none": "6 3", "cooperation": "", "latency": "", "error": "2 3"}
+HORIZON = 30.0
+"""The chart begins where the two cars are this near [m]."""
+
+
+@dataclass(frozen=True)
+class CameraPicture:
+    """A picture out of the run, as PNG."""
+
+    title: str
+    caption: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a scenario happens: what the pictures of all its arms share."""
+
+    roads: RoadDrawing
+    conflict_areas: tuple[Array, ...]
+    views: tuple[CameraPicture, ...] = ()
+
+
+def write_demo(
+    out: Path,
+    links: Table,
+    own: Table,
+    stories: Mapping[tuple[str, str], Story],
+    places: Mapping[str, Place],
+    *,
+    watched: int,
+    footer: str = "",
+) -> Path:
+    """Write the page. `stories` are those of the seed `watched`, by scenario and channel. Returns `out`."""
+    windows = {scenario: _window(scenario, stories) for scenario in links.scenarios}
+    symbols = "".join(roads_symbol(places[name].roads, _identifier(name)) for name in links.scenarios)
+    values = {
+        table.rule.name: {
+            "title": table.rule.title,
+            "places": [_place(table, name, stories, places[name], windows[name], watched) for name in links.scenarios],
+        }
+        for table in (links, own)
+    }
+    return write_page(
+        out,
+        "demo.html.jinja",
+        title="A hidden car, a helper, a channel",
+        symbols=Markup(
+            f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{symbols}</defs></svg>'
+        ),
+        colours=COLOURS,
+        seeds=len(links.cells[0].seeds),
+        watched=watched,
+        legend=Markup(legend()),
+        links=values[links.rule.name],
+        own=values[own.rule.name],
+        sentence=difference(links, own),
+        footer=footer,
+    )
+
+
+def _place(
+    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: Place, window: Window, watched: int
+) -> dict[str, Any]:
+    mine = {arm.name: stories[scenario, arm.channel(table.rule)] for arm in ARMS}
+    found: Sequence[Check] = [check for check in checks(table) if check.scenario == scenario]
+    return {
+        "title": SCENARIOS.get(scenario, scenario),
+        "cells": [cell for cell in table.cells if cell.scenario == scenario],
+        "checks": found,
+        "chart": Markup(_chart(mine)),
+        "views": [
+            {"title": view.title, "caption": view.caption, "address": png_address(view.png)} for view in place.views
+        ]
+        if table.rule == LINKS
+        else [],
+        "arms": [
+            {
+                "title": arm.title,
+                "colour": COLOURS[arm.name],
+                "summary": _summary(table.cell(scenario, arm.name), mine[arm.name], watched),
+                "pictures": [
+                    _picture(moment, mine[arm.name], arm, place, window, _identifier(scenario))
+                    for moment in mine[arm.name].moments
+                ],
+            }
+            for arm in ARMS
+        ],
+    }
+
+
+def _picture(moment: Moment, story: Story, arm: Arm, place: Place, window: Window, roads_id: str) -> dict[str, Any]:
+    snapshot = moment.snapshot
+    if snapshot is None:
+        return {"title": moment.title, "caption": "", "svg": None}
+    row = story.times.index(snapshot.time)
+    lost = sum(event.outcome == "lost" for event in snapshot.links)
+    caption = (
+        f"at {snapshot.time:.2f} s, {story.centres[row]:.1f} m between centres, "
+        f"{story.ego} at {3.6 * story.speeds[row]:.0f} km/h" + (", last message lost" if lost else "")
+    )
+    svg = top_view(
+        snapshot,
+        window,
+        roads_id=roads_id,
+        conflict_areas=place.conflict_areas,
+        description=f"{arm.title}: {moment.title} {caption}",
+    )
+    return {"title": moment.title, "caption": caption, "svg": Markup(svg)}
+
+
+def _summary(cell: Cell, story: Story, watched: int) -> str:
+    nearest = min(story.boxes) if story.boxes else float("nan")
+    outcome = "they collide" if nearest == 0.0 else f"{nearest:.2f} m apart at the closest"
+    free = cell.collision_free
+    return f"seed {watched}: {outcome}; all seeds: {free.successes} of {free.trials} without a collision"
+
+
+def _chart(stories: Mapping[str, Story]) -> str:
+    lines, start, end = [], float("inf"), 0.0
+    for arm in ARMS:
+        story = stories[arm.name]
+        if not story.times:
+            continue
+        nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centres[row]))
+        lines.append(Line(arm.title, COLOURS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
+        near = next((time for time, gap in zip(story.times, story.boxes, strict=True) if gap <= HORIZON), 0.0)
+        start, end = min(start, near), max(end, story.times[nearest] + 3.0)
+    end = min(end, max((line.x[-1] for line in lines), default=1.0))
+    return line_chart(
+        lines,
+        x_title="time [s]",
+        y_title="distance between bodies [m]",
+        x_range=(start if start < end else 0.0, end),
+        y_range=(0.0, HORIZON),
+    )
+
+
+def _window(scenario: str, stories: Mapping[tuple[str, str], Story]) -> Window:
+    """The same for all pictures of a scenario: all actors at all of its decisive instants."""
+    points = [
+        tuple(centre)
+        for (name, _), story in stories.items()
+        if name == scenario
+        for moment in story.moments
+        if moment.snapshot is not None
+        for centre in moment.snapshot.view.centres.tolist()
+    ]
+    return Window.around(points or [(0.0, 0.0)], margin=7.0)
+
+
+def _identifier(scenario: str) -> str:
+    return "roads-" + "".join(letter if letter.isalnum() else "-" for letter in scenario)

@@ -1,0 +1,38 @@
+"""Pages from templates: one file each, nothing loaded from elsewhere."""
+
+from __future__ import annotations
+
+import base64
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("eidrive_scenario.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render_page(template: str, **values: Any) -> str:
+    """The HTML of a template of this package; text is escaped, `markupsafe.Markup` is taken as it is."""
+    return _environment().get_template(template).render(**values)
+
+
+def write_page(out: Path, template: str, **values: Any) -> Path:
+    """Render a template into the file `out`, whose folder is made if it is missing. Returns `out`."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(render_page(template, **values), encoding="utf-8")
+    return out
+
+
+def png_address(png: bytes) -> str:
+    """A picture as a data URI."""
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")

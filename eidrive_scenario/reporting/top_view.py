@@ -1,0 +1,233 @@
+"""A street from above as SVG: the truth as outlines, and what one station knows of it.
+
+Coordinates in the picture are x and -y of the world [m], so a picture may share the drawing of its roads with others
+on the page (`roads_symbol`, then `roads_id`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.geometry import footprint
+from eidrive_scenario.reporting.snapshot import Snapshot
+
+Array = NDArray[np.float64]
+
+OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"
+TRUTH, STATION = "#334155", "#0f172a"
+LANES = {"driving": "#d5d9e0", "sidewalk": "#e9e6df", "shoulder": "#dfe2e6", "border": "#dfe2e6", "median": "#dde5d3"}
+LANE, GROUND, PAINT = "#dcdfe5", "#f1f3ee", "#ffffff"
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of the world that a picture shows [m]."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @classmethod
+    def around(cls, points: Iterable[Sequence[float]], margin: float = 6.0) -> Window:
+        """The smallest window that holds all points (x, y, …) with a margin [m]."""
+        plan = np.array([tuple(point[:2]) for point in points], dtype=np.float64)
+        low, high = plan.min(axis=0) - margin, plan.max(axis=0) + margin
+        return cls(float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+
+    @property
+    def view_box(self) -> str:
+        """For the attribute viewBox."""
+        return f"{self.left:.2f} {-self.top:.2f} {self.right - self.left:.2f} {self.top - self.bottom:.2f}"
+
+
+@dataclass(frozen=True)
+class RoadDrawing:
+    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, polyline (M, 2)) [m]."""
+
+    lanes: tuple[tuple[str, Array], ...] = ()
+    markings: tuple[tuple[str, Array], ...] = ()
+
+
+def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
+    """The roads as a group with an id, to be put once into a page and used by many pictures."""
+    lanes = "".join(
+        f'<path d="{_path(polygon)}Z" fill="{LANES.get(kind, LANE)}" stroke="{LANES.get(kind, LANE)}" '
+        'stroke-width="0.05"/>'
+        for kind, polygon in roads.lanes
+    )
+    lines = "".join(
+        f'<path d="{_path(line)}" fill="none" stroke="{PAINT}" stroke-width="0.16"{_dashes(kind)}/>'
+        for kind, line in roads.markings
+    )
+    return f'<g id="{escape(identifier)}">{lanes}{lines}</g>'
+
+
+def top_view(
+    snapshot: Snapshot,
+    window: Window,
+    *,
+    roads: RoadDrawing | None = None,
+    roads_id: str = "",
+    conflict_areas: Sequence[Array] = (),
+    labels: Mapping[str, str] | None = None,
+    description: str = "",
+) -> str:
+    """The snapshot as an SVG element.
+
+    `roads` are drawn into the picture itself; `roads_id` refers to a `roads_symbol` of the same page instead.
+    `conflict_areas` are polygons (M, 2) [m]. `labels` maps an actor's name to what is written beside it; an actor
+    without an entry is labelled with its name, one mapped to "" is not labelled.
+    """
+    view = snapshot.view
+    names = labels or {}
+    ground = f'<rect x="{window.left:.2f}" y="{-window.top:.2f}" width="100%" height="100%" fill="{GROUND}"/>'
+    parts = [ground]
+    if roads is not None:
+        parts.append(roads_symbol(roads, ""))
+    if roads_id:
+        parts.append(f'<use href="#{escape(roads_id)}"/>')
+    parts.extend(
+        f'<path class="area" d="{_path(area)}Z" fill="{AREA}" fill-opacity="0.22" stroke="{AREA}" '
+        'stroke-width="0.15" stroke-dasharray="0.7 0.4"/>'
+        for area in conflict_areas
+    )
+    parts.extend(_links(snapshot))
+    for received in snapshot.heard:
+        parts.extend(_boxes(received.message.detections, "received", RECEIVED, 0.55))
+    parts.extend(_boxes(snapshot.own, "own", OWN, 0.25))
+    parts.extend(_truth(snapshot))
+    for row, name in enumerate(view.names):
+        text = names.get(name, name)
+        x, y = view.centres[row, :2]
+        if text and window.left <= x <= window.right and window.bottom <= y <= window.top:
+            parts.append(_label(window, x, y, view.boxes[row], text))
+    parts.append(_clock(window, snapshot.time))
+    title = escape(description or f"top view at {snapshot.time:.2f} s as {snapshot.station} knows it")
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="top-view" viewBox="{window.view_box}" role="img">'
+        f"<title>{title}</title>{''.join(parts)}</svg>"
+    )
+
+
+def _truth(snapshot: Snapshot) -> list[str]:
+    """Every actor as an outline with a bar at its front; the station itself filled; a mast as a dot."""
+    view, drawn = snapshot.view, []
+    corners = footprint(view.boxes)
+    for row, name in enumerate(view.names):
+        length, width = view.size[row, :2]
+        own = name == snapshot.station
+        fill, opacity = (STATION, "1") if own else ("#ffffff", "0.35")
+        if max(length, width) < 1.0:
+            x, y = view.centres[row, :2]
+            drawn.append(
+                f'<circle class="truth" cx="{x:.2f}" cy="{-y:.2f}" r="0.7" fill="#ffffff" stroke="{TRUTH}" '
+                f'stroke-width="0.25"/><circle cx="{x:.2f}" cy="{-y:.2f}" r="0.28" fill="{TRUTH}"/>'
+            )
+            continue
+        drawn.append(
+            f'<path class="truth" d="{_path(corners[row])}Z" fill="{fill}" fill-opacity="{opacity}" '
+            f'stroke="{TRUTH}" stroke-width="0.14" stroke-linejoin="round"/>'
+        )
+        front = corners[row][[0, 3]]
+        back = front + 0.22 * (corners[row][[1, 2]] - front)
+        drawn.append(
+            f'<path d="{_path(back)}" fill="none" stroke="{"#ffffff" if own else TRUTH}" stroke-width="0.22" '
+            'stroke-linecap="round"/>'
+        )
+    return drawn
+
+
+def _boxes(detections: Detections, kind: str, colour: str, stroke: float) -> list[str]:
+    """Received boxes have the broader rim, so that both show where two stations report one object."""
+    return [
+        f'<path class="{kind}" d="{_path(corners)}Z" fill="{colour}" fill-opacity="0.28" stroke="{colour}" '
+        f'stroke-width="{stroke}" stroke-linejoin="round"/>'
+        for corners in footprint(detections.boxes)
+    ]
+
+
+def _links(snapshot: Snapshot) -> list[str]:
+    view = snapshot.view
+    drawn: list[str] = []
+    if snapshot.station not in view:
+        return drawn
+    x1, y1 = view.centres[view.row(snapshot.station), :2]
+    for event in snapshot.links:
+        if event.sender not in view:
+            continue
+        x0, y0 = view.centres[view.row(event.sender), :2]
+        lost = event.outcome == "lost"
+        colour, dashes = (LOST, ' stroke-dasharray="0.9 0.9"') if lost else (LINK, "")
+        drawn.append(
+            f'<line class="link {event.outcome}" x1="{x0:.2f}" y1="{-y0:.2f}" x2="{x1:.2f}" y2="{-y1:.2f}" '
+            f'stroke="{colour}" stroke-width="0.22"{dashes}/>'
+        )
+    return drawn
+
+
+def _label(window: Window, x: float, y: float, box: Array, text: str) -> str:
+    """Beside the vehicle, to the right of where its body ends, or to the left where the window ends."""
+    size = _text_size(window)
+    reach = abs(math.cos(box[6])) * box[3] / 2 + abs(math.sin(box[6])) * box[4] / 2 + 0.5 * size
+    to_left = x + reach + 0.6 * size * len(text) > window.right
+    anchor, place = ("end", x - reach) if to_left else ("start", x + reach)
+    return (
+        f'<text x="{place:.2f}" y="{-y + 0.35 * size:.2f}" font-size="{size:.2f}" text-anchor="{anchor}" '
+        f'fill="{STATION}" stroke="#ffffff" stroke-width="{0.22 * size:.2f}" paint-order="stroke" '
+        f'stroke-linejoin="round">{escape(text)}</text>'
+    )
+
+
+def _clock(window: Window, time: float) -> str:
+    size = 1.15 * _text_size(window)
+    return (
+        f'<text x="{window.left + 0.6 * size:.2f}" y="{-window.top + 1.4 * size:.2f}" font-size="{size:.2f}" '
+        f'font-weight="600" fill="{STATION}" stroke="#ffffff" stroke-width="{0.2 * size:.2f}" paint-order="stroke">'
+        f"t = {time:.2f} s</text>"
+    )
+
+
+def _text_size(window: Window) -> float:
+    return (window.right - window.left) / 24
+
+
+def _dashes(kind: str) -> str:
+    return ' stroke-dasharray="3 3"' if "broken" in kind else ""
+
+
+def _path(points: Array) -> str:
+    return "M" + "L".join(f"{x:.2f} {-y:.2f}" for x, y in np.asarray(points)[:, :2].tolist())
+
+
+def legend() -> str:
+    """What the colours and lines of a top view mean, as HTML."""
+    box = '<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" {}/></svg>'
+    line = '<svg viewBox="0 0 26 14"><line x1="1" x2="25" y1="7" y2="7" stroke-width="2" {}/></svg>'
+    entries = (
+        (box.format(f'fill="#fff" stroke="{TRUTH}" stroke-width="1.4"'), "where it really is"),
+        (box.format(f'fill="{STATION}"'), "the ego"),
+        (_sample(OWN), "seen by the ego itself"),
+        (_sample(RECEIVED), "received from others"),
+        (line.format(f'stroke="{LINK}"'), "message arrives"),
+        (line.format(f'stroke="{LOST}" stroke-dasharray="5 4"'), "message lost"),
+        (
+            box.format(f'fill="{AREA}" fill-opacity=".25" stroke="{AREA}" stroke-dasharray="4 2"'),
+            "conflict area: the ego stops while it knows of a car inside",
+        ),
+    )
+    return "".join(f"<span>{symbol}{escape(text)}</span>" for symbol, text in entries)
+
+
+def _sample(colour: str) -> str:
+    return (
+        f'<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" fill="{colour}" '
+        f'fill-opacity=".3" stroke="{colour}" stroke-width="2"/></svg>'
+    )

@@ -1,0 +1,86 @@
+"""The decisive instants of a run, against the plain kinematics of conftest's street."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.key_frames import KeyFrames, Story
+
+Play = Callable[..., list[Frame]]
+
+
+def story_of(frames: list[Frame]) -> Story:
+    observer = KeyFrames("Ego", "Incoming")
+    for frame in frames:
+        observer.observe(frame)
+    observer.close()
+    return observer.story()
+
+
+def time_of(story: Story, kind: str) -> float:
+    snapshot = story.moment(kind).snapshot
+    assert snapshot is not None
+    return snapshot.time
+
+
+def test_the_helper_sees_the_car_at_20_m(street: Play) -> None:
+    story = story_of(street(1))
+    assert time_of(story, "seen") == pytest.approx(1.40)
+    assert story.moment("seen").title == "RSU sees Incoming"
+
+
+@pytest.mark.parametrize("delay", [1, 3, 6])
+def test_the_ego_hears_of_it_as_many_ticks_later_as_the_message_takes(street: Play, delay: int) -> None:
+    story = story_of(street(delay))
+    assert time_of(story, "heard") == pytest.approx(1.40 + 0.05 * delay)
+    assert time_of(story, "braked") == time_of(story, "heard")
+
+
+def test_lost_messages_put_it_off(street: Play) -> None:
+    story = story_of(street(1, frozenset({28, 29, 30})))
+    assert time_of(story, "heard") == pytest.approx(1.60)
+
+
+def test_without_a_channel_the_ego_neither_hears_nor_brakes(street: Play) -> None:
+    story = story_of(street(None))
+    assert [(moment.kind, moment.snapshot is None) for moment in story.moments] == [
+        ("seen", False),
+        ("heard", True),
+        ("braked", True),
+        ("closest", False),
+    ]
+    assert story.moment("heard").title == "Ego never hears of Incoming"
+
+
+def test_distances_over_time_are_those_of_centres_and_bodies(street: Play) -> None:
+    story = story_of(street(None))
+    assert len(story.times) == len(story.centres) == len(story.boxes) == len(story.speeds) == 100
+    assert story.centres[0] == pytest.approx(math.hypot(29.5, 39.5))
+    gap = (29.5 - (4.892 + 1.837) / 2, 39.5 - (4.892 + 1.837) / 2)
+    assert story.boxes[0] == pytest.approx(math.hypot(*gap))
+
+
+def test_closest_is_the_smallest_gap_between_bodies(street: Play) -> None:
+    story = story_of(street(1))
+    nearest = min(story.boxes)
+    assert nearest > 0.0
+    assert time_of(story, "closest") == story.times[story.boxes.index(nearest)]
+    assert story.moment("closest").title == f"closest, {nearest:.2f} m apart"
+
+
+def test_a_collision_is_shown_at_its_first_touch(street: Play) -> None:
+    """With the ego 7.5 m further on, the two meet."""
+    further = np.array([[7.5, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    frames = [
+        Frame(dataclasses.replace(frame.view, position=frame.view.position + further), frame.steps)
+        for frame in street(None)
+    ]
+    story = story_of(frames)
+    assert story.moment("closest").title == "Incoming hits Ego"
+    assert time_of(story, "closest") == story.times[story.boxes.index(0.0)]
