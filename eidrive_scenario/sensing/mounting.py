@@ -1,0 +1,79 @@
+"""Where sensors sit on a body, and where that is in the world."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.sensing.settings import Mount, SensorSettings
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.view import WorldView
+
+Array = NDArray[np.float64]
+
+ABOVE_ROOF = 0.41
+"""A roof sensor stands this far above the body: 1.90 m on a car of 1.49 m [m]."""
+AHEAD_OF_BUMPER = 0.054
+"""The front camera sits this far ahead of the body: 2.5 m ahead of the middle of a car of 4.892 m [m]."""
+
+_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Camera axes (x right, y down, z forward) as columns in a frame of x forward, y left, z up."""
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """A sensor's place in the actor's frame: position [m], yaw to the left and pitch downwards [rad]."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    def position(self, view: WorldView, row: int) -> tuple[float, float, float]:
+        """In the world [m]; pitch and roll neglected, as in the view's boxes."""
+        x, y, z = view.position[row].tolist()
+        cos, sin = math.cos(view.yaw[row]), math.sin(view.yaw[row])
+        return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, z + self.z
+
+    def pose(self, view: WorldView, row: int) -> Array:
+        """(4, 4) sensor to world, sensor frame x forward, y left, z up."""
+        body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+        pose = np.eye(4)
+        pose[:3, :3] = body @ rotation_matrix(self.yaw, self.pitch)
+        pose[:3, 3] = view.position[row] + body @ (self.x, self.y, self.z)
+        return pose
+
+    def camera_pose(self, view: WorldView, row: int) -> Array:
+        """(4, 4) camera to world, camera frame x right, y down, z forward."""
+        pose = self.pose(view, row)
+        pose[:3, :3] = pose[:3, :3] @ _OPTICAL
+        return pose
+
+
+def mounting(settings: SensorSettings, spec: ActorSpec, usual: str) -> Mounting:
+    """The place that the settings ask for, on this body; `usual` names the one of the kind where they do not.
+
+    The named places are those of EI-Drive on a Lincoln MKZ, carried over to other bodies: they are measured from the
+    middle of the body's outline, at ground level. On a body without wheels (a mast) all are at its top.
+    """
+    mount = settings.mount if settings.mount is not None else usual
+    if isinstance(mount, Mount):
+        return Mounting(mount.x, mount.y, mount.z, math.radians(mount.yaw), math.radians(mount.pitch))
+    middle_x, middle_y, middle_z = spec.offset
+    top = middle_z + spec.size[2] / 2.0
+    yaw = math.radians({"left": 100.0, "right": -100.0, "back": 180.0}.get(mount, 0.0))
+    if spec.wheelbase <= 0.0:
+        return Mounting(middle_x, middle_y, top, yaw)
+    x, y, z = {
+        "front": (spec.size[0] / 2.0 + AHEAD_OF_BUMPER, 0.0, 1.0),
+        "left": (0.0, 0.3, top + ABOVE_ROOF - 0.1),
+        "right": (0.0, -0.3, top + ABOVE_ROOF - 0.1),
+        "back": (-2.0, 0.0, top + ABOVE_ROOF - 0.1),
+        "roof": (-0.5, 0.0, top + ABOVE_ROOF),
+    }[mount]
+    return Mounting(middle_x + x, middle_y + y, z, yaw)

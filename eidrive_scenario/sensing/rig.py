@@ -1,0 +1,99 @@
+"""The sensors of one station, and the reading of all stations' sensors at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from eidrive_scenario.sensing.camera import Camera
+from eidrive_scenario.sensing.lidar import Lidar
+from eidrive_scenario.sensing.readings import EgoState, Readings
+from eidrive_scenario.sensing.scene import Scene
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings, TruthSettings
+from eidrive_scenario.sensing.truth import TruthSensor, read_truth
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.view import WorldView
+
+Sensor = TruthSensor | Camera | Lidar
+
+
+class Rig:
+    """The sensors that sit on one actor. A sensor with a rate is read when its next period has begun.
+
+    Raises ValueError if there is more than one truth sensor.
+    """
+
+    def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings]) -> None:
+        self.station = spec.name
+        self._sensors: dict[str, Sensor] = {name: _sensor(settings, spec) for name, settings in sensors.items()}
+        self._periods: dict[str, int] = {}
+        if sum(isinstance(sensor, TruthSensor) for sensor in self._sensors.values()) > 1:
+            raise ValueError(f"station {spec.name!r} has more than one truth sensor")
+
+    def read(self, scene: Scene, view: WorldView) -> Readings:
+        """Own motion, and the sensors that are due. Raises KeyError if the actor is not in the world."""
+        return read_all([self], scene, view)[self.station]
+
+    def due(self, time: float) -> dict[str, Sensor]:
+        """The sensors to read at `time` [s]; asking counts as reading."""
+        found = {}
+        for name, sensor in self._sensors.items():
+            rate = sensor.settings.rate
+            if rate is not None:
+                period = math.floor(time * rate + 1e-6)
+                if self._periods.get(name, -1) >= period:
+                    continue
+                self._periods[name] = period
+            found[name] = sensor
+        return found
+
+
+def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Readings]:
+    """The readings of several stations, by name; the rays of their truth sensors go out in one batch."""
+    due = [rig.due(view.time) for rig in rigs]
+    rows = [view.row(rig.station) for rig in rigs]
+    sighted = [
+        (index, sensor)
+        for index, found in enumerate(due)
+        for sensor in found.values()
+        if isinstance(sensor, TruthSensor)
+    ]
+    seen = read_truth([sensor for _, sensor in sighted], [rows[index] for index, _ in sighted], scene, view)
+    truths = {index: reading for (index, _), reading in zip(sighted, seen, strict=True)}
+    return {
+        rig.station: Readings(
+            time=view.time,
+            ego=ego_state(view, rows[index]),
+            truth=truths.get(index),
+            cameras={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Camera)},
+            lidars={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Lidar)},
+        )
+        for index, rig in enumerate(rigs)
+    }
+
+
+def ego_state(view: WorldView, row: int) -> EgoState:
+    """The actor's own motion, exact."""
+    yaw = float(view.yaw[row])
+    forward, left, _ = view.acceleration[row].tolist()
+    return EgoState(
+        time=view.time,
+        position=view.position[row],
+        yaw=yaw,
+        pitch=float(view.pitch[row]),
+        roll=float(view.roll[row]),
+        speed=float(view.speed[row]),
+        yaw_rate=float(view.yaw_rate[row]),
+        acceleration=math.cos(yaw) * forward + math.sin(yaw) * left,
+    )
+
+
+def _sensor(settings: SensorSettings, spec: ActorSpec) -> Sensor:
+    match settings:
+        case TruthSettings():
+            return TruthSensor(settings, spec)
+        case CameraSettings():
+            return Camera(settings, spec)
+        case LidarSettings():
+            return Lidar(settings, spec)
+    raise TypeError(f"no sensor reads {type(settings).__name__}")
