@@ -1,0 +1,58 @@
+"""Frames with nothing but boxes that move."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.api import Contact, Frame, WorldView
+
+
+class Car(NamedTuple):
+    """An actor for a hand-made frame: box centre [m], yaw [rad], speed along the heading [m/s]; box 4 x 2 x 1.5 m."""
+
+    x: float
+    y: float = 0.0
+    yaw: float = 0.0
+    speed: float = 0.0
+
+
+MakeFrame = Callable[..., Frame]
+
+
+@pytest.fixture
+def car() -> type[Car]:
+    return Car
+
+
+@pytest.fixture
+def frame() -> MakeFrame:
+    """`frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box centre on the ground."""
+
+    def make(time: float, cars: Mapping[str, Car], contacts: Sequence[Contact] = ()) -> Frame:
+        table = np.array(list(cars.values()), dtype=float).reshape(-1, 4)
+        zeros, ones = np.zeros(len(table)), np.ones((len(table), 1))
+        x, y, yaw, speed = table.T
+        view = WorldView(
+            time=time,
+            tick=round(time / 0.05),
+            names=tuple(cars),
+            categories=("car",) * len(table),
+            position=np.stack([x, y, zeros], axis=1),
+            yaw=yaw,
+            pitch=zeros,
+            roll=zeros,
+            velocity=np.stack([speed * np.cos(yaw), speed * np.sin(yaw), zeros], axis=1),
+            acceleration=np.zeros((len(table), 3)),
+            yaw_rate=zeros,
+            speed=speed,
+            size=ones * (4.0, 2.0, 1.5),
+            offset=ones * (0.0, 0.0, 0.75),
+            contacts=tuple(contacts),
+        )
+        return Frame(view)
+
+    return make

@@ -1,0 +1,64 @@
+"""Distances of boxes 4 m by 2 m, worked out by hand."""
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
+from eidrive_scenario.api import Verdict, judge
+
+
+def criterion(**settings: Any) -> MinDistance:
+    return MinDistance(MinDistanceSettings.model_validate({"of": "Ego", "to": "Incoming", **settings}))
+
+
+def passing(frame: Any, car: Any) -> list[Any]:
+    """Incoming crosses from left to right, 10 m ahead at first, 5 m ahead of the Ego's centre at 2 s, then away."""
+    places = [car(10, 10, -math.pi / 2), car(8, 4, -math.pi / 2), car(5, 0, -math.pi / 2), car(5, -8, -math.pi / 2)]
+    return [frame(float(second), {"Ego": car(0), "Incoming": place}) for second, place in enumerate(places)]
+
+
+def test_centre_and_box(frame: Any, car: Any) -> None:
+    distance = criterion()
+    (verdict,) = judge(passing(frame, car), [distance])
+    # Square on at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
+    assert verdict == Verdict(
+        "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (centre to centre) at 2.00 s"
+    )
+    assert distance.metrics() == {
+        "min_distance.Ego.Incoming.centre": 5.0,
+        "min_distance.Ego.Incoming.box": pytest.approx(2.0),
+        "min_distance.Ego.Incoming.time": 2.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("measure", "at_least", "violated"),
+    [("centre", 5.0, None), ("centre", 5.01, 2.0), ("centre", 9.0, 1.0), ("box", 1.99, None), ("box", 2.01, 2.0)],
+)
+def test_limit(frame: Any, car: Any, measure: str, at_least: float, violated: float | None) -> None:
+    (verdict,) = judge(passing(frame, car), [criterion(measure=measure, at_least=at_least)])
+    assert verdict.passed is (violated is None)
+    assert verdict.first_violation == violated
+    assert verdict.limit == at_least
+
+
+def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
+    (verdict,) = judge([frame(0.0, {"Ego": car(0), "Incoming": car(3, 1)})], [criterion(measure="box", at_least=0.1)])
+    assert not verdict.passed
+    assert verdict.value == 0.0
+
+
+def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
+    (verdict,) = judge([frame(0.0, {"Ego": car(0)})], [criterion(at_least=1.0)])
+    assert (verdict.passed, verdict.value) == (False, None)
+    assert verdict.reason == "Incoming was never in the world, so nothing was measured"
+
+
+def test_two_that_never_meet_in_the_world_fail_it(frame: Any, car: Any) -> None:
+    distance = criterion()
+    (verdict,) = judge([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Incoming": car(0)})], [distance])
+    assert not verdict.passed
+    assert verdict.reason == "Ego and Incoming were never there together"
+    assert distance.metrics() == {}

@@ -1,0 +1,72 @@
+"""Criteria on how far and how fast an actor came."""
+
+from typing import Any
+
+import pytest
+
+from eidrive_criteria.driven_distance import DrivenDistance, DrivenDistanceSettings
+from eidrive_criteria.max_speed import MaxSpeed, MaxSpeedSettings
+from eidrive_criteria.reach_position import ReachPosition, ReachPositionSettings
+from eidrive_scenario.api import Criterion, judge
+
+
+def reach(**settings: Any) -> ReachPosition:
+    return ReachPosition(ReachPositionSettings.model_validate({"of": "Ego", "x": 10, "y": 3, **settings}))
+
+
+def driving(frame: Any, car: Any) -> list[Any]:
+    """5 m/s along x from the origin, 4 s long."""
+    return [frame(float(second), {"Ego": car(5.0 * second, speed=5.0)}) for second in range(5)]
+
+
+@pytest.mark.parametrize(
+    ("settings", "passed", "nearest"),
+    [({"within": 3}, True, 3.0), ({"within": 2.9}, False, 3.0), ({"within": 3, "by": 1.5}, False, 34**0.5)],
+)
+def test_reach_position(frame: Any, car: Any, settings: dict[str, Any], passed: bool, nearest: float) -> None:
+    judged = reach(**settings)
+    (verdict,) = judge(driving(frame, car), [judged])
+    assert (verdict.passed, verdict.value) == (passed, pytest.approx(nearest))
+    assert judged.metrics() == ({"reach_position.time": 2.0} if passed else {})
+
+
+def test_reaching_is_fatal_only_when_it_is_too_late(frame: Any, car: Any) -> None:
+    judged = reach(within=1, by=2.5, fatal=True)
+    frames = driving(frame, car)
+    assert [judge([each], [judged])[0].fatal for each in frames] == [False, False, False, True, True]
+
+
+def test_driven_distance(frame: Any, car: Any) -> None:
+    far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=metres)) for metres in (20.0, 20.1))
+    verdicts = judge(driving(frame, car), [far, farther])
+    assert [verdict.passed for verdict in verdicts] == [True, False]
+    assert verdicts[0].value == pytest.approx(20.0)
+
+
+def test_a_jump_is_no_way_driven(frame: Any, car: Any) -> None:
+    judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=50))
+    (verdict,) = judge([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [judged])
+    assert (verdict.passed, verdict.value) == (False, 0.0)
+
+
+def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
+    judged = MaxSpeed(MaxSpeedSettings(of="Ego", at_most=6))
+    frames = [*driving(frame, car), frame(5.0, {"Ego": car(0, speed=-7.0)})]
+    (verdict,) = judge(frames, [judged])
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 7.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    "criterion",
+    [
+        reach(),
+        DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=1)),
+        MaxSpeed(MaxSpeedSettings(of="Ego", at_most=99)),
+    ],
+    ids=lambda criterion: criterion.name,
+)
+def test_an_actor_that_never_appears_fails_them(frame: Any, car: Any, criterion: Criterion) -> None:
+    (verdict,) = judge([frame(0.0, {"Bus": car(0)})], [criterion])
+    assert (verdict.passed, verdict.value) == (False, None)
+    assert verdict.reason == "Ego was never in the world, so nothing was measured"
+    assert criterion.metrics() == {}

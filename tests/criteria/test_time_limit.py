@@ -1,0 +1,21 @@
+"""The run must end by itself."""
+
+from typing import Any
+
+import pytest
+
+from eidrive_criteria.time_limit import TimeLimit, TimeLimitSettings
+from eidrive_scenario.api import judge
+
+
+@pytest.mark.parametrize(("end", "passed"), [(1.0, True), (400 * 0.05, True), (20.05, False)])
+def test_it_passes_up_to_the_limit(frame: Any, car: Any, end: float, passed: bool) -> None:
+    frames = [frame(0.0, {"Ego": car(0)}), frame(end, {"Ego": car(0)})]
+    (verdict,) = judge(frames, [TimeLimit(TimeLimitSettings(within=20))])
+    assert (verdict.passed, verdict.value, verdict.limit, verdict.unit) == (passed, end, 20.0, "s")
+    assert verdict.first_violation == (None if passed else end)
+
+
+def test_it_ends_the_run_unless_told_otherwise() -> None:
+    assert TimeLimit(TimeLimitSettings(within=1)).verdict().fatal
+    assert not TimeLimit(TimeLimitSettings(within=1, fatal=False)).verdict().fatal
