@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal
 
 from eidrive_scenario.randomness import generator
@@ -52,7 +53,10 @@ class ComposedChannel(LinkChannel):
         seconds = delay.quantile(u)
         if not self.profile.reordering:
             link = (message.sender, receiver)
-            seconds = max(seconds, self._last_arrival.get(link, now) - now)
+            last = self._last_arrival.get(link, now)
+            seconds = max(seconds, last - now)
+            while now + seconds < last:  # rounding
+                seconds = math.nextafter(seconds, math.inf)
             self._last_arrival[link] = now + seconds
         return seconds
 

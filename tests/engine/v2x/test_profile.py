@@ -1,0 +1,96 @@
+"""Channel profiles: the library's, a person's, and wrong ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.delay import ConstantDelay
+from eidrive_scenario.v2x.loss import BernoulliLoss, NoLoss
+from eidrive_scenario.v2x.profile import build_channel, load_profile, profile_names
+
+LIBRARY = Path(__file__).parents[3] / "xosc" / "channels"
+
+
+def composed(source: object, folders: tuple[Path, ...] = (LIBRARY,)) -> ComposedProfile:
+    profile = load_profile(source, folders)  # type: ignore[arg-type]
+    assert isinstance(profile, ComposedProfile)
+    return profile
+
+
+def test_every_profile_of_the_library_makes_a_channel() -> None:
+    names = profile_names(LIBRARY)
+    assert {"none", "ideal", "latency_300ms", "error_30pct", "paper_latency_300ms", "paper_error_30pct"} <= set(names)
+    for name in names:
+        profile = load_profile(name, [LIBRARY])
+        channel = build_channel(profile, 0)
+        if name == "none":
+            assert profile is None
+            assert channel is None
+        else:
+            assert profile is not None
+            assert profile.name == name
+            assert profile.description
+            assert isinstance(channel, ComposedChannel)
+            assert channel.own_perception == name.startswith("paper_")
+
+
+def test_the_paper_s_settings() -> None:
+    assert composed("latency_300ms").delay == ConstantDelay(seconds=0.3)
+    assert composed("latency_300ms").loss == NoLoss()
+    assert composed("error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="link")
+    assert composed("paper_error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="frame")
+
+
+def test_a_profile_may_be_a_mapping_a_yaml_text_or_a_file(tmp_path: Path) -> None:
+    text = "{delay: {kind: constant, seconds: 0.1}, own_perception: true}"
+    file = tmp_path / "mine.yaml"
+    file.write_text("delay:\n  kind: constant\n  seconds: 0.1\nown_perception: true\n")
+    mapping = {"delay": {"kind": "constant", "seconds": 0.1}, "own_perception": True}
+    for source, name in ((text, "custom"), (mapping, "custom"), (file, "mine"), (str(file), "mine"), ("mine", "mine")):
+        profile = composed(source, (tmp_path,))
+        assert profile.delay == ConstantDelay(seconds=0.1)
+        assert profile.own_perception
+        assert profile.name == name
+
+
+WRONG = [
+    ("latency_300", "no channel profile 'latency_300'; did you mean 'latency_300ms'?"),
+    ("{los: {kind: none}}", "unknown setting 'los'; did you mean 'loss'?"),
+    ("{delay: {kind: constant, second: 0.3}}", "unknown setting 'delay.constant.second'; did you mean 'seconds'?"),
+    ("{delay: {kind: constnt}}", "setting 'delay.kind' is 'constnt'; did you mean 'constant'?"),
+    ("{delay: {kind: constant, seconds: -1}}", "'delay.constant.seconds' is -1"),
+    ("{delay: {kind: uniform, minimum: 2, maximum: 1}}", "maximum 1 lies below minimum 2"),
+    ("{delay: {kind: shifted_gamma, minimum: 2, mean: 1}}", "mean 1 lies below minimum 2"),
+    ("{delay: {kind: truncated_normal, mean: 9, sd: 0.1, maximum: 1}}", "falls between minimum and maximum"),
+    ("{loss: {kind: bernoulli, probability: 1.5}}", "'loss.bernoulli.probability' is 1.5"),
+    ("{model: compsed}", "unknown channel model 'compsed'; did you mean 'composed'?"),
+    ("[1, {2: 3}]", "a channel profile is a mapping"),
+    ("{a: [}", "not valid YAML"),
+]
+
+
+@pytest.mark.parametrize(("source", "message"), WRONG, ids=[row[0] for row in WRONG])
+def test_a_wrong_profile_says_where_and_what_would_be_right(source: str, message: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        load_profile(source, [LIBRARY], origin="scenario.xosc", line=12)
+    assert str(caught.value).startswith("scenario.xosc:12: ")
+    assert message in str(caught.value)
+
+
+def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.yaml"
+    file.write_text("model: composed\nloss:\n  kind: bernoulli\nspeed: 3\n")
+    with pytest.raises(SettingError) as caught:
+        load_profile(file)
+    assert [str(problem) for problem in caught.value.problems] == [
+        f"{file}:2: setting 'loss.bernoulli.probability' is missing; add it",
+        f"{file}:4: unknown setting 'speed'; known: delay, description, loss, model, name, own_perception, reordering",
+    ]
+    empty = tmp_path / "empty.yaml"
+    empty.write_text("")
+    with pytest.raises(SettingError, match="it is empty"):
+        load_profile(empty)
