@@ -1,0 +1,145 @@
+"""The lanes of a road network as a graph, and the way from place to place over it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import networkx as nx
+
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.roads.links import LaneLinks
+from eidrive_scenario.roads.location import LaneKey, LaneLocation
+from eidrive_scenario.roads.model import Lane, LaneSection, Road
+from eidrive_scenario.roads.movement import driving_direction
+from eidrive_scenario.roads.poses import lane_at, lane_pose_at
+
+if TYPE_CHECKING:
+    LaneGraph = nx.DiGraph[LaneKey]
+else:
+    LaneGraph = nx.DiGraph
+
+LANE_CHANGE_COST = 10.0
+"""Metres of detour that a lane change is worth."""
+HASTE_COST = 500.0
+"""A lane change within a section of L metres costs this / L metres more: short sections are bad places for it."""
+NARROWEST = 1.0
+"""A lane must be this wide in the middle of its section to change to it [m]."""
+
+
+class RouteError(InputError):
+    """There is no way over the lanes from one place to another."""
+
+
+def build_graph(roads: Mapping[str, Road], links: LaneLinks) -> LaneGraph:
+    """Nodes LaneKey with `length` [m] and `drivable`; edges with `weight` [m] and `kind` 'successor' or 'change'.
+
+    An edge leads from a lane to the lanes that traffic enters at its end, and to its neighbours of the same direction.
+    """
+    graph: LaneGraph = LaneGraph()
+    directions = {
+        (road.id, number): driving_direction(road, number)
+        for road in roads.values()
+        for section in road.sections
+        for number in section.lanes
+    }
+    for road in roads.values():
+        for section in road.sections:
+            for number, lane in section.lanes.items():
+                if number:
+                    key = LaneKey(road.id, section.index, number)
+                    graph.add_node(key, length=section.length, drivable=lane.drivable)
+    for key in list(graph):
+        length = graph.nodes[key]["length"]
+        for other, direction in links.beyond(key, directions[key.road, key.lane]):
+            if other in graph and directions[other.road, other.lane] == direction:
+                graph.add_edge(key, other, weight=length, kind="successor")
+    for road in roads.values():
+        for section in road.sections:
+            for one, two in _neighbours(section):
+                if directions[road.id, one] == directions[road.id, two]:
+                    cost = LANE_CHANGE_COST + HASTE_COST / max(section.length, 1.0)
+                    keys = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
+                    graph.add_edge(*keys, weight=cost, kind="change")
+                    graph.add_edge(*reversed(keys), weight=cost, kind="change")
+    return graph
+
+
+def _neighbours(section: LaneSection) -> Iterator[tuple[int, int]]:
+    """Pairs of drivable lanes side by side, across lane 0 too."""
+    lanes = [lane for number, lane in section.lanes.items() if number]
+    for one, two in pairwise(lanes):
+        if _usable(one, section) and _usable(two, section):
+            yield one.id, two.id
+
+
+def _usable(lane: Lane, section: LaneSection) -> bool:
+    return lane.drivable and lane.width.value(0.5 * section.length) >= NARROWEST
+
+
+def find_lanes(
+    graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation
+) -> tuple[LaneKey, ...]:
+    """The lanes of the cheapest way by A*, the straight line to the end as the bound. Raises RouteError."""
+    source, target = _key(roads, start), _key(roads, end)
+    goal = lane_pose_at(roads[end.road], end.lane, end.s)
+    section = roads[end.road].sections[target.section]
+
+    def bound(key: LaneKey, _: LaneKey) -> float:
+        if key == target:
+            return 0.0
+        road = roads[key.road]
+        part = road.sections[key.section]
+        s = part.end if driving_direction(road, key.lane) > 0 else part.s
+        x, y, *_rest = road.reference.at(s)
+        # The reference line may run up to the road's width beside the lane; the way counts from this lane's end.
+        beside = max(lane.outer.value(s - part.s) for lane in part.lanes.values())
+        return max(math.hypot(goal.x - x, goal.y - y) - 2.0 * beside - section.length, 0.0)
+
+    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < 0.0
+    if source[:2] == target[:2] and behind and source in graph:
+        graph, source = _started(graph, source)
+    try:
+        found: Sequence[LaneKey] = nx.astar_path(graph, source, target, heuristic=bound, weight="weight")
+    except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
+        raise RouteError(
+            Problem(
+                f"no way over the lanes from road {start.road!r} lane {start.lane} s {start.s:.1f} "
+                f"to road {end.road!r} lane {end.lane} s {end.s:.1f}",
+                "check the direction of the lanes and the links between them",
+            )
+        ) from error
+    return tuple(LaneKey(*key[:3]) for key in found)
+
+
+def _started(graph: LaneGraph, source: LaneKey) -> tuple[LaneGraph, LaneKey]:
+    """A graph with a second copy of the source's section: one that can be left, but not yet reached as a target."""
+    copy: LaneGraph = LaneGraph(graph)
+    group = [key for key in graph if key[:2] == source[:2]]
+
+    def twin(key: LaneKey) -> LaneKey:
+        return _Started(*key)
+
+    for key in group:
+        for _, other, data in graph.out_edges(key, data=True):
+            copy.add_edge(twin(key), twin(other) if data["kind"] == "change" else other, **data)
+    return copy, twin(source)
+
+
+class _Started(LaneKey):
+    """The part of a lane ahead of the start."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Started) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(("started", *self))
+
+
+def _key(roads: Mapping[str, Road], location: LaneLocation) -> LaneKey:
+    section, lane = lane_at(roads[location.road], location.lane, location.s)
+    return LaneKey(location.road, section.index, lane.id)

@@ -1,0 +1,118 @@
+"""Where something is: poses, road coordinates and lane coordinates, one at a time or as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.errors import InputError
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class PositionError(InputError):
+    """A road, lane or place along a road that the road network does not have."""
+
+
+class Pose(NamedTuple):
+    """World frame: x, y, z [m]; heading, pitch (nose down positive), roll [rad], z-y'-x'' rotation."""
+
+    x: float
+    y: float
+    z: float
+    h: float
+    p: float
+    r: float
+
+    def turned(self, angle: float) -> Pose:
+        """The pose of something that stands on the same spot of the same surface, turned left by `angle` [rad].
+
+        Pitch and roll follow: what climbs in one direction descends in the other.
+        """
+        if self.p == 0.0 and self.r == 0.0:
+            return self._replace(h=self.h + angle)
+        ca, sa = math.cos(angle), math.sin(angle)
+        cp, sp, cr, sr = math.cos(self.p), math.sin(self.p), math.cos(self.r), math.sin(self.r)
+        # Columns of Ry(p)·Rx(r)·Rz(angle): forward and the vertical parts of left and up.
+        forward = (cp * ca + sp * sr * sa, cr * sa, -sp * ca + cp * sr * sa)
+        left_z, up_z = sp * sa + cp * sr * ca, cp * cr
+        heading = math.atan2(forward[1], forward[0])
+        pitch = math.atan2(-forward[2], math.hypot(forward[0], forward[1]))
+        return self._replace(h=self.h + heading, p=pitch, r=math.atan2(left_z, up_z))
+
+
+class Poses(NamedTuple):
+    """`Pose` as arrays of one shape."""
+
+    x: Array
+    y: Array
+    z: Array
+    h: Array
+    p: Array
+    r: Array
+
+
+class LaneLocation(NamedTuple):
+    """A place in lane coordinates.
+
+    s, t    road coordinates [m]; offset  distance from the lane's centre line, positive in the direction of t [m]
+    """
+
+    road: str
+    lane: int
+    s: float
+    offset: float
+    t: float
+
+
+class LaneKey(NamedTuple):
+    """A lane of a lane section: the node of the lane graph."""
+
+    road: str
+    section: int
+    lane: int
+
+
+@dataclass(frozen=True)
+class LaneLocations:
+    """Places in lane coordinates, as arrays of one shape (N,).
+
+    road      index into `roads`, -1 where no road is within reach
+    lane      lane id; 0 where no road is within reach
+    s, t      road coordinates [m]; offset  from the lane's centre line, positive in the direction of t [m]
+    heading   of the reference line at s [rad]
+    outside   distance from the edge of the road, 0 on the road [m]
+    """
+
+    roads: Sequence[str]
+    road: Integers
+    lane: Integers
+    s: Array
+    t: Array
+    offset: Array
+    heading: Array
+    outside: Array
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """True where a road is within reach."""
+        return self.road >= 0
+
+    def location(self, index: int) -> LaneLocation | None:
+        """One of them, None where no road is within reach."""
+        road = int(self.road[index])
+        if road < 0:
+            return None
+        return LaneLocation(
+            self.roads[road],
+            int(self.lane[index]),
+            float(self.s[index]),
+            float(self.offset[index]),
+            float(self.t[index]),
+        )

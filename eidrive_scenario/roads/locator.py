@@ -1,0 +1,128 @@
+"""World coordinates to roads and lanes: nearest sample of a lane centre first, Newton's method on the road after."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from eidrive_scenario.roads.location import Array, Integers, LaneLocations
+from eidrive_scenario.roads.tables import RoadTables
+
+SPACING = 4.0
+"""Distance between samples along a lane [m]."""
+NARROW = 1.0
+"""Lanes narrower than this are found by way of their neighbours [m]."""
+CANDIDATES = 12
+REACH = 30.0
+"""How far from a road a point may lie to be located on it [m]."""
+
+
+class Locator:
+    """Finds road and lane coordinates of points.
+
+    A point is taken to the road whose lane centre is nearest; where it turns out to lie on none of that road's lanes,
+    the roads of the next samples are tried and the one wins that the point lies on, or is nearest to.
+    """
+
+    def __init__(self, tables: RoadTables) -> None:
+        self._tables = tables
+        self._row, self._s = _samples(tables)
+        poses = tables.lane_poses(self._row, self._s, np.zeros_like(self._s))
+        self._road = tables.section_road[tables.lane_section[self._row]]
+        self.sample_points: Array = np.column_stack([poses.x, poses.y])
+        self._flat = cKDTree(self.sample_points)
+        self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
+
+    def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
+        """Road and lane coordinates of points (N,); without z, the nearest in plan view counts."""
+        solid = z is not None and self._solid is not None
+        tree = self._solid if solid and self._solid is not None else self._flat
+        points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
+        _, nearest = tree.query(points, k=1)
+        road, s = self._road[nearest], self._s[nearest]
+        s, t, beyond = self._refine(road, s, x, y)
+        row, outside = self._tables.lane_beside(road, s, t)
+        outside = np.hypot(outside, beyond)
+        doubtful = np.flatnonzero(outside > 0.0)
+        if doubtful.size and len(self._s) > 1:
+            height = z[doubtful] if solid and z is not None else None
+            best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height)
+            road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
+        heading = self._tables.curves.at(road, s)[2]
+        far = outside > reach
+        centre, _ = self._tables.lane_t(row, s)
+        return LaneLocations(
+            roads=self._tables.ids,
+            road=np.where(far, -1, road),
+            lane=np.where(far, 0, self._tables.lane_id[row]),
+            s=s,
+            t=t,
+            offset=t - centre,
+            heading=heading,
+            outside=outside,
+        )
+
+    def _compare(
+        self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None
+    ) -> tuple[Integers, Array, Array, Integers, Array]:
+        """The best of the roads of the nearest samples: the one whose surface is nearest."""
+        k = min(CANDIDATES, len(self._s))
+        _, nearest = tree.query(points, k=k)
+        nearest = nearest.reshape(len(points), k)
+        road = self._road[nearest]
+        first = np.ones_like(road, dtype=bool)
+        for k_th in range(1, k):
+            first[:, k_th] = ~np.any(road[:, :k_th] == road[:, k_th : k_th + 1], axis=1)
+        point, column = np.nonzero(first)
+        road, s = road[point, column], self._s[nearest[point, column]]
+        s, t, beyond = self._refine(road, s, x[point], y[point])
+        row, outside = self._tables.lane_beside(road, s, t)
+        outside = np.hypot(outside, beyond)
+        score = outside
+        if z is not None:
+            score = outside + np.abs(z[point] - self._tables.road_poses(road, s, t).z)
+        order = np.lexsort((column, score, point))
+        best = order[np.searchsorted(point[order], np.arange(len(points)))]
+        return road[best], s[best], t[best], row[best], outside[best]
+
+    def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """s, t and the distance beyond an end of the road, by Newton's method from a guess of s."""
+        curves, length = self._tables.curves, self._tables.length[road]
+        s, across, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
+        open_ = np.arange(len(s))
+        for _ in range(10):
+            px, py, h, curvature, speed = curves.at(road[open_], s[open_])
+            cos, sin = np.cos(h), np.sin(h)
+            dx, dy = x[open_] - px, y[open_] - py
+            along, left = cos * dx + sin * dy, cos * dy - sin * dx
+            across[open_] = left
+            step = along / (speed * np.maximum(1.0 - curvature * left, 0.2))
+            moved = np.clip(s[open_] + step, 0.0, length[open_])
+            change = np.abs(moved - s[open_])
+            s[open_] = moved
+            at_end = (moved <= 0.0) | (moved >= length[open_])
+            beyond[open_] = np.where(at_end & (np.abs(along) > 1e-6), np.abs(along), 0.0)
+            open_ = open_[change > 1e-6]
+            if not open_.size:
+                break
+        roll = self._tables.superelevation.value(road, s)
+        return s, across / np.cos(roll), beyond
+
+
+def _samples(tables: RoadTables) -> tuple[Integers, Array]:
+    """Lane rows and s of the samples: along every lane that is not narrow, and along the widest of each section."""
+    lanes = np.flatnonzero(tables.lane_id != 0)
+    section = tables.lane_section[lanes]
+    length = tables.section_length[section]
+    width = np.max([tables.width.value(lanes, length * part) for part in (0.0, 0.5, 1.0)], axis=0)
+    widest = np.zeros(len(tables.section_start))
+    np.maximum.at(widest, section, width)
+    chosen = (width >= NARROW) | (width >= widest[section])
+    lanes, length, section = lanes[chosen], length[chosen], section[chosen]
+    counts = np.maximum(np.ceil(length / SPACING).astype(np.int64), 1) + 1
+    row = np.repeat(lanes, counts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = number / np.repeat(counts - 1, counts)
+    # The end of a section belongs to the next one: stay a little inside.
+    s = np.repeat(tables.section_start[section], counts) + np.repeat(np.maximum(length - 1e-6, 0.0), counts) * part
+    return row, s

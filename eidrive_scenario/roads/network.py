@@ -1,0 +1,266 @@
+"""The road network: what the other rooms ask about roads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from eidrive_scenario.roads import poses
+from eidrive_scenario.roads.distance import RoadDistances
+from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
+from eidrive_scenario.roads.links import LaneLinks
+from eidrive_scenario.roads.location import Array, LaneKey, LaneLocation, LaneLocations, Pose, Poses
+from eidrive_scenario.roads.locator import REACH, Locator
+from eidrive_scenario.roads.model import (
+    Header,
+    Junction,
+    Road,
+    RoadMap,
+    RoadObject,
+    Signal,
+    SignalController,
+    SignalPlace,
+)
+from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
+from eidrive_scenario.roads.reading import read_road_map
+from eidrive_scenario.roads.reading.document import parse_road_map
+from eidrive_scenario.roads.route import Route, joined
+from eidrive_scenario.roads.tables import RoadTables
+
+
+class RoadNetwork:
+    """Roads, lanes, junctions, signals and objects of one OpenDRIVE file, with their geometry.
+
+    Coordinates as in the standard: s along a road's reference line, t to its left, lane ids positive to the left.
+    """
+
+    def __init__(self, road_map: RoadMap) -> None:
+        self.source = road_map.source
+        self.header: Header = road_map.header
+        self.roads: Mapping[str, Road] = road_map.roads
+        self.junctions: Mapping[str, Junction] = road_map.junctions
+        self.signals: Mapping[str, Signal] = road_map.signals
+        self.controllers: Mapping[str, SignalController] = road_map.controllers
+        self.objects: tuple[RoadObject, ...] = road_map.objects
+        self.links = LaneLinks(road_map)
+        self.movement = Movement(self.roads, self.links)
+        self._distances = RoadDistances(self.roads, self.links)
+
+    @classmethod
+    def load(cls, path: str | Path) -> RoadNetwork:
+        """The network of an OpenDRIVE file. Raises RoadError with all findings."""
+        return cls(read_road_map(Path(path)))
+
+    @classmethod
+    def parse(cls, text: str | bytes, source: str = "<memory>") -> RoadNetwork:
+        """The network of an OpenDRIVE text. Raises RoadError."""
+        return cls(parse_road_map(text.encode() if isinstance(text, str) else text, source))
+
+    @cached_property
+    def tables(self) -> RoadTables:
+        """The roads as flat arrays."""
+        return RoadTables(list(self.roads.values()))
+
+    @cached_property
+    def graph(self) -> LaneGraph:
+        """The lanes as a directed graph over LaneKey(road, section, lane)."""
+        return build_graph(self.roads, self.links)
+
+    @cached_property
+    def _locator(self) -> Locator:
+        return Locator(self.tables)
+
+    def road(self, road_id: str) -> Road:
+        """The road with this id. Raises PositionError with the nearest right id."""
+        road = self.roads.get(road_id)
+        if road is None:
+            raise poses.unknown_road(road_id, list(self.roads))
+        return road
+
+    # Road and lane coordinates to the world
+
+    def road_pose_at(self, road_id: str, s: float, t: float = 0.0) -> Pose:
+        """The pose at road coordinates; heading of the reference line. Raises PositionError."""
+        return poses.road_pose_at(self.road(road_id), s, t)
+
+    def lane_pose_at(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> Pose:
+        """The pose at a lane's centre line plus offset; heading of the lane, along growing s. Raises PositionError."""
+        return poses.lane_pose_at(self.road(road_id), lane_id, s, offset)
+
+    def pose(self, location: LaneLocation) -> Pose:
+        """The pose at a lane location; heading of the lane in its driving direction."""
+        road = self.road(location.road)
+        found = poses.lane_pose_at(road, location.lane, location.s, location.offset)
+        return found if driving_direction(road, location.lane) > 0 else found.turned(np.pi)
+
+    def road_pose(self, road_id: str, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
+        """`road_pose_at` over arrays, broadcast against each other. Raises PositionError."""
+        self.road(road_id)
+        s, t = np.broadcast_arrays(np.asarray(s, dtype=np.float64), np.asarray(t, dtype=np.float64))
+        road = np.full(s.size, self.tables.index[road_id])
+        self.tables.check(road, s.ravel())
+        found = self.tables.road_poses(road, s.ravel(), t.ravel())
+        return Poses(*(part.reshape(s.shape) for part in found))
+
+    def lane_pose(self, road_id: str, lane_id: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
+        """`lane_pose_at` over arrays, broadcast against each other. Raises PositionError."""
+        self.road(road_id)
+        lane, s, offset = np.broadcast_arrays(
+            np.asarray(lane_id, dtype=np.int64),
+            np.asarray(s, dtype=np.float64),
+            np.asarray(offset, dtype=np.float64),
+        )
+        road, flat = np.full(s.size, self.tables.index[road_id]), s.ravel()
+        self.tables.check(road, flat)
+        found = self.tables.lane_poses(self.tables.lane_row(road, flat, lane.ravel()), flat, offset.ravel())
+        return Poses(*(part.reshape(s.shape) for part in found))
+
+    # The world to road and lane coordinates
+
+    def locate(self, x: ArrayLike, y: ArrayLike, z: ArrayLike | None = None, reach: float = REACH) -> LaneLocations:
+        """Lane locations of points (N,); where roads lie above each other, z decides."""
+        px, py = np.atleast_1d(np.asarray(x, dtype=np.float64)), np.atleast_1d(np.asarray(y, dtype=np.float64))
+        pz = None if z is None else np.atleast_1d(np.asarray(z, dtype=np.float64))
+        return self._locator.locate(px, py, pz, reach)
+
+    def locate_at(
+        self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH
+    ) -> LaneLocation | None:
+        """The lane location of a point, None where no road is within reach.
+
+        With a hint (where it was before) the point stays on that road, or on what the road leads to, as long as it
+        lies on one of their lanes; so something that crosses a junction stays on its own connecting road.
+        """
+        if hint is not None and hint.road in self.roads:
+            near = self._locate_near(x, y, hint)
+            if near is not None:
+                return near
+        found = self._locator.locate(np.array([x]), np.array([y]), None if z is None else np.array([z]), reach)
+        return found.location(0)
+
+    def _locate_near(self, x: float, y: float, hint: LaneLocation) -> LaneLocation | None:
+        road = self.roads[hint.road]
+        here = self._on(road, x, y, hint.s)
+        if here is not None:
+            return here
+        for direction in (driving_direction(road, hint.lane), -driving_direction(road, hint.lane)):
+            key = LaneKey(road.id, road.section_at(hint.s).index, hint.lane)
+            last = len(road.sections) - 1 if direction > 0 else 0
+            ways = self.links.beyond(LaneKey(road.id, last, hint.lane), direction) if key.lane else ()
+            for other, way in ways:
+                target = self.roads[other.road]
+                found = self._on(target, x, y, 0.0 if way > 0 else target.length)
+                if found is not None:
+                    return found
+        return None
+
+    def _on(self, road: Road, x: float, y: float, s: float) -> LaneLocation | None:
+        s, t, beyond = poses.project(road, x, y, s)
+        if beyond:
+            return None
+        section, lane, outside = poses.lane_beside(road, s, t)
+        if outside:
+            return None
+        return LaneLocation(road.id, lane.id, s, t - poses.lane_t(road, section, lane, s)[0], t)
+
+    def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
+        """The lane location with these coordinates, its t filled in. Raises PositionError."""
+        road = self.road(road_id)
+        section, lane = poses.lane_at(road, lane_id, s)
+        return LaneLocation(road_id, lane_id, s, offset, poses.lane_t(road, section, lane, s)[0] + offset)
+
+    def road_location(self, road_id: str, s: float, t: float) -> LaneLocation:
+        """The lane location of road coordinates, beyond the edge in the outermost lane. Raises PositionError."""
+        road = self.road(road_id)
+        if not -poses.BEYOND <= s <= road.length + poses.BEYOND:
+            raise poses.off_road(road, s)
+        section, lane, _ = poses.lane_beside(road, s, t)
+        return LaneLocation(road_id, lane.id, s, t - poses.lane_t(road, section, lane, s)[0], t)
+
+    # Lanes
+
+    def driving_direction(self, road_id: str, lane_id: int) -> int:
+        """+1 where the lane's traffic drives in the direction of s, -1 where against it."""
+        return driving_direction(self.road(road_id), lane_id)
+
+    def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
+        """The lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
+        lanes = self.road(road_id).section_at(s).lanes
+        return tuple(number for number, lane in lanes.items() if number and (lane.drivable or not drivable))
+
+    def lane_width(self, road_id: str, lane_id: int, s: float) -> float:
+        """Width of a lane at s [m]. Raises PositionError."""
+        section, lane = poses.lane_at(self.road(road_id), lane_id, s)
+        return lane.width.value(s - section.s)
+
+    def lane_type(self, road_id: str, lane_id: int, s: float) -> str:
+        """Type of a lane at s, as the standard names it. Raises PositionError."""
+        return poses.lane_at(self.road(road_id), lane_id, s)[1].type
+
+    def curvature(self, road_id: str, s: float) -> float:
+        """Curvature of the reference line at s, left positive [1/m]."""
+        return self.road(road_id).reference.at(s).curvature
+
+    def speed_limit(self, road_id: str, s: float, lane_id: int | None = None) -> float | None:
+        """The limit at s [m/s]: the lane's own, else the road's; inf for no limit, None where the map is silent."""
+        road = self.road(road_id)
+        if lane_id is not None:
+            section, lane = poses.lane_at(road, lane_id, s)
+            own = [limit for start, limit in lane.speeds if start <= s - section.s + 1e-9]
+            if own:
+                return own[-1]
+        kinds = [kind for kind in road.types if kind.s <= s + 1e-9]
+        return kinds[-1].speed if kinds else None
+
+    def on_road(self, location: LaneLocation) -> bool:
+        """True where the location lies within its lane's width."""
+        width = self.lane_width(location.road, location.lane, location.s)
+        return abs(location.offset) <= 0.5 * width
+
+    def signal_pose(self, signal: Signal, place: SignalPlace | None = None) -> Pose:
+        """Where a signal stands, its face turned against the traffic that it is for."""
+        at = place or signal.place
+        pose = self.road_pose_at(at.road, at.s, at.t)
+        turn = 0.0 if at.orientation == "-" else np.pi
+        return pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)
+
+    # Movement
+
+    def advance(
+        self,
+        location: LaneLocation,
+        distance: float,
+        *,
+        route: Route | None = None,
+        choose: Choose | None = None,
+    ) -> LaneLocation | None:
+        """The place `distance` metres further along the lane in its driving direction (back where negative).
+
+        Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
+        taken. None where the lane ends.
+        """
+        return self.movement.advance(location, distance, route, choose)
+
+    def route(self, start: LaneLocation, end: LaneLocation, via: Sequence[LaneLocation] = ()) -> Route:
+        """The cheapest way over the lanes from start to end, by A*. Raises RouteError if there is none."""
+        stops = [start, *via, end]
+        parts = [Route(self.roads, find_lanes(self.graph, self.roads, a, b), a, b) for a, b in pairwise(stops)]
+        return parts[0] if len(parts) == 1 else joined(parts)
+
+    def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
+        """How far b lies ahead of a and to its left [m], in road coordinates along connected roads, or None.
+
+        Seen in the driving direction of a's lane; negative for behind and right.
+        """
+        return self._distances.between(a, b)
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """The smallest rectangle around all lane centres: least x, least y, greatest x, greatest y [m]."""
+        points: Array = self._locator.sample_points
+        low, high = points.min(axis=0), points.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])

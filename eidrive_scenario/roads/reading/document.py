@@ -1,0 +1,211 @@
+"""The file as a whole: parsed safely, read element by element, its references checked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, RoadError, suggestion
+from eidrive_scenario.roads.model import (
+    Connection,
+    Header,
+    Junction,
+    LaneSection,
+    Road,
+    RoadLink,
+    RoadMap,
+    RoadObject,
+    RoadType,
+)
+from eidrive_scenario.roads.polynomials import Polynomials
+from eidrive_scenario.roads.reading.findings import Findings, line_of
+from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
+from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
+from eidrive_scenario.roads.reading.plan_view import read_reference_line
+
+LARGEST = 256 * 1024 * 1024
+"""Bytes of a file that is read at all."""
+
+
+def read_road_map(path: Path) -> RoadMap:
+    """An OpenDRIVE file. Raises RoadError with every finding, its line and what would be right."""
+    source = str(path)
+    try:
+        size = path.stat().st_size
+        text = path.read_bytes() if size <= LARGEST else b""
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RoadError(Problem(f"cannot read: {reason}", "give the path of an OpenDRIVE file", source)) from error
+    if size > LARGEST:
+        raise RoadError(Problem(f"is {size} bytes large", f"at most {LARGEST} are read", source))
+    return parse_road_map(text, source)
+
+
+def parse_road_map(text: bytes, source: str) -> RoadMap:
+    """OpenDRIVE from memory; `source` names it in errors. Raises RoadError."""
+    root = _parse(text, source)
+    findings = Findings(source)
+    elements = [(findings.text(element, "id"), element) for element in root.iterfind("road")]
+    roads: dict[str, Road] = {}
+    objects: list[RoadObject] = []
+    for number, element in elements:
+        if number in roads:
+            findings.add(element, f"road {number!r} occurs twice", "give each road its own id")
+        roads[number] = _read_road(number, element, findings)
+        objects.extend(read_objects(number, element, findings))
+    if not elements:
+        findings.add(root, "there is no <road>", "add at least one")
+    junctions = {}
+    for element in root.iterfind("junction"):
+        junction = _read_junction(element, roads, findings)
+        junctions[junction.id] = junction
+    for road in roads.values():
+        _check_links(road, roads, junctions, findings)
+    signals = read_signals(elements, findings)
+    controllers = read_controllers(root, signals, findings)
+    if findings.problems:
+        raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
+    return RoadMap(source, _read_header(root), roads, junctions, signals, controllers, tuple(objects))
+
+
+def _parse(text: bytes, source: str) -> etree._Element:
+    """The root element. No DTD, no entities, no network, no namespaces left."""
+    parser = etree.XMLParser(
+        resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        line = error.lineno if error.lineno else None
+        raise RoadError(Problem(f"not well-formed XML: {error.msg}", "repair it there", source, line)) from error
+    docinfo: Any = root.getroottree().docinfo
+    if docinfo.doctype:
+        raise RoadError(Problem("has a document type declaration", "remove <!DOCTYPE …>", source, 1))
+    if root.tag.startswith("{"):
+        for element in root.iter():
+            element.tag = etree.QName(element).localname
+    if root.tag != "OpenDRIVE":
+        raise RoadError(
+            Problem(f"the root element is <{root.tag}>", "an OpenDRIVE file begins with <OpenDRIVE>", source, 1)
+        )
+    return root
+
+
+def _read_header(root: etree._Element) -> Header:
+    header = root.find("header")
+    if header is None:
+        return Header()
+    revision = tuple(
+        int(text) if text.isdigit() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
+    )
+    return Header(
+        name=header.get("name", ""),
+        revision=cast(tuple[int, int], revision),
+        vendor=header.get("vendor", ""),
+        date=header.get("date", ""),
+        geo_reference=(header.findtext("geoReference") or "").strip(),
+    )
+
+
+def _read_road(number: str, element: etree._Element, findings: Findings) -> Road:
+    length = findings.number(element, "length")
+    if length <= 0.0 and element.get("length") is not None:
+        findings.add(element, f"road {number!r} has length {length:g} m", "give a positive length")
+    rule = element.get("rule", "RHT")
+    if rule not in ("RHT", "LHT"):
+        findings.add(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
+    lanes = element.find("lanes")
+    lane_offset = Polynomials()
+    sections: tuple[LaneSection, ...] = ()
+    if lanes is None:
+        findings.add(element, f"road {number!r} has no <lanes>", "add its lanes")
+    else:
+        lane_offset = read_lane_offset(lanes, findings)
+        sections = read_sections(lanes, length, lane_offset, findings)
+    junction = element.get("junction", "-1")
+    return Road(
+        id=number,
+        name=element.get("name", ""),
+        length=length,
+        rule="LHT" if rule == "LHT" else "RHT",
+        junction_id=None if junction in ("-1", "") else junction,
+        reference=read_reference_line(element, length, findings),
+        elevation=_profile(element, "elevationProfile/elevation", findings),
+        superelevation=_profile(element, "lateralProfile/superelevation", findings),
+        lane_offset=lane_offset,
+        sections=sections,
+        predecessor=_read_link(element.find("link/predecessor"), findings),
+        successor=_read_link(element.find("link/successor"), findings),
+        types=tuple(sorted(_read_types(element, findings), key=lambda kind: kind.s)),
+        line=line_of(element),
+        section_starts=tuple(section.s for section in sections),
+    )
+
+
+def _profile(road: etree._Element, path: str, findings: Findings) -> Polynomials:
+    return Polynomials(findings.polynomial(element, "s") for element in road.iterfind(path))
+
+
+def _read_types(road: etree._Element, findings: Findings) -> list[RoadType]:
+    types = []
+    for element in road.iterfind("type"):
+        speed = element.find("speed")
+        limit = None if speed is None else read_speed(speed, findings)
+        types.append(RoadType(findings.number(element, "s"), element.get("type", "unknown"), limit))
+    return types
+
+
+def _read_link(element: etree._Element | None, findings: Findings) -> RoadLink | None:
+    if element is None:
+        return None
+    kind = findings.text(element, "elementType", "road")
+    if kind not in ("road", "junction"):
+        findings.add(element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction")))
+        return None
+    number = findings.text(element, "elementId")
+    contact = findings.contact(element, "contactPoint")
+    return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
+
+
+def _read_junction(element: etree._Element, roads: dict[str, Road], findings: Findings) -> Junction:
+    connections = []
+    for connection in element.iterfind("connection"):
+        read = _read_connection(connection, roads, findings)
+        if read is not None:
+            connections.append(read)
+    return Junction(
+        id=findings.text(element, "id"),
+        name=element.get("name", ""),
+        type=element.get("type", "default"),
+        connections=tuple(connections),
+        controllers=tuple(findings.text(controller, "id") for controller in element.iterfind("controller")),
+    )
+
+
+def _read_connection(element: etree._Element, roads: dict[str, Road], findings: Findings) -> Connection | None:
+    incoming = element.get("incomingRoad")
+    connecting = element.get("connectingRoad", element.get("linkedRoad"))
+    if incoming is None or connecting is None:
+        if element.get("type") != "virtual":
+            findings.add(element, "<connection> lacks incomingRoad or connectingRoad", "give both")
+        return None
+    missing = [number for number in (incoming, connecting) if number not in roads]
+    for number in missing:
+        findings.add(element, f"<connection> names road {number!r}, which does not exist", suggestion(number, roads))
+    links = tuple(
+        (findings.integer(link, "from"), findings.integer(link, "to")) for link in element.iterfind("laneLink")
+    )
+    contact = findings.contact(element, "contactPoint") or "start"
+    return None if missing else Connection(element.get("id", ""), incoming, connecting, contact, links)
+
+
+def _check_links(road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: Findings) -> None:
+    for link in (road.predecessor, road.successor):
+        if link is None:
+            continue
+        known = roads if link.element_type == "road" else junctions
+        if link.element_id not in known and len(findings.problems) < 100:
+            message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
+            findings.problems.append(Problem(message, suggestion(link.element_id, known), findings.source, link.line))

@@ -1,0 +1,107 @@
+"""Attributes of XML elements, checked; what is wrong is collected, so that one reading reports all of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, overload
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, suggestion
+
+MOST = 100
+"""Findings after which reading goes on in silence."""
+
+
+def line_of(element: etree._Element | None) -> int | None:
+    """Where an element begins in its file."""
+    line = None if element is None else element.sourceline
+    return line if isinstance(line, int) else None
+
+
+class Findings:
+    """Reads attributes of elements of one file and remembers each problem with its line."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.problems: list[Problem] = []
+
+    def add(self, element: etree._Element | None, message: str, remedy: str) -> None:
+        """Remember a problem at an element."""
+        if len(self.problems) < MOST:
+            self.problems.append(Problem(message, remedy, self.source, line_of(element)))
+
+    @overload
+    def number(self, element: etree._Element, name: str) -> float: ...
+    @overload
+    def number(self, element: etree._Element, name: str, default: float) -> float: ...
+    @overload
+    def number(self, element: etree._Element, name: str, default: None) -> float | None: ...
+    def number(self, element: etree._Element, name: str, default: float | None = math.nan) -> float | None:
+        """A finite number. Missing without a default, or not a number, is a problem and gives 0."""
+        text = element.get(name)
+        if text is None:
+            if default is not None and math.isnan(default):
+                self._missing(element, name)
+                return 0.0
+            return default
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isfinite(value):
+            return value
+        self.add(element, f"<{element.tag}> has {name}={text!r}", "give a finite number")
+        return 0.0
+
+    def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
+        """A piece of a cubic: its start and a, b, c, d."""
+        return (
+            self.number(element, start),
+            self.number(element, "a"),
+            self.number(element, "b"),
+            self.number(element, "c"),
+            self.number(element, "d"),
+        )
+
+    def text(self, element: etree._Element, name: str, default: str | None = None) -> str:
+        """A text. Missing without a default is a problem and gives ''."""
+        text = element.get(name)
+        if text is not None:
+            return text
+        if default is None:
+            self._missing(element, name)
+            return ""
+        return default
+
+    def integer(self, element: etree._Element, name: str) -> int:
+        """A whole number. Missing, or not one, is a problem and gives 0."""
+        text = element.get(name)
+        if text is None:
+            self._missing(element, name)
+            return 0
+        try:
+            return int(text)
+        except ValueError:
+            self.add(element, f"<{element.tag}> has {name}={text!r}", "give a whole number")
+            return 0
+
+    def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
+        """Which end of a road; None where the attribute is missing."""
+        text = element.get(name)
+        if text == "start":
+            return "start"
+        if text == "end":
+            return "end"
+        if text is not None:
+            self.add(element, f"<{element.tag}> has {name}={text!r}", suggestion(text, ("start", "end")))
+        return None
+
+    def flag(self, element: etree._Element, name: str) -> bool:
+        """yes, true or 1 are true; anything else, or nothing, is false."""
+        return element.get(name, "").strip().lower() in ("yes", "true", "1")
+
+    def _missing(self, element: etree._Element, name: str) -> None:
+        near = suggestion(name, map(str, element.attrib)) if element.attrib else ""
+        remedy = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
+        self.add(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)

@@ -1,0 +1,143 @@
+"""<signals>, <objects> and <controller>."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lxml import etree
+
+from eidrive_scenario.roads.model import Corner, Repeat, RoadObject, Signal, SignalController, SignalPlace
+from eidrive_scenario.roads.reading.findings import Findings
+
+
+def read_signals(roads: list[tuple[str, etree._Element]], findings: Findings) -> dict[str, Signal]:
+    """The signals of all roads by id, with the references that other roads make to them.
+
+    Some maps give one id to several signals: the second of them is found under 'id#2', and so on.
+    """
+    signals: dict[str, Signal] = {}
+    references: list[tuple[str, SignalPlace, etree._Element]] = []
+    for road, element in roads:
+        for signal in element.iterfind("signals/signal"):
+            read = _read_signal(road, signal, findings)
+            same = sum(1 for key in signals if key == read.id or key.startswith(f"{read.id}#"))
+            signals[f"{read.id}#{same + 1}" if same else read.id] = read
+        for reference in element.iterfind("signals/signalReference"):
+            references.append((findings.text(reference, "id"), _read_place(road, reference, findings), reference))
+    for number, place, reference in references:
+        if number in signals:
+            signals[number] = replace(signals[number], references=(*signals[number].references, place))
+        else:
+            findings.add(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
+    return signals
+
+
+def _read_place(road: str, element: etree._Element, findings: Findings) -> SignalPlace:
+    orientation = element.get("orientation", "none")
+    return SignalPlace(
+        road=road,
+        s=findings.number(element, "s"),
+        t=findings.number(element, "t"),
+        orientation=orientation if orientation in ("+", "-") else "none",
+        validity=tuple(
+            (findings.integer(v, "fromLane"), findings.integer(v, "toLane")) for v in element.iterfind("validity")
+        ),
+    )
+
+
+def _read_signal(road: str, element: etree._Element, findings: Findings) -> Signal:
+    return Signal(
+        id=findings.text(element, "id"),
+        name=element.get("name", ""),
+        type=findings.text(element, "type"),
+        subtype=element.get("subtype", ""),
+        country=element.get("country", ""),
+        value=findings.number(element, "value", None),
+        unit=element.get("unit", ""),
+        text=element.get("text", ""),
+        dynamic=findings.flag(element, "dynamic"),
+        place=_read_place(road, element, findings),
+        z_offset=findings.number(element, "zOffset", 0.0),
+        h_offset=findings.number(element, "hOffset", 0.0),
+        width=findings.number(element, "width", 0.0),
+        height=findings.number(element, "height", 0.0),
+    )
+
+
+def read_controllers(
+    root: etree._Element, signals: dict[str, Signal], findings: Findings
+) -> dict[str, SignalController]:
+    """Groups of signals by id."""
+    controllers = {}
+    for element in root.iterfind("controller"):
+        members = []
+        for control in element.iterfind("control"):
+            number = findings.text(control, "signalId")
+            if number not in signals:
+                findings.add(control, f"control of signal {number!r}, which does not exist", "correct the id")
+            members.append(number)
+        number = findings.text(element, "id")
+        controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
+    return controllers
+
+
+def read_objects(road: str, element: etree._Element, findings: Findings) -> list[RoadObject]:
+    """The objects of one road."""
+    return [_read_object(road, item, findings) for item in element.iterfind("objects/object")]
+
+
+def _read_object(road: str, element: etree._Element, findings: Findings) -> RoadObject:
+    def number(name: str) -> float:
+        return findings.number(element, name, 0.0)
+
+    outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
+    return RoadObject(
+        id=element.get("id", ""),
+        name=element.get("name", ""),
+        type=element.get("type", "none"),
+        subtype=element.get("subtype", ""),
+        road=road,
+        s=findings.number(element, "s"),
+        t=findings.number(element, "t"),
+        z_offset=number("zOffset"),
+        heading=number("hdg"),
+        pitch=number("pitch"),
+        roll=number("roll"),
+        orientation=element.get("orientation", "none"),
+        length=number("length"),
+        width=number("width"),
+        height=number("height"),
+        radius=number("radius"),
+        outlines=tuple(tuple(_read_corners(outline, findings)) for outline in outlines),
+        repeats=tuple(_read_repeat(repeat, element, findings) for repeat in element.iterfind("repeat")),
+    )
+
+
+def _read_corners(outline: etree._Element, findings: Findings) -> list[Corner]:
+    corners = []
+    for corner in outline:
+        if corner.tag == "cornerRoad":
+            x, y, z = findings.number(corner, "s"), findings.number(corner, "t"), findings.number(corner, "dz", 0.0)
+        elif corner.tag == "cornerLocal":
+            x, y, z = findings.number(corner, "u"), findings.number(corner, "v"), findings.number(corner, "z", 0.0)
+        else:
+            continue
+        corners.append(Corner(corner.tag == "cornerRoad", x, y, z, findings.number(corner, "height", 0.0)))
+    return corners
+
+
+def _read_repeat(repeat: etree._Element, element: etree._Element, findings: Findings) -> Repeat:
+    def pair(name: str, own: str) -> tuple[float, float]:
+        fallback = findings.number(element, own, 0.0)
+        start = findings.number(repeat, f"{name}Start", fallback)
+        return start, findings.number(repeat, f"{name}End", start)
+
+    return Repeat(
+        s=findings.number(repeat, "s", findings.number(element, "s", 0.0)),
+        length=findings.number(repeat, "length"),
+        distance=findings.number(repeat, "distance", 0.0),
+        t=pair("t", "t"),
+        width=pair("width", "width"),
+        height=pair("height", "height"),
+        z_offset=pair("zOffset", "zOffset"),
+    )

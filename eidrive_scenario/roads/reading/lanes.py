@@ -1,0 +1,200 @@
+"""<lanes>: lane offset, lane sections, widths or borders, lane links, road marks, heights, speeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from lxml import etree
+
+from eidrive_scenario.roads.model import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
+from eidrive_scenario.roads.polynomials import Polynomials, combine
+from eidrive_scenario.roads.reading.findings import Findings
+
+UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
+ZERO = Polynomials()
+CENTRE = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, centre=ZERO)
+
+
+def read_speed(element: etree._Element, findings: Findings) -> float | None:
+    """The limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
+    text = findings.text(element, "max")
+    if text in ("no limit", "undefined"):
+        return math.inf if text == "no limit" else None
+    unit = element.get("unit", "m/s")
+    if unit not in UNITS:
+        findings.add(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
+    return findings.number(element, "max") * UNITS.get(unit, 1.0)
+
+
+def read_lane_offset(lanes: etree._Element, findings: Findings) -> Polynomials:
+    """The distance of lane 0 from the reference line."""
+    return Polynomials(findings.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
+
+
+def read_sections(
+    lanes: etree._Element, length: float, lane_offset: Polynomials, findings: Findings
+) -> tuple[LaneSection, ...]:
+    """The lane sections of a road in the order of s; a section of no length is left out."""
+    found = sorted(
+        ((findings.number(element, "s"), element) for element in lanes.iterfind("laneSection")),
+        key=lambda pair: pair[0],
+    )
+    if not found:
+        findings.add(lanes, "<lanes> has no <laneSection>", "add at least one")
+        return ()
+    if any(findings.flag(element, "singleSide") for _, element in found):
+        found = _join_sides(found)
+    ends = [*(s for s, _ in found[1:]), length]
+    sections: list[LaneSection] = []
+    for (s, element), end in zip(found, ends, strict=True):
+        if end - s <= 1e-6 and (sections or len(found) > 1):
+            continue
+        read = _read_section(element, 0.0 if not sections else s, lane_offset, findings)
+        sections.append(LaneSection(len(sections), 0.0 if not sections else s, max(end - s, 0.0), read))
+    return tuple(sections)
+
+
+def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
+    """Sections that name one side only (singleSide) as sections with both: the other side goes on from before."""
+    joined: list[tuple[float, etree._Element]] = []
+    current: dict[str, tuple[float, etree._Element]] = {}
+    for s in sorted({s for s, _ in found}):
+        started = [element for start, element in found if start == s]
+        merged = etree.Element("laneSection")
+        for element in started:
+            sides = [side for side in ("left", "right") if element.find(side) is not None]
+            for side in sides if element.get("singleSide", "").lower() in ("true", "1") else ("left", "right"):
+                current[side] = (s, element)
+            current["center"] = (s, element)
+        for side, (start, element) in current.items():
+            part = element.find(side)
+            if part is not None:
+                copy = etree.fromstring(etree.tostring(part))
+                for lane in copy.iterfind("lane"):
+                    lane.set("from", repr(start - s))
+                    if start < s:
+                        _continue_link(lane, "predecessor")
+                        _continue_link(joined[-1][1].find(f"{side}/lane[@id='{lane.get('id')}']"), "successor")
+                merged.append(copy)
+        joined.append((s, merged))
+    return joined
+
+
+def _continue_link(lane: etree._Element | None, name: str) -> None:
+    """Link a lane to the lane of its own id."""
+    if lane is None:
+        return
+    link = lane.find("link")
+    if link is None:
+        link = etree.SubElement(lane, "link")
+    for old in link.findall(name):
+        link.remove(old)
+    etree.SubElement(link, name, id=lane.get("id", "0"))
+
+
+def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, findings: Findings) -> dict[int, Lane]:
+    found: dict[int, etree._Element] = {}
+    for side, sign in (("left", 1), ("center", 0), ("right", -1)):
+        for element in section.iterfind(f"{side}/lane"):
+            number = findings.integer(element, "id")
+            if (number > 0) - (number < 0) != sign:
+                findings.add(
+                    element,
+                    f"lane {number} stands under <{side}>",
+                    "left lanes have ids above 0, the centre lane 0, right lanes below 0",
+                )
+            elif number in found:
+                findings.add(element, f"lane {number} occurs twice in its section", "give each lane its own id")
+            else:
+                found[number] = element
+    centre = found.get(0)
+    lanes = {0: CENTRE if centre is None else _lane(centre, 0, ZERO, ZERO, findings)}
+    offset = lane_offset.shifted(s)
+    for sign in (1, -1):
+        edge = ZERO
+        for number in sorted((n for n in found if n * sign > 0), key=abs):
+            lane = _lane(found[number], number, edge, offset, findings)
+            lanes[number] = lane
+            edge = lane.outer
+    if not any(lanes):
+        findings.add(section, "<laneSection> has no lane beside the centre", "add a lane under <left> or <right>")
+    return {number: lanes[number] for number in sorted(lanes, reverse=True)}
+
+
+def _lane(
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
+) -> Lane:
+    begin = float(element.get("from", "0"))
+    width = ZERO
+    if number:
+        width = _read_width(element, number, inner, lane_offset, findings)
+    outer = inner if number == 0 else combine([(1.0, inner), (1.0, width)])
+    centre = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
+    link = element.find("link")
+    speeds = ((findings.number(e, "sOffset") + begin, read_speed(e, findings)) for e in element.iterfind("speed"))
+    return Lane(
+        id=number,
+        type=element.get("type", "none"),
+        width=width,
+        inner=inner,
+        outer=outer,
+        centre=centre,
+        predecessors=_linked(link, "predecessor", findings),
+        successors=_linked(link, "successor", findings),
+        level=findings.flag(element, "level"),
+        direction=element.get("direction", "standard"),
+        road_marks=tuple(sorted(_read_marks(element, begin, findings), key=lambda mark: mark.s_offset)),
+        heights=tuple(
+            LaneHeight(findings.number(e, "sOffset") + begin, findings.number(e, "inner"), findings.number(e, "outer"))
+            for e in element.iterfind("height")
+        ),
+        speeds=tuple(sorted((s, limit) for s, limit in speeds if limit is not None)),
+    )
+
+
+def _read_width(
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
+) -> Polynomials:
+    """Width over ds. A <border> counts from the reference line; <width> wins where both are given (clause 11.7)."""
+    begin = float(element.get("from", "0"))
+    widths = [findings.polynomial(e, "sOffset") for e in element.iterfind("width")]
+    borders = [findings.polynomial(e, "sOffset") for e in element.iterfind("border")]
+    given = Polynomials(widths or borders)
+    if begin:
+        given = given.shifted(-begin)
+    if widths or not borders:
+        return given
+    side = 1.0 if number > 0 else -1.0
+    return combine([(side, given), (-side, lane_offset), (-1.0, inner)])
+
+
+def _linked(link: etree._Element | None, name: str, findings: Findings) -> tuple[int, ...]:
+    return () if link is None else tuple(findings.integer(element, "id") for element in link.iterfind(name))
+
+
+def _read_marks(element: etree._Element, begin: float, findings: Findings) -> Iterable[RoadMark]:
+    for mark in element.iterfind("roadMark"):
+        weight = mark.get("weight", "standard")
+        width = findings.number(mark, "width", None)
+        lines = []
+        for line in mark.iterfind("type/line"):
+            lines.append(
+                RoadMarkLine(
+                    length=findings.number(line, "length"),
+                    space=findings.number(line, "space"),
+                    t_offset=findings.number(line, "tOffset", 0.0),
+                    s_offset=findings.number(line, "sOffset", 0.0),
+                    width=findings.number(line, "width", 0.0) or width or MARK_WIDTHS.get(weight, 0.12),
+                )
+            )
+        yield RoadMark(
+            s_offset=findings.number(mark, "sOffset", 0.0) + begin,
+            type=findings.text(mark, "type", "none"),
+            weight=weight,
+            color=mark.get("color", "standard"),
+            width=width or MARK_WIDTHS.get(weight, 0.12),
+            lane_change=mark.get("laneChange", "both"),
+            lines=tuple(lines),
+        )

@@ -1,0 +1,77 @@
+"""<planView>: the curves of a reference line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lxml import etree
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.roads import curves
+from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.reading.findings import Findings
+
+KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
+SHORTEST = 1e-9
+"""Geometries of no length occur in real maps and are left out [m]."""
+
+
+def read_reference_line(road: etree._Element, length: float, findings: Findings) -> ReferenceLine:
+    """The reference line of a <road>."""
+    plan = road.find("planView")
+    if plan is None:
+        findings.add(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
+        return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
+    found: list[Curve] = []
+    for geometry in plan.iterfind("geometry"):
+        found.extend(_read_geometry(geometry, findings))
+    if not found:
+        findings.add(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
+        return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
+    found.sort(key=lambda curve: curve.s)
+    covered = found[-1].s + found[-1].length
+    if abs(covered - length) > max(0.01 * length, 0.1):
+        findings.add(
+            road,
+            f"road {road.get('id')!r} has length {length:g} m, but its geometry ends at {covered:g} m",
+            "correct the length or complete the geometry",
+        )
+    return ReferenceLine(found, length)
+
+
+def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Curve]:
+    s, x, y, h, length = (findings.number(geometry, name) for name in ("s", "x", "y", "hdg", "length"))
+    if length <= SHORTEST:
+        if length < 0.0:
+            findings.add(geometry, f"<geometry> has length={length:g}", "give a positive length")
+        return []
+    shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
+    if shape is None:
+        findings.add(geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS))
+        return []
+    if shape.tag == "line":
+        return [Arc(s, x, y, h, length)]
+    if shape.tag == "arc":
+        return [Arc(s, x, y, h, length, findings.number(shape, "curvature"))]
+    if shape.tag == "spiral":
+        start, end = findings.number(shape, "curvStart"), findings.number(shape, "curvEnd")
+        return [curves.spiral(s, x, y, h, length, start, end)]
+    if shape.tag == "poly3":
+        a, b, c, d = (findings.number(shape, name) for name in "abcd")
+        return curves.poly3(s, x, y, h, length, (a, b, c, d))
+    if shape.tag == "paramPoly3":
+        return [_read_param_poly3(shape, s, x, y, h, length, findings)]
+    findings.add(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
+    return []
+
+
+def _read_param_poly3(
+    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, findings: Findings
+) -> Cubic:
+    u0, u1, u2, u3 = (findings.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
+    v0, v1, v2, v3 = (findings.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
+    span = shape.get("pRange", "normalized")
+    if span not in ("arcLength", "normalized"):
+        findings.add(shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized")))
+    pace = 1.0 if span == "arcLength" else 1.0 / length
+    return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace)

@@ -1,0 +1,208 @@
+"""A route: the lanes from place to place, its length and its course."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from eidrive_scenario.roads.location import Array, LaneKey, LaneLocation, Pose
+from eidrive_scenario.roads.model import Road
+from eidrive_scenario.roads.movement import Branch, driving_direction
+from eidrive_scenario.roads.poses import lane_pose_at, lane_t, road_pose_at
+
+GRAIN = 0.25
+"""Distance between the points by which a route's course is kept [m]."""
+LANE_CHANGE_LENGTH = 40.0
+"""Metres over which a lane change stretches where its section has room for it."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of a route within one lane section: from s to s_end, from one lane into another (mostly the same)."""
+
+    road: str
+    section: int
+    lane: int
+    lane_end: int
+    s: float
+    s_end: float
+
+    @property
+    def direction(self) -> int:
+        """+1 along growing s, -1 against it."""
+        return 1 if self.s_end >= self.s else -1
+
+
+@dataclass(frozen=True)
+class Route:
+    """The way from `start` to `end` over `lanes`; distances along it count from the start [m]."""
+
+    roads: Mapping[str, Road] = field(repr=False)
+    lanes: tuple[LaneKey, ...]
+    start: LaneLocation
+    end: LaneLocation
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """The stretches of the route, one for each lane section that it crosses."""
+        groups: list[list[LaneKey]] = []
+        for key in self.lanes:
+            if groups and groups[-1][-1][:2] == key[:2] and groups[-1][-1] != key:
+                groups[-1].append(key)
+            else:
+                groups.append([key])
+        legs = []
+        for number, group in enumerate(groups):
+            road = self.roads[group[0].road]
+            section = road.sections[group[0].section]
+            s, s_end = section.s, section.end
+            if driving_direction(road, group[0].lane) < 0:
+                s, s_end = s_end, s
+            if number == 0:
+                s = self.start.s
+            if number == len(groups) - 1:
+                s_end = self.end.s
+            legs.append(Leg(road.id, section.index, group[0].lane, group[-1].lane, s, s_end))
+        return tuple(legs)
+
+    @property
+    def length(self) -> float:
+        """Metres from start to end along the lanes' centre lines."""
+        return float(self._course[1][-1])
+
+    def polyline(self, spacing: float = 1.0) -> Array:
+        """(M, 3) points of the lanes' centre lines from start to end, at most `spacing` apart [m]."""
+        count = max(math.ceil(self.length / spacing), 1) + 1
+        return self.points_at(np.linspace(0.0, self.length, count))
+
+    def points_at(self, distance: Array) -> Array:
+        """(M, 3) points at distances (M,) along the route."""
+        points, along, _, _ = self._course
+        return np.column_stack([np.interp(distance, along, points[:, axis]) for axis in range(3)])
+
+    def location_at(self, distance: float) -> LaneLocation:
+        """The place at a distance along the route, on its centre line."""
+        _, along, owner, places = self._course
+        index = min(max(bisect_right(along, distance) - 1, 0), len(along) - 2)
+        leg = self.legs[int(owner[index + 1])]
+        before = index if owner[index] == owner[index + 1] else index + 1
+        span = along[index + 1] - along[before]
+        part = (distance - along[before]) / span if span > 0.0 else 0.0
+        s = float(places[before] + (places[index + 1] - places[before]) * min(max(part, 0.0), 1.0))
+        road = self.roads[leg.road]
+        section = road.sections[leg.section]
+        t = self._t(leg, s)
+        lane = min((leg.lane, leg.lane_end), key=lambda n: abs(lane_t(road, section, section.lanes[n], s)[0] - t))
+        return LaneLocation(leg.road, lane, s, t - lane_t(road, section, section.lanes[lane], s)[0], t)
+
+    def pose_at(self, distance: float) -> Pose:
+        """The pose at a distance along the route, heading in the direction of travel."""
+        place = self.location_at(distance)
+        pose = lane_pose_at(self.roads[place.road], place.lane, place.s, place.offset)
+        x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
+        if x[0] == x[1] and y[0] == y[1]:
+            return pose
+        heading = math.atan2(y[1] - y[0], x[1] - x[0])
+        return pose.turned(_wrap(heading - pose.h))
+
+    def s_along(self, location: LaneLocation) -> float | None:
+        """The distance along the route at which it passes a place's road and s, None where it does not."""
+        _, along, owner, places = self._course
+        for number, leg in enumerate(self.legs):
+            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
+            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+                mine = np.flatnonzero(owner == number)
+                order = places[mine] * leg.direction
+                return float(np.interp(location.s * leg.direction, order, along[mine]))
+        return None
+
+    def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
+        """The distance along the route that is nearest to a point, and how far left of the route the point lies [m].
+
+        `near` narrows the search to `window` metres around a distance known before.
+        """
+        points, along, _, _ = self._course
+        low, high = 0, len(along) - 1
+        if near is not None:
+            low = max(bisect_right(along, near - window) - 1, 0)
+            high = min(bisect_right(along, near + window), high)
+        part = points[low : high + 1]
+        index = low + int(np.argmin((part[:, 0] - x) ** 2 + (part[:, 1] - y) ** 2))
+        best = (math.inf, 0.0, 0.0)
+        for i in (index - 1, index):
+            if low <= i < high:
+                (ax, ay), (bx, by) = points[i, :2], points[i + 1, :2]
+                dx, dy = bx - ax, by - ay
+                norm = math.hypot(dx, dy)
+                if norm == 0.0:
+                    continue
+                part_of = min(max(((x - ax) * dx + (y - ay) * dy) / norm**2, 0.0), 1.0)
+                gap = math.hypot(x - ax - part_of * dx, y - ay - part_of * dy)
+                left = ((y - ay) * dx - (x - ax) * dy) / norm
+                place = float(along[i] + part_of * (along[i + 1] - along[i]))
+                best = min(best, (gap, place, left))
+        return best[1], float(best[2])
+
+    def pick(self, branches: Sequence[Branch]) -> Branch | None:
+        """The branch that the route takes; None if it takes none of them."""
+        for branch in branches:
+            if branch.lane in self._lane_set:
+                return branch
+        for branch in branches:
+            if branch.lane.road in self._road_set:
+                return branch
+        return None
+
+    @cached_property
+    def _lane_set(self) -> frozenset[LaneKey]:
+        return frozenset(self.lanes)
+
+    @cached_property
+    def _road_set(self) -> frozenset[str]:
+        return frozenset(key.road for key in self.lanes)
+
+    def _t(self, leg: Leg, s: float) -> float:
+        """t of the route's course on a leg; a lane change eases in and out with no jump of curvature."""
+        road = self.roads[leg.road]
+        section = road.sections[leg.section]
+        t = lane_t(road, section, section.lanes[leg.lane], s)[0]
+        if leg.lane == leg.lane_end:
+            return t
+        span = min(abs(leg.s_end - leg.s), LANE_CHANGE_LENGTH)
+        part = min(abs(s - leg.s) / span, 1.0) if span > 0.0 else 1.0
+        eased = part**3 * (10.0 + part * (6.0 * part - 15.0))
+        return t + eased * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
+
+    @cached_property
+    def _course(self) -> tuple[Array, Array, Array, Array]:
+        """Points (M, 3), distances along (M,), the leg of each (M,) and its s (M,)."""
+        rows: list[tuple[float, float, float]] = []
+        owner: list[int] = []
+        places: list[float] = []
+        for number, leg in enumerate(self.legs):
+            count = max(math.ceil(abs(leg.s_end - leg.s) / GRAIN), 1) + 1
+            for s in np.linspace(leg.s, leg.s_end, count).tolist():
+                pose = road_pose_at(self.roads[leg.road], s, self._t(leg, s))
+                rows.append(pose[:3])
+                owner.append(number)
+                places.append(s)
+        points = np.array(rows)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        return points, along, np.array(owner, dtype=np.float64), np.array(places)
+
+
+def joined(routes: Sequence[Route]) -> Route:
+    """Several routes, each beginning where the one before ends, as one."""
+    lanes = list(routes[0].lanes)
+    for route in routes[1:]:
+        lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
+    return Route(routes[0].roads, tuple(lanes), routes[0].start, routes[-1].end)
+
+
+def _wrap(angle: float) -> float:
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)

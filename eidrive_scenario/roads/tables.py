@@ -1,0 +1,151 @@
+"""All roads of a network as flat arrays: road and lane coordinates to poses for any mixture of roads at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.roads.curves import CurveTable
+from eidrive_scenario.roads.location import Array, Integers, Poses, PositionError
+from eidrive_scenario.roads.model import Lane, LaneSection, Road
+from eidrive_scenario.roads.polynomials import PolynomialTable
+from eidrive_scenario.roads.poses import BEYOND, off_road
+
+
+class RoadTables:
+    """Roads by their index in `ids`; lane sections and lanes by running numbers over all roads.
+
+    The lanes of a section stand in the order 0, 1, 2, … -1, -2, …
+    """
+
+    def __init__(self, roads: Sequence[Road]) -> None:
+        self.roads = list(roads)
+        self.ids = [road.id for road in roads]
+        self.index = {number: index for index, number in enumerate(self.ids)}
+        self.length = np.array([road.length for road in roads])
+        spans = [road.length for road in roads]
+        self.curves = CurveTable([road.reference for road in roads])
+        self.elevation = PolynomialTable([road.elevation for road in roads], spans)
+        self.superelevation = PolynomialTable([road.superelevation for road in roads], spans)
+        self.lane_offset = PolynomialTable([road.lane_offset for road in roads], spans)
+        self._flat = all(road.elevation.is_zero for road in roads)
+        self._level = all(road.superelevation.is_zero for road in roads)
+        self._index_sections()
+
+    def _index_sections(self) -> None:
+        owners = [(index, section) for index, road in enumerate(self.roads) for section in road.sections]
+        sections = [section for _, section in owners]
+        self.section_road = np.array([index for index, _ in owners], dtype=np.int64)
+        self.section_start = np.array([section.s for section in sections])
+        self.section_length = np.array([section.length for section in sections])
+        self.first_section = np.searchsorted(self.section_road, np.arange(len(self.roads)))
+        self._section_keys = self.curves.base[self.section_road] + self.section_start
+        ordered = [_inside_out(section) for section in sections]
+        counts = np.array([len(lanes) for lanes in ordered])
+        self.left_count = np.array([sum(1 for lane in lanes if lane.id > 0) for lanes in ordered])
+        self.right_count = counts - self.left_count - 1
+        self.first_lane = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        lanes = [lane for group in ordered for lane in group]
+        self.lane_section = np.repeat(np.arange(len(sections)), counts)
+        self.lane_id = np.array([lane.id for lane in lanes], dtype=np.int64)
+        self.lane_drivable = np.array([lane.drivable for lane in lanes])
+        spans = [section.length for section, group in zip(sections, ordered, strict=True) for _ in group]
+        self.centre = PolynomialTable([lane.centre for lane in lanes], spans)
+        self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
+        self.width = PolynomialTable([lane.width for lane in lanes], spans)
+
+    def section_of(self, road: Integers, s: Array) -> Integers:
+        """Running number of the lane section at s (N,) of roads (N,)."""
+        keys = self.curves.base[road] + s
+        found: Integers = np.searchsorted(self._section_keys, keys, side="right") - 1
+        first: Integers = self.first_section[road]
+        return np.maximum(found, first)
+
+    def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
+        """Running number of lanes by their id (N,) at s (N,). Raises PositionError for one that does not exist."""
+        section = self.section_of(road, s)
+        left, right = self.left_count[section], self.right_count[section]
+        row = self.first_lane[section] + np.where(lane >= 0, np.minimum(lane, left), left + np.minimum(-lane, right))
+        wrong = self.lane_id[row] != lane
+        for n in np.flatnonzero(wrong):
+            # Lane ids with gaps are against the standard, but occur: look the lane up by its id.
+            end = self.first_lane[section[n]] + left[n] + right[n] + 1
+            near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
+            if not near.size:
+                raise PositionError(
+                    Problem(f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane")
+                )
+            row[n] = self.first_lane[section[n]] + near[0]
+        return row
+
+    def check(self, road: Integers, s: Array) -> None:
+        """Raises PositionError for the first place beyond the ends of its road."""
+        wrong = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
+        if wrong.size:
+            first = wrong[0]
+            raise off_road(self.roads[road[first]], float(s[first]))
+
+    def road_poses(self, road: Integers, s: Array, t: Array) -> Poses:
+        """Poses at road coordinates (N,); headings of the reference lines."""
+        x, y, h, _, _ = self.curves.at(road, s)
+        return self._lifted(road, s, t, x, y, h, h)
+
+    def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
+        """Poses at the centre lines of lanes (running numbers) plus offset; headings of the lanes, along growing s."""
+        section = self.lane_section[row]
+        road = self.section_road[section]
+        t, slope = self.lane_t(row, s)
+        t = t + offset
+        x, y, h, curvature, speed = self.curves.at(road, s)
+        return self._lifted(road, s, t, x, y, h, h + np.arctan2(slope, speed * (1.0 - curvature * t)))
+
+    def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
+        """t of lanes' centre lines and its derivative."""
+        section = self.lane_section[row]
+        t, slope = self.lane_offset.value_and_slope(self.section_road[section], s)
+        centre, centre_slope = self.centre.value_and_slope(row, s - self.section_start[section])
+        side = np.sign(self.lane_id[row])
+        return t + side * centre, slope + side * centre_slope
+
+    def lane_beside(self, road: Integers, s: Array, t: Array) -> tuple[Integers, Array]:
+        """Running number of the lane at road coordinates, and the distance from the road's edge (0 on the road)."""
+        section = self.section_of(road, s)
+        ds = s - self.section_start[section]
+        offset = t - self.lane_offset.value(road, s)
+        left, right = self.left_count[section], self.right_count[section]
+        to_left = offset > 0.0
+        count = np.where(to_left, left, right)
+        first = self.first_lane[section] + np.where(to_left, 1, 1 + left)
+        reach = np.abs(offset)
+        row = np.where(count > 0, first, self.first_lane[section] + np.where(left + right > 0, 1, 0))
+        outside = np.where(count > 0, 0.0, reach)
+        open_ = np.flatnonzero(count > 0)
+        for k in range(int(count.max(initial=0))):
+            row[open_] = first[open_] + k
+            over = reach[open_] - self.outer.value(row[open_], ds[open_])
+            last = k + 1 >= count[open_]
+            outside[open_[last]] = np.maximum(over[last], 0.0)
+            open_ = open_[(over >= 0.0) & ~last]
+            if not open_.size:
+                break
+        return row, outside
+
+    def _lifted(self, road: Integers, s: Array, t: Array, x: Array, y: Array, h: Array, heading: Array) -> Poses:
+        z, pitch, roll, across = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), t
+        if not self._flat:
+            z, slope = self.elevation.value_and_slope(road, s)
+            pitch = -np.arctan(slope)
+        if not self._level:
+            roll = self.superelevation.value(road, s)
+            across = t * np.cos(roll)
+            z = z + t * np.sin(roll)
+        return Poses(x - across * np.sin(h), y + across * np.cos(h), z, heading, pitch, roll)
+
+
+def _inside_out(section: LaneSection) -> list[Lane]:
+    lanes = list(section.lanes.values())
+    left = sorted((lane for lane in lanes if lane.id > 0), key=lambda lane: lane.id)
+    right = sorted((lane for lane in lanes if lane.id < 0), key=lambda lane: -lane.id)
+    return [section.lanes[0], *left, *right]
