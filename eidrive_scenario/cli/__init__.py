@@ -1,0 +1,55 @@
+"""The command `eidrive`. Each command imports what it needs when it runs, so that `--help` is quick.
+
+Exit codes: 0 passed, 1 a criterion failed, 2 the input is wrong, 3 the run broke or ran out of its time limit.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from eidrive_scenario.cli.check import check
+from eidrive_scenario.cli.failures import Guarded
+from eidrive_scenario.cli.run import run
+from eidrive_scenario.cli.show import list_names, report, tree, view
+
+app = typer.Typer(
+    name="eidrive",
+    cls=Guarded,
+    help="Play OpenSCENARIO files with cooperative perception, and judge them.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(run)
+app.command()(check)
+app.command(name="list")(list_names)
+app.command()(tree)
+app.command()(view)
+app.command()(report)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"eidrive-scenario {version('eidrive-scenario')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    traceback: Annotated[
+        bool, typer.Option("--traceback", envvar="EIDRIVE_TRACEBACK", help="Show where an internal error arose.")
+    ] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Options before the command; `Guarded` and `_show_version` act on them."""
+
+
+def main() -> None:
+    """Entry point; ends the process with the command's exit code."""
+    app()

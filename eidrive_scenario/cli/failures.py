@@ -1,0 +1,46 @@
+"""How the command line fails: what is wrong with the input by file and line, and never a traceback unasked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from eidrive_scenario.errors import EidriveError, InputError
+
+WRONG_INPUT, BROKEN = 2, 3
+_INTERRUPTED = 130
+"""As a shell reports it: 128 + SIGINT."""
+
+
+class Guarded(TyperGroup):
+    """A group of commands that turns errors into messages on stderr and exit codes."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the chosen command."""
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            for problem in error.problems:
+                typer.echo(str(problem), err=True)
+            raise typer.Exit(WRONG_INPUT) from error
+        except KeyboardInterrupt as error:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(_INTERRUPTED) from error
+        except EidriveError as error:
+            if ctx.params.get("traceback"):
+                raise
+            typer.echo(f"the run broke: {error}", err=True)
+            raise typer.Exit(BROKEN) from error
+        except Exception as error:
+            if ctx.params.get("traceback") or _from_typer(error):
+                raise
+            typer.echo(f"internal error: {type(error).__name__}: {error}", err=True)
+            typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) shows where; please report it", err=True)
+            raise typer.Exit(BROKEN) from error
+
+
+def _from_typer(error: Exception) -> bool:
+    """Exits and usage errors, which typer shows itself; it brings its own copy of click in newer versions."""
+    return any(kind.__module__.split(".")[0] in ("typer", "click") for kind in type(error).__mro__)

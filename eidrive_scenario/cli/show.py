@@ -1,0 +1,87 @@
+"""Commands that show something: `list`, `tree`, `view`, `report`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eidrive_scenario.errors import Problem, SettingError
+
+
+class Names(StrEnum):
+    """What `eidrive list` can list."""
+
+    scenarios = "scenarios"
+    channels = "channels"
+    weather = "weather"
+    detectors = "detectors"
+    criteria = "criteria"
+    actions = "actions"
+    conditions = "conditions"
+
+
+def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = Names.scenarios) -> None:
+    """List names of the library or of installed extensions."""
+    from eidrive_scenario import library
+    from eidrive_scenario.registry import registry
+
+    if what is Names.scenarios:
+        lines = library.scenarios()
+    elif what is Names.channels:
+        lines = [*library.names("channels"), "none"]
+    elif what is Names.weather:
+        lines = library.names("weather")
+    else:
+        known = registry(what.value)
+        width = max(map(len, known), default=0)
+        lines = [f"{name:<{width}}  {known.value(name)}" for name in known]
+    for line in lines:
+        typer.echo(line)
+
+
+def tree(scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library.")]) -> None:
+    """Print a scenario's storyboard as a tree, triggers in words."""
+    from eidrive_scenario.library import resolve_scenario
+    from eidrive_scenario.openscenario import load_scenario
+    from eidrive_scenario.roads import RoadNetwork
+    from eidrive_scenario.storyboard.storyboard import Storyboard
+
+    loaded = load_scenario(resolve_scenario(scenario))
+    roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
+    typer.echo(Storyboard(loaded, roads, dt=0.05, seed=0).as_text())
+
+
+def view(
+    recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="The page; beside the recording by default.")] = None,
+    browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
+) -> None:
+    """Write a recorded run as an HTML replay."""
+    from eidrive_scenario.experiments.single_run import RECORDING
+    from eidrive_scenario.recording import read_recording
+    from eidrive_scenario.reporting.replay import write_replay
+
+    path = recording / RECORDING if recording.is_dir() else recording
+    page = out or path.with_suffix(".html")
+    write_replay(read_recording(path), page)
+    typer.echo(str(page))
+    if browser:
+        typer.launch(page.resolve().as_uri())
+
+
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Folders written by run --out, or folders of such folders.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the report.")],
+) -> None:
+    """Write one page over many runs."""
+    from eidrive_scenario.experiments.single_run import read_results
+    from eidrive_scenario.reporting.report import write_report
+
+    results = read_results(runs)
+    if not results:
+        places = ", ".join(map(str, runs))
+        raise SettingError(Problem(f"no result.json in {places}", "give folders that eidrive run --out has written"))
+    typer.echo(str(write_report(results, out)))

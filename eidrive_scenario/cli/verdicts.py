@@ -1,0 +1,57 @@
+"""A run's result for human eyes."""
+
+from __future__ import annotations
+
+import os
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from eidrive_scenario.recording import Verdict
+from eidrive_scenario.simulation import RunResult
+
+
+def console(*, err: bool = False) -> Console:
+    """A terminal's own width; wide enough for a reason on one line where the output goes to a file."""
+    plain = Console(stderr=err, highlight=False)
+    if plain.is_terminal or "COLUMNS" in os.environ:
+        return plain
+    return Console(stderr=err, highlight=False, width=180)
+
+
+def show(result: RunResult) -> None:
+    """Print verdicts, end, fingerprint and speed."""
+    out = console()
+    word, style = ("passed", "bold green") if result.passed else ("failed", "bold red")
+    title = Text.assemble((result.scenario, "bold"), f"  seed {result.seed}  channel {result.channel}  ", (word, style))
+    out.print(title)
+    if result.criteria:
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        for heading in ("criterion", "", "value", "limit", "reason"):
+            table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+        for verdict in result.criteria:
+            table.add_row(*_row(verdict))
+        out.print(table)
+    else:
+        out.print("no criterion: nothing was judged", style="yellow")
+    speed = f", {result.simulated_s / result.wall_s:.0f} times real time" if result.wall_s > 0 else ""
+    out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
+    out.print(Text(f"trace {result.trace_hash}", style="dim"))
+    for warning in result.warnings:
+        console(err=True).print(Text(f"warning: {warning}", style="yellow"))
+
+
+def _row(verdict: Verdict) -> tuple[Text, ...]:
+    mark = Text("passed", style="green") if verdict.passed else Text("failed", style="red")
+    return (
+        Text(verdict.name),
+        mark,
+        Text(_quantity(verdict.value, verdict.unit)),
+        Text(_quantity(verdict.limit, verdict.unit)),
+        Text(verdict.reason),
+    )
+
+
+def _quantity(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.3f} {unit}" if unit else f"{value:g}"

@@ -1,0 +1,110 @@
+"""One run that leaves files behind: its recording, its result, its table of motions."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.recording import CsvWriter, Recorder
+from eidrive_scenario.recording.output import create
+from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
+
+RECORDING, RESULT, TABLE = "recording.mcap", "result.json", "motion.csv"
+"""Names of the files in a run's folder."""
+
+
+def play(
+    source: str | Path,
+    *,
+    seed: int = 1,
+    settings: RunSettings | None = None,
+    out: Path | None = None,
+    record: bool = True,
+    csv: Path | None = None,
+) -> RunResult:
+    """Run a scenario, given by path or library name.
+
+    out     folder for `recording.mcap` (unless `record` is False) and `result.json`
+    csv     file for one row per actor and tick
+
+    Raises InputError for a wrong scenario, setting or place to write.
+    """
+    settings = settings or RunSettings()
+    path = resolve_scenario(source)
+    scenario = load_for_seed(path, seed, settings.parameters)
+    observers: list[Observer] = []
+    with ExitStack() as stack:
+        if csv is not None:
+            observers.append(CsvWriter(csv))
+            stack.callback(observers[-1].close)
+        if out is not None and record:
+            attachments = _attachments(path, scenario)
+            observers.append(
+                Recorder(out / RECORDING, metadata=_told(scenario, seed, settings), attachments=attachments)
+            )
+            stack.callback(observers[-1].close)
+        result = Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
+    if out is not None:
+        with create(out / RESULT) as stream:
+            stream.write(as_json_text(result, indent=2).encode() + b"\n")
+    return result
+
+
+def as_json_text(result: RunResult, indent: int | None = None) -> str:
+    """The result as JSON; a number that JSON does not have is null."""
+    return json.dumps(_finite(result.as_json()), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _told(scenario: Scenario, seed: int, settings: RunSettings) -> dict[str, str]:
+    """What the run was told, as texts; what was left to the file is not there."""
+    told = {name: value for name, value in asdict(settings).items() if value is not None and name != "parameters"}
+    if settings.cooperate is not None:
+        told["cooperate"] = ",".join(settings.cooperate) or "none"
+    texts = {name: str(value) for name, value in told.items()}
+    return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}
+
+
+def _attachments(path: Path, scenario: Scenario) -> dict[str, bytes]:
+    """The scenario's own text and its road, so that a recording can be shown without the files."""
+    files = {"scenario.xosc": path}
+    if scenario.road_file is not None:
+        files["road.xodr"] = Path(scenario.road_file)
+    return {name: file.read_bytes() for name, file in files.items()}
+
+
+def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
+    """The results in these files and folders, and in folders below, in order of their paths.
+
+    Raises InputError for a file that is no result.
+    """
+    results = []
+    for place in places:
+        for path in sorted(place.rglob(RESULT)) if place.is_dir() else [place]:
+            try:
+                result = json.loads(path.read_text(encoding="utf-8"))
+            except OSError as error:
+                raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
+            except ValueError as error:
+                raise InputError(Problem(f"not JSON: {error}", f"give a {RESULT}", str(path))) from error
+            if not isinstance(result, dict) or "trace_hash" not in result:
+                raise InputError(
+                    Problem("not the result of a run", "give a file that eidrive run --out wrote", str(path))
+                )
+            results.append(result)
+    return results

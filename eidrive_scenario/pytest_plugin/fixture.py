@@ -1,0 +1,99 @@
+"""The marker `scenario` and the fixture `run_scenario`, for tests written in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.library import definition, library_path, resolve_scenario
+from eidrive_scenario.pytest_plugin.options import Arm, arms
+from eidrive_scenario.pytest_plugin.outcome import play_arm, properties
+
+if TYPE_CHECKING:
+    from eidrive_scenario.simulation import RunResult
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the marker asks the test to run."""
+
+    source: Path
+    arm: Arm
+
+
+class RunScenario(Protocol):
+    """What the fixture gives."""
+
+    def __call__(
+        self,
+        source: str | Path | None = None,
+        *,
+        channel: str | None = None,
+        seed: int | None = None,
+        **settings: object,
+    ) -> RunResult: ...
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Parametrise tests that are marked with `scenario` over scenarios, channels and seeds."""
+    marker = metafunc.definition.get_closest_marker("scenario")
+    if marker is None or "run_scenario" not in metafunc.fixturenames:
+        return
+    patterns, channels, seeds = _read_marker(*marker.args, **marker.kwargs)
+    paths = [path for pattern in patterns for path in _matches(pattern, metafunc)]
+    cases = [Case(path, arm) for path in paths for arm in arms(metafunc.config, channels, seeds)]
+    metafunc.parametrize("run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.arm}" for case in cases])
+
+
+def _read_marker(
+    *patterns: str, channel: str | Sequence[str] | None = None, seeds: int | None = None
+) -> tuple[tuple[str, ...], Sequence[str] | None, int | None]:
+    if not patterns:
+        raise pytest.UsageError('the marker scenario needs a pattern, such as scenario("coop/*.xosc")')
+    return patterns, [channel] if isinstance(channel, str) else channel, seeds
+
+
+def _matches(pattern: str, metafunc: pytest.Metafunc) -> list[Path]:
+    """Scenarios beside the test file, else below the root, else in the library; a pattern without suffix is a name."""
+    glob = pattern if pattern.endswith(".xosc") else f"{pattern}.xosc"
+    if not Path(glob).is_absolute():
+        for folder in (metafunc.definition.path.parent, metafunc.config.rootpath, library_path()):
+            found = sorted(path for path in folder.glob(glob) if definition(path) in ("scenario", "unreadable"))
+            if found:
+                return found
+    elif Path(glob).is_file():
+        return [Path(glob)]
+    raise pytest.UsageError(f"{metafunc.definition.nodeid}: no scenario matches {pattern!r}")
+
+
+@pytest.fixture
+def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
+    """A function that plays a scenario and gives its RunResult; the numbers go into the test report.
+
+    In a test with the marker `scenario` it is called without arguments. Any other scenario is played by
+    `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. A wrong input
+    fails the test with file and line.
+    """
+    case: Case | None = getattr(request, "param", None)
+
+    def run(
+        source: str | Path | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
+    ) -> RunResult:
+        if source is None and case is None:
+            raise pytest.UsageError('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario')
+        arm = case.arm if case is not None else Arm(None, 1)
+        arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed)
+        try:
+            path = case.source if source is None and case is not None else resolve_scenario(source or "")
+            result = play_arm(request.config, path, arm, **settings)
+        except InputError as error:
+            pytest.fail(str(error), pytrace=False)
+        request.node.user_properties.extend(properties(result))
+        return result
+
+    return run

@@ -1,0 +1,111 @@
+"""Options of the plugin, and what they mean for the runs of one scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+MARKER = (
+    "scenario(pattern, channel=None, seeds=None): run the test once for every scenario that matches the pattern "
+    "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
+)
+_GIVEN = pytest.StashKey[tuple[Path, ...]]()
+_WORKER_KEY = "eidrive_given"
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One way to run a scenario; the channel None is the one that the file itself names."""
+
+    channel: str | None
+    seed: int
+
+    def __str__(self) -> str:
+        channel = [] if self.channel is None else [Path(self.channel).stem]
+        return "-".join([*channel, f"seed{self.seed}"])
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The options `--eidrive-…` and the ini option `eidrive_paths`."""
+    group = parser.getgroup("eidrive", "OpenSCENARIO files")
+    group.addoption(
+        "--eidrive-channel",
+        metavar="A,B",
+        help="run each scenario with each of these channel profiles (default: the file's own); none: no cooperation",
+    )
+    group.addoption(
+        "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
+    )
+    group.addoption("--eidrive-detector", metavar="NAME", help="detector of all stations (default: the file's own)")
+    group.addoption("--eidrive-out", metavar="DIR", help="keep recording.mcap and result.json of every run below DIR")
+    parser.addini(
+        "eidrive_paths",
+        "folders whose .xosc files are tests (default: those given on the command line)",
+        type="paths",
+        default=None,
+    )
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise ValueError
+    return count
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marker; note what was named on the command line."""
+    config.addinivalue_line("markers", MARKER)
+    config.stash[_GIVEN] = _given(config)
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Say what the options ask for, where they ask for something."""
+    asked = [
+        f"{name} {config.getoption(f'eidrive_{name}')}"
+        for name in ("channel", "detector", "seeds", "out")
+        if config.getoption(f"eidrive_{name}") is not None
+    ]
+    return f"eidrive: {', '.join(asked)}" if asked else None
+
+
+def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None) -> Iterator[Arm]:
+    """Every channel with every seed; the command line wins over `channels` and `seeds`."""
+    given = config.getoption("eidrive_channel")
+    names: Sequence[str | None] = [name.strip() for name in given.split(",") if name.strip()] if given else []
+    count = config.getoption("eidrive_seeds") or seeds or 1
+    for channel in names or channels or (None,):
+        for seed in range(1, count + 1):
+            yield Arm(channel, seed)
+
+
+def wanted(config: pytest.Config, path: Path) -> bool:
+    """Whether a scenario file is to become tests.
+
+    One that is named itself always is. One in a folder is where the ini option `eidrive_paths` lists the folder or one
+    above; where the project does not set that option, where the folder or one above was given on the command line.
+    """
+    given = config.stash[_GIVEN]
+    if path in given:
+        return True
+    listed = config.getini("eidrive_paths")
+    return any(path.is_relative_to(folder) for folder in (given if listed is None else listed))
+
+
+def _given(config: pytest.Config) -> tuple[Path, ...]:
+    """Files and folders that were named on the command line; a worker of pytest-xdist asks its controller."""
+    if hasattr(config, "workerinput"):
+        return tuple(map(Path, config.workerinput[_WORKER_KEY]))
+    if config.args_source is not pytest.Config.ArgsSource.ARGS:
+        return ()
+    return tuple(Path(config.invocation_params.dir, argument.split("::")[0]).resolve() for argument in config.args)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell a worker of pytest-xdist what was named on the command line: its own arguments do not say."""
+    node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]

@@ -1,0 +1,80 @@
+"""One run as a test: play it, note its numbers, say why it failed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.pytest_plugin.options import Arm
+
+if TYPE_CHECKING:
+    from eidrive_scenario.recording import Verdict
+    from eidrive_scenario.simulation import RunResult
+
+Properties = list[tuple[str, object]]
+
+
+class ScenarioFailed(Exception):
+    """The verdict of a run is failed."""
+
+    def __init__(self, result: RunResult) -> None:
+        super().__init__(explain(result))
+        self.result = result
+
+
+def play_arm(config: pytest.Config, source: Path, arm: Arm, **overrides: Any) -> RunResult:
+    """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
+
+    Raises InputError.
+    """
+    # Imported with the first run: pytest loads this plugin in every project of its environment.
+    from eidrive_scenario.experiments.single_run import play
+    from eidrive_scenario.simulation import RunSettings
+
+    settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
+    folder = config.getoption("eidrive_out")
+    out = Path(config.invocation_params.dir, folder, *_place(config, source), str(arm)) if folder is not None else None
+    return play(source, seed=arm.seed, settings=RunSettings(**settings), out=out)
+
+
+def _place(config: pytest.Config, source: Path) -> tuple[str, ...]:
+    path = source.resolve().with_suffix("")
+    return path.relative_to(config.rootpath).parts if path.is_relative_to(config.rootpath) else path.parts[-2:]
+
+
+def properties(result: RunResult) -> Properties:
+    """What of a run belongs into a test report: each criterion's value and limit, the metrics, the fingerprint.
+
+    Plain numbers only, as pytest-xdist sends nothing else to its controller.
+    """
+    noted: Properties = [("channel", result.channel), ("seed", result.seed), ("end", result.end)]
+    for verdict in result.criteria:
+        noted.append((f"{verdict.name}.passed", bool(verdict.passed)))
+        if verdict.value is not None:
+            noted.append((f"{verdict.name}.value", float(verdict.value)))
+        if verdict.limit is not None:
+            noted.append((f"{verdict.name}.limit", float(verdict.limit)))
+    noted += ((name, float(value)) for name, value in result.metrics.items())
+    return [*noted, ("simulated_s", result.simulated_s), ("trace_hash", result.trace_hash)]
+
+
+def explain(result: RunResult) -> str:
+    """Why a run failed, in words."""
+    lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
+    if not lines:
+        lines = [f"ended by its {result.end} after {result.simulated_s:.2f} s"]
+    return "\n".join([f"{result.scenario} failed with channel {result.channel}, seed {result.seed}", *lines])
+
+
+def _limit(verdict: Verdict) -> str:
+    return f" (limit {verdict.limit:g} {verdict.unit})" if verdict.limit is not None and verdict.unit else ""
+
+
+def failure_text(error: BaseException) -> str | None:
+    """The text of a failure that needs no traceback, or None for one that does."""
+    if isinstance(error, ScenarioFailed | InputError):
+        return str(error)
+    return None
