@@ -5,20 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.v2x.message import LinkEvent, Received
 from eidrive_scenario.world.view import WorldView
 
-MEMORY = 0.15
-"""How long a received message stays in the picture [s]; stations that speak at 10 Hz then do not flicker."""
+REPORT_LIFETIME = AgentSettings().report_timeout
+"""How long a station goes by an old report [s]."""
+LINK_LIFETIME = 0.15
+"""How long the last message on a link stays in the picture [s]; links of 10 Hz then do not flicker."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What `station` saw (`own`), heard lately (`heard`) and concluded (`fused`), and the links towards it.
+    """What `station` saw (`own`), holds from others (`heard`) and concluded (`fused`), and the links towards it.
 
-    `heard` and `links` hold at most one entry per sender, the newest.
+    `own` is what the station goes by: where its own detections travel the channel too, those that have come back.
+    `heard` and `links` hold one entry per sender, the newest.
     """
 
     station: str
@@ -42,24 +46,40 @@ class Knowledge:
         self.station = station
         self._heard: dict[str, Received] = {}
         self._links: dict[str, LinkEvent] = {}
+        self._own_travels = False
 
     def observe(self, frame: Frame) -> Snapshot:
         """Take the next frame; the snapshot at its time."""
         now = frame.view.time
         step = frame.steps.get(self.station)
         for received in step.inbox if step else ():
-            self._heard[received.message.sender] = received
+            held = self._heard.get(received.message.sender)
+            if held is None or received.message.detections.time >= held.message.detections.time:
+                self._heard[received.message.sender] = received
         for event in frame.links:
-            if event.receiver == self.station and event.sender != self.station:
+            if event.receiver == self.station:
                 self._links[event.sender] = event
-        self._heard = {name: heard for name, heard in self._heard.items() if now - heard.arrived <= MEMORY + 1e-9}
-        self._links = {name: event for name, event in self._links.items() if now - event.sent <= MEMORY + 1e-9}
+                self._own_travels |= event.sender == self.station
+        self._heard = {
+            name: held
+            for name, held in self._heard.items()
+            if now - held.message.detections.time <= REPORT_LIFETIME + 1e-9
+        }
+        self._links = {name: event for name, event in self._links.items() if now - event.sent <= LINK_LIFETIME + 1e-9}
         return Snapshot(
             station=self.station,
             view=frame.view,
-            own=step.detections if step else Detections(now),
-            heard=tuple(self._heard.values()),
+            own=self._own(step, now),
+            heard=tuple(held for name, held in self._heard.items() if name != self.station),
             fused=step.fused if step else Detections(now),
-            links=tuple(self._links.values()),
+            links=tuple(event for name, event in self._links.items() if name != self.station),
             step=step,
         )
+
+    def _own(self, step: AgentStep | None, now: float) -> Detections:
+        if step is None:
+            return Detections(now)
+        if not self._own_travels:
+            return step.detections
+        held = self._heard.get(self.station)
+        return held.message.detections if held is not None else Detections(now)

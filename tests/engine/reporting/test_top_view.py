@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable
 
@@ -12,6 +13,7 @@ from lxml import etree
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
 
 Play = Callable[..., list[Frame]]
 SVG = "{http://www.w3.org/2000/svg}"
@@ -84,11 +86,28 @@ def test_without_a_channel_nothing_is_received(street: Play) -> None:
     assert not list(etree.fromstring(svg).iter(f"{SVG}line"))
 
 
-def test_what_was_heard_fades_after_a_while(street: Play) -> None:
-    """All messages from tick 30 on are lost; the one of tick 29 arrives at 1.50 s and stays for 0.15 s."""
+def test_what_was_heard_stays_as_long_as_a_station_goes_by_it(street: Play) -> None:
+    """All messages from tick 30 on are lost; the last one was measured at 1.45 s, and is forgotten 1 s later."""
     frames = street(1, frozenset(range(30, 100)))
-    assert len(snapshot_at(frames, 33).heard) == 1
-    assert len(snapshot_at(frames, 34).heard) == 0
+    assert len(snapshot_at(frames, 49).heard) == 1
+    assert len(snapshot_at(frames, 50).heard) == 0
+
+
+def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(street: Play) -> None:
+    frames = street(None)
+    sent = [frame.steps["Ego"].detections for frame in frames]
+    travelling = []
+    for tick, frame in enumerate(frames):
+        state = StationState(frame.view.time, 0.0, 0.0, 0.0, 0.0, 0.0)
+        back = Message("Ego", tick - 6, 0.0, state, sent[tick - 6], 100)
+        inbox = (Received(back, frame.view.time),) if tick >= 6 else ()
+        step = dataclasses.replace(frame.steps["Ego"], inbox=inbox)
+        event = LinkEvent("Ego", "Ego", tick, frame.view.time, "delivered", frame.view.time + 0.3, "", 100)
+        travelling.append(Frame(frame.view, {"Ego": step}, (), (event,)))
+    assert len(snapshot_at(travelling, 5).own) == 0
+    snapshot = snapshot_at(travelling, 40)
+    assert snapshot.own is sent[34]
+    assert (snapshot.heard, snapshot.links) == ((), ())
 
 
 def test_conflict_area_and_roads_are_drawn_below_the_cars(street: Play) -> None:

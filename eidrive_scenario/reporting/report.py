@@ -1,0 +1,116 @@
+"""One page over many runs: what passed, what failed, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
+from eidrive_scenario.reporting.page import write_page
+
+SHOWN = 4
+"""So many metrics stand in the overview; those that most runs have come first."""
+
+
+class ReportedCriterion(BaseModel):
+    """A verdict as `--json` prints it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    name: str
+    passed: bool
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    reason: str = ""
+
+
+class ReportedRun(BaseModel):
+    """A run as `--json` prints it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    scenario: str
+    seed: int
+    channel: str = ""
+    passed: bool
+    end: str
+    criteria: tuple[ReportedCriterion, ...] = ()
+    metrics: dict[str, float | None] = {}
+    simulated_s: float = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """False where the run was cut off by its time limit."""
+        return self.end != "time limit"
+
+
+def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str = "") -> Path:
+    """One page over these results, given as `--json` prints them. Returns the page's path.
+
+    `out` is the page if it ends in `.html`, else the folder in which `report.html` is written. Raises InputError if
+    there are no results, or one of them is none.
+    """
+    page = out if out.suffix == ".html" else out / "report.html"
+    runs = [_checked(result) for result in results]
+    if not runs:
+        raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
+    groups: dict[tuple[str, str], list[ReportedRun]] = {}
+    for run in sorted(runs, key=lambda run: (run.scenario, run.channel, run.seed)):
+        groups.setdefault((run.scenario, run.channel), []).append(run)
+    metrics = _common_metrics(runs)
+    return write_page(
+        page,
+        "report.html.jinja",
+        title="Scenario report",
+        total=len(runs),
+        passed=sum(run.passed for run in runs),
+        failed=sum(not run.passed and run.finished for run in runs),
+        broken=sum(not run.passed and not run.finished for run in runs),
+        metrics=[{"title": name.replace(".", " ")} for name in metrics],
+        groups=[
+            {
+                "scenario": scenario,
+                "channel": channel,
+                "anchor": f"group-{index}",
+                "runs": group,
+                "share": wilson(sum(run.passed for run in group), len(group)),
+                "summaries": [_summary(group, name) for name in metrics],
+            }
+            for index, ((scenario, channel), group) in enumerate(groups.items())
+        ],
+        number=_number,
+        footer=footer,
+    )
+
+
+def _checked(result: Mapping[str, Any]) -> ReportedRun:
+    try:
+        return ReportedRun.model_validate(result)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(
+            Problem(f"a result's {where!r}: {first['msg'].lower()}", "give what eidrive run --json prints")
+        ) from error
+
+
+def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
+    counts: dict[str, int] = {}
+    for run in runs:
+        for name in run.metrics:
+            counts[name] = counts.get(name, 0) + 1
+    return sorted(counts, key=lambda name: (-counts[name], name))[:SHOWN]
+
+
+def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
+    values = [value for run in runs if (value := run.metrics.get(metric)) is not None]
+    return summarise(values) if values else None
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.3g} {unit}".strip()

@@ -1,0 +1,78 @@
+"""Replays: the data of the page, and a page that loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.replay import replay_data, write_replay
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+
+Play = Callable[..., list[Frame]]
+
+
+def recorded(frames: list[Frame], folder: Path) -> Path:
+    recorder = Recorder(folder / "run.mcap", metadata={"scenario": "street <1>", "seed": "7"})
+    for frame in frames:
+        recorder.observe(frame)
+    recorder.close()
+    return folder / "run.mcap"
+
+
+def test_data_holds_a_pose_per_frame_and_actor(street: Play) -> None:
+    data = replay_data(street(1))
+    assert len(data["times"]) == len(data["poses"]) == 100
+    assert data["times"][40] == 2.0
+    assert data["poses"][40]["Incoming"] == [29.5, 11.5, -1.571, 14.0]
+    assert data["actors"]["Truck"] == {"category": "truck", "size": [8.47, 2.89]}
+
+
+def test_data_tells_own_boxes_from_heard_ones(street: Play) -> None:
+    ego = replay_data(street(6))["stations"]["Ego"][40]
+    assert ego["own"] == [[25.4, 5.6, 8.47, 2.89, -1.571]]
+    assert sorted(box[:2] for box in ego["heard"]) == [[25.4, 5.6], [29.5, 15.7]]
+    assert ego["links"] == [["RSU", True]]
+    assert ego["plan"] == "conflict area"
+
+
+def test_a_station_that_comes_later_has_no_knowledge_before(street: Play) -> None:
+    frames = street(1)
+    late = [
+        Frame(frame.view, {k: v for k, v in frame.steps.items() if k == "Ego"} if i < 5 else frame.steps)
+        for i, frame in enumerate(frames)
+    ]
+    rsu = replay_data(late)["stations"]["RSU"]
+    assert rsu[:5] == [None] * 5
+    assert len(rsu) == 100
+    assert rsu[5] is not None
+
+
+def test_changes_of_the_storyboard_are_listed(street: Play) -> None:
+    change = StateChange(0.0, "Go", "S/A/Go", "event", State.STANDBY, Transition.START, State.RUNNING, "time > 0")
+    frame = street(1)[0]
+    data = replay_data([Frame(frame.view, frame.steps, (change,))])
+    assert data["changes"] == [[0.0, "S/A/Go", "running", "time > 0"]]
+
+
+def test_the_page_holds_the_run_and_nothing_from_elsewhere(street: Play, tmp_path: Path) -> None:
+    out = write_replay(read_recording(recorded(street(1), tmp_path)), tmp_path / "pages" / "run.html")
+    text = out.read_text(encoding="utf-8")
+    assert not re.search(r"(?:src|href)\s*=\s*[\"']?(?!#|data:)", text)
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
+    root = html.fromstring(text)
+    assert root.findtext(".//h1") == "street <1>, seed 7"
+    data = json.loads(root.findtext(".//script[@id='data']"))
+    assert len(data["times"]) == 100
+
+
+def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no frame"):
+        write_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")

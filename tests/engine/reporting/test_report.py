@@ -1,0 +1,86 @@
+"""The page over many results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import html
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.reporting.report import write_report
+
+
+def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, Any]:
+    verdict = {
+        "name": "min_distance",
+        "passed": passed,
+        "value": 4.2 if passed else 0.0,
+        "limit": 3.5,
+        "unit": "m",
+        "reason": "" if passed else "Ego and <Incoming> came as near as 0.00 m at 3.10 s",
+    }
+    run = {
+        "scenario": "coop/scenario_1",
+        "seed": seed,
+        "channel": channel,
+        "passed": passed,
+        "end": "stop trigger",
+        "criteria": [verdict],
+        "metrics": {"min_distance.Ego.Incoming.box": 1.0 + seed},
+        "trace_hash": "00",
+        "simulated_s": 12.5,
+        "wall_s": 0.3,
+    }
+    return {**run, **changes}
+
+
+def rows(page: Path) -> list[list[str]]:
+    return [
+        [" ".join(cell.text_content().split()) for cell in row.iterfind("td")]
+        for row in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//tbody/tr")
+    ]
+
+
+def test_the_overview_has_a_row_per_scenario_and_channel(tmp_path: Path) -> None:
+    results = [result(seed, "ideal", True) for seed in (2, 1)] + [result(1, "none", False)]
+    page = write_report(results, tmp_path)
+    assert page == tmp_path / "report.html"
+    overview = rows(page)[:2]
+    assert overview[0] == ["coop/scenario_1", "ideal", "2/2", "0.34 … 1.00", "2.50 · 2.00"]
+    assert overview[1] == ["coop/scenario_1", "none", "0/1", "0.00 … 0.79", "2.00 · 2.00"]
+
+
+def test_each_run_shows_its_verdict_and_reason(tmp_path: Path) -> None:
+    page = write_report([result(3, "none", False), result(1, "none", True)], tmp_path / "page.html")
+    assert page.name == "page.html"
+    passed, failed = rows(page)[1:]
+    assert passed == ["1", "passed", "min_distance", "4.2 m", "3.5 m", "", "stop trigger", "12.50"]
+    assert failed[:2] == ["3", "failed"]
+    assert failed[5] == "Ego and <Incoming> came as near as 0.00 m at 3.10 s"
+
+
+def test_a_run_cut_off_by_its_time_limit_did_not_finish(tmp_path: Path) -> None:
+    page = write_report([result(1, "none", False, end="time limit", criteria=[]), result(2, "none", True)], tmp_path)
+    text = html.fromstring(page.read_text(encoding="utf-8")).findtext(".//p/span[@class='broken']")
+    assert text == "1 did not finish"
+
+
+def test_a_metric_that_is_null_is_left_out(tmp_path: Path) -> None:
+    results = [result(1, "ideal", True, metrics={"ttc": None}), result(2, "ideal", True, metrics={"ttc": 1.5})]
+    assert rows(write_report(results, tmp_path))[0][-1] == "1.50 · 1.50"
+
+
+def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a result's 'scenario': field required"):
+        write_report([{"seed": 1, "passed": True, "end": ""}], tmp_path)
+    with pytest.raises(InputError, match="no result to report"):
+        write_report([], tmp_path)
+
+
+def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
+    text = write_report([result(1, "ideal", True)], tmp_path).read_text(encoding="utf-8")
+    assert "http" not in text
+    assert "<link" not in text
+    assert "src=" not in text

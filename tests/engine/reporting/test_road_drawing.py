@@ -1,0 +1,81 @@
+"""Roads as drawings, against a straight and a curved road written by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.reporting.road_drawing import road_drawing, thinned
+from eidrive_scenario.reporting.top_view import Window
+from eidrive_scenario.roads.model import Road
+from eidrive_scenario.roads.reading.document import parse_road_map
+
+ROAD = b"""<?xml version="1.0"?>
+<OpenDRIVE>
+  <header revMajor="1" revMinor="6" name="street"/>
+  <road id="1" length="50" junction="-1">
+    <planView>
+      <geometry s="0" x="10" y="5" hdg="0" length="50">{shape}</geometry>
+    </planView>
+    <lanes>
+      <laneSection s="0">
+        <left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>
+          <roadMark sOffset="0" type="solid" width="0.12"/></lane></left>
+        <center><lane id="0" type="none"><roadMark sOffset="0" type="broken" width="0.12"/>
+          <roadMark sOffset="30" type="none" width="0.12"/></lane></center>
+        <right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+          <lane id="-2" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane></right>
+      </laneSection>
+    </lanes>
+  </road>
+</OpenDRIVE>
+"""
+
+
+def roads(shape: bytes) -> list[Road]:
+    return list(parse_road_map(ROAD.replace(b"{shape}", shape), "street.xodr").roads.values())
+
+
+def test_a_straight_lane_is_a_rectangle() -> None:
+    drawing = road_drawing(roads(b"<line/>"))
+    by_type = {kind: polygon for kind, polygon in drawing.lanes if kind == "sidewalk"}
+    assert by_type["sidewalk"] == pytest.approx(np.array([[10, 1.5], [60, 1.5], [60, -0.5], [10, -0.5]]))
+
+
+def test_driving_lanes_cover_sidewalks() -> None:
+    assert [kind for kind, _ in road_drawing(roads(b"<line/>")).lanes] == ["sidewalk", "driving", "driving"]
+
+
+def test_markings_run_as_far_as_they_are_painted() -> None:
+    markings = dict(road_drawing(roads(b"<line/>")).markings)
+    assert set(markings) == {"solid", "broken"}
+    assert markings["broken"] == pytest.approx(np.array([[10, 5], [40, 5]]))
+    assert markings["solid"] == pytest.approx(np.array([[10, 8.5], [60, 8.5]]))
+
+
+def test_a_curved_edge_stays_within_the_tolerance() -> None:
+    """Curvature 0.02: the left lane's outer edge is a circle of radius 46.5 m about (10, 55)."""
+    drawing = road_drawing(roads(b'<arc curvature="0.02"/>'))
+    solid = dict(drawing.markings)["solid"]
+    ends = np.hypot(solid[:, 0] - 10.0, solid[:, 1] - 55.0)
+    middles = np.hypot(*((solid[1:] + solid[:-1]) / 2 - (10.0, 55.0)).T)
+    assert ends == pytest.approx(np.full(len(solid), 46.5))
+    assert 46.5 - middles.min() < 0.03
+    assert len(solid) < 40
+
+
+def test_only_what_reaches_into_the_window_is_drawn() -> None:
+    drawing = road_drawing(roads(b"<line/>"), Window(0, 20, 6.0, 20))
+    assert [kind for kind, _ in drawing.lanes] == ["driving"]
+    assert not road_drawing(roads(b"<line/>"), Window(100, 120, 0, 20)).lanes
+
+
+def test_thinning_keeps_corners_and_drops_points_on_lines() -> None:
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
+    assert thinned(corner) == pytest.approx(np.array([[0, 0], [2, 0], [2, 2]]))
+    assert len(thinned(corner[:2])) == 2
+
+
+def test_thinning_a_closed_line_keeps_its_farthest_point() -> None:
+    loop = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
+    assert thinned(loop) == pytest.approx(loop)
