@@ -1,0 +1,37 @@
+# `make demo` and `make test` do all the set-up that they need.
+PYTHON ?= python3.11
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+.PHONY: help install demo test lint bench clean
+
+help:           ## this list
+	@grep -E '^[a-z]+: .*##|^[a-z]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+install: $(STAMP)  ## create .venv and install the project with its development tools
+
+$(STAMP): pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not installed; name another with: make PYTHON=python3 …"; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+demo: install   ## run the main job: scenarios 1 and 2 of the paper, all arms, reports/demo.html
+	$(BIN)/python -m eidrive_scenario.reporting.demo --out reports/demo.html
+
+test: install   ## run the test suite and the scenario library's own tests
+	$(BIN)/python -m pytest -n auto
+
+lint: install   ## style, types, import arrows
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: install  ## simulated seconds per wall second, and where the time goes
+	$(BIN)/python benchmarks/bench_scenario_1.py
+
+clean:          ## remove the virtual environment and everything generated
+	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	find reports -mindepth 1 ! -name README.md -delete

@@ -1,0 +1,193 @@
+"""All stations of a run, and the radio between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from eidrive_scenario.driving.agent import Agent, build_agent, build_rig
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
+from eidrive_scenario.driving.step import AgentStep, Goal
+from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.library import library_path
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import Controller
+from eidrive_scenario.registry import registry
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.rig import Rig, read_all
+from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.message import LinkEvent, Received
+from eidrive_scenario.v2x.profile import NO_COOPERATION, build_channel, load_profile
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control
+from eidrive_scenario.world.view import WorldView
+
+
+class Stations:
+    """Every actor whose controller is ours, the sensors on it, and the channel that joins them.
+
+    channel    profile that wins over what the file says; None leaves it to the file
+    detector   for all stations; None leaves it to their controllers
+    cooperate  the senders whom driving stations hear; None leaves it to their controllers
+
+    Raises SettingError if a controller's properties, the channel or one of these options is wrong.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        roads: RoadNetwork | None,
+        *,
+        seed: int,
+        dt: float,
+        channel: str | Path | None = None,
+        detector: str | None = None,
+        cooperate: tuple[str, ...] | None = None,
+    ) -> None:
+        self._scenario = scenario
+        self._roads = roads
+        self._seed = seed
+        self._dt = dt
+        self._fixed_channel = channel is not None
+        self._channel: Channel | None = None
+        self.channel_name = NO_COOPERATION
+        self.goals: Mapping[str, Goal] = {}
+        self.links: tuple[LinkEvent, ...] = ()
+        """What became of the messages that were said in the last tick."""
+        self._agents: dict[str, Agent] = {}
+        self._rigs: dict[str, Rig] = {}
+        self._settings = _all_settings(scenario, detector, cooperate)
+        if channel is not None:
+            self._set_channel(channel, origin="--channel", line=None)
+
+    @property
+    def drivers(self) -> frozenset[str]:
+        """The stations that move by their own pedals and steering."""
+        return frozenset(name for name, agent in self._agents.items() if agent.controller is not None)
+
+    def join(self, spec: ActorSpec) -> None:
+        """An actor has entered the world; it becomes a station if it has a controller of ours."""
+        settings = self._settings.get(spec.name)
+        if settings is None:
+            return
+        self._rigs[spec.name] = build_rig(settings, spec)
+        self._agents[spec.name] = build_agent(
+            settings, spec, self._roads, seed=self._seed, dt=self._dt, own_perception=self._own_perception
+        )
+
+    def leave(self, name: str) -> None:
+        """An actor has left the world."""
+        self._agents.pop(name, None)
+        self._rigs.pop(name, None)
+
+    def use_channel(self, profile: str, *, source: str, line: int) -> None:
+        """The file asks for a channel, at the start or on a trigger; an option given by the caller wins."""
+        if not self._fixed_channel:
+            self._set_channel(profile, origin=source, line=line)
+
+    def act(self, world: World, view: WorldView) -> dict[str, AgentStep]:
+        """Sensors read, messages that have arrived are heard, every agent acts."""
+        if not self._agents:
+            return {}
+        readings = read_all(list(self._rigs.values()), world, view)
+        now = view.time
+        return {
+            name: agent.act(readings[name], self._deliver(name, now), now, self.goals.get(name))
+            for name, agent in self._agents.items()
+        }
+
+    def controls(self, steps: Mapping[str, AgentStep]) -> dict[str, Control]:
+        """The pedals and steering that the agents chose."""
+        return {name: step.control for name, step in steps.items() if step.control is not None}
+
+    def send(self, steps: Mapping[str, AgentStep], now: float) -> None:
+        """What the agents said goes on the air, each message on the link to each station that listens."""
+        if self._channel is None:
+            return
+        links: list[LinkEvent] = []
+        for sender, step in steps.items():
+            receivers = self._listeners(sender)
+            if receivers:
+                for message in step.outbox:
+                    links.extend(self._channel.send(message, receivers, now))
+        self.links = tuple(links)
+
+    def metrics(self, now: float) -> dict[str, float]:
+        """Counts of messages over all links."""
+        if self._channel is None:
+            return {}
+        books = self._channel.statistics(now).values()
+        return {
+            "messages.sent": sum(book.sent for book in books),
+            "messages.received": sum(book.received for book in books),
+            "messages.lost": sum(book.lost for book in books),
+            "messages.bytes": sum(book.bytes_sent for book in books),
+        }
+
+    def _deliver(self, receiver: str, now: float) -> Sequence[Received]:
+        return self._channel.deliver(receiver, now) if self._channel is not None else ()
+
+    def _listeners(self, sender: str) -> list[str]:
+        """Who hears `sender`: stations that drive and count it; itself too where the channel carries own perception."""
+        found = []
+        for name, agent in self._agents.items():
+            if agent.planner is None:
+                continue
+            heard = agent.settings.cooperates_with
+            if self._own_perception if name == sender else heard is None or sender in heard:
+                found.append(name)
+        return found
+
+    @property
+    def _own_perception(self) -> bool:
+        return self._channel is not None and self._channel.own_perception
+
+    def _set_channel(self, source: str | Path, *, origin: str, line: int | None) -> None:
+        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line)
+        self._channel = build_channel(profile, self._seed, previous=self._channel)
+        self.channel_name = profile.name if profile is not None else NO_COOPERATION
+        for agent in self._agents.values():
+            agent.own_perception = self._own_perception
+
+
+def _all_settings(
+    scenario: Scenario, detector: str | None, cooperate: tuple[str, ...] | None
+) -> dict[str, AgentSettings]:
+    """The settings of every entity with a controller of ours, options applied; all that is wrong in one error."""
+    if detector is not None and detector not in registry("detectors"):
+        remedy = suggestion(detector, registry("detectors"))
+        raise SettingError(Problem(f"unknown detector {detector!r}", remedy, "--detector"))
+    problems: list[Problem] = []
+    found: dict[str, AgentSettings] = {}
+    controllers: dict[str, Controller] = {}
+    for name, assigned in scenario.controllers.items():
+        for controller in filter(is_agent, assigned):
+            try:
+                found[name] = agent_settings(controller)
+            except SettingError as error:
+                problems.extend(error.problems)
+            controllers[name] = controller
+    for name, settings in found.items():
+        problems.extend(_unknown_senders(name, settings, controllers))
+    for sender in cooperate or ():
+        if sender not in controllers:
+            problems.append(Problem(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
+    if problems:
+        raise SettingError(problems)
+    options = {"detector": detector, "cooperates_with": cooperate}
+    update = {key: value for key, value in options.items() if value is not None}
+    return {name: settings.model_copy(update=update) for name, settings in found.items()}
+
+
+def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Problem]:
+    controller = controllers[name]
+    return [
+        Problem(
+            f"{name!r} cooperates with {sender!r}, which is no station",
+            suggestion(sender, [other for other in controllers if other != name]),
+            controller.source,
+            controller.line,
+        )
+        for sender in settings.cooperates_with or ()
+        if sender not in controllers
+    ]

@@ -1,0 +1,300 @@
+"""One run: the tick that ties world, stations, radio and storyboard together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+from lxml import etree
+
+from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.openscenario import Scenario, load_scenario
+from eidrive_scenario.openscenario.variation import drawn_parameters
+from eidrive_scenario.recording.criteria_text import exit_verdict, parse_criteria, stop_trigger_criteria
+from eidrive_scenario.recording.criterion import Criterion, Verdict
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.commands import Commands, CustomCommand
+from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.world import World
+from eidrive_scenario.world.specs import actor_spec
+
+PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
+"""Exit codes of a run."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What a caller may say beside the file; None leaves it to the file.
+
+    channel         profile name or file; 'none' is no cooperation
+    detector        for all stations
+    cooperate       the senders whom driven stations hear; () is nobody
+    dt              step [s]
+    time_limit      [s] of simulated time, for files that do not end by themselves
+    """
+
+    channel: str | Path | None = None
+    detector: str | None = None
+    cooperate: tuple[str, ...] | None = None
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    dt: float = 0.05
+    time_limit: float = 120.0
+    weather: str | None = None
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run came to."""
+
+    scenario: str
+    seed: int
+    channel: str
+    passed: bool
+    end: str
+    """stop trigger, storyboard complete, criterion: NAME, or time limit"""
+    exit_code: int
+    criteria: tuple[Verdict, ...]
+    metrics: Mapping[str, float]
+    trace_hash: str
+    simulated_s: float
+    wall_s: float
+    warnings: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        return {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "channel": self.channel,
+            "passed": self.passed,
+            "end": self.end,
+            "criteria": [
+                {
+                    "name": verdict.name,
+                    "passed": verdict.passed,
+                    "value": verdict.value,
+                    "limit": verdict.limit,
+                    "unit": verdict.unit,
+                    "reason": verdict.reason,
+                }
+                for verdict in self.criteria
+            ],
+            "metrics": dict(self.metrics),
+            "trace_hash": self.trace_hash,
+            "simulated_s": self.simulated_s,
+            "wall_s": self.wall_s,
+        }
+
+
+class Observer(Protocol):
+    """Watches a run without changing it: a recorder, a CSV writer, a collector of pictures."""
+
+    def observe(self, frame: Frame) -> None:
+        """Take one frame."""
+
+    def close(self) -> None:
+        """The run is over."""
+
+
+class Simulation:
+    """One scenario, one seed, one run. A second run needs a second Simulation.
+
+    Raises InputError while it is built if the scenario, its roads or the settings are wrong.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        seed: int = 0,
+        settings: RunSettings | None = None,
+        observers: Sequence[Observer] = (),
+    ) -> None:
+        self.scenario = scenario
+        self.seed = seed
+        self.settings = settings or RunSettings()
+        self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+        self.world = World(self.roads, dt=self.settings.dt)
+        self.storyboard = Storyboard(scenario, self.roads, dt=self.settings.dt, seed=seed)
+        self.stations = Stations(
+            scenario,
+            self.roads,
+            seed=seed,
+            dt=self.settings.dt,
+            channel=self.settings.channel,
+            detector=self.settings.detector,
+            cooperate=self.settings.cooperate,
+        )
+        self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
+        self._observers = tuple(observers)
+        self._trace = TraceHash()
+        self._warnings: list[str] = [str(problem) for problem in scenario.warnings]
+        self._exit: Verdict | None = None
+        self._initial = self.storyboard.initial()
+        self._apply(self._initial)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the world and finish what the observers write."""
+        self.world.close()
+        for observer in self._observers:
+            observer.close()
+
+    def run(self) -> RunResult:
+        """Play to the end."""
+        started = time.perf_counter()
+        with self:
+            end = None
+            while end is None:
+                frame, end = self.tick()
+            return self._result(frame, end, time.perf_counter() - started)
+
+    def tick(self) -> tuple[Frame, str | None]:
+        """One step of the loop: the frame of this instant, and why the run ends with it (None: it goes on)."""
+        view = self.world.view()
+        steps = self.stations.act(self.world, view)
+        commands = self.storyboard.tick(view)
+        frame = Frame(view, steps, self.storyboard.changes, self.stations.links)
+
+        self._trace.observe(frame)
+        for observer in self._observers:
+            observer.observe(frame)
+        for criterion in self.criteria:
+            criterion.observe(frame)
+        end = self._end(frame)
+        if end is None:
+            self.stations.send(steps, view.time)
+            self._apply(commands)
+            self.world.step(commands.placements, self.stations.controls(steps))
+        return frame, end
+
+    def _end(self, frame: Frame) -> str | None:
+        if self._exit is not None:
+            return f"command: {self._exit.name}"
+        for criterion in self.criteria:
+            if criterion.fatal and not criterion.verdict().passed:
+                return f"criterion: {criterion.name}"
+        if self.storyboard.ended is not None:
+            return self.storyboard.ended
+        return "time limit" if frame.view.time >= self.settings.time_limit - 1e-9 else None
+
+    def _apply(self, commands: Commands) -> None:
+        """Carry out what the storyboard decided, except the placements, which are the world's step."""
+        for name in commands.removals:
+            self.world.remove(name)
+            self.stations.leave(name)
+        for name, placement in commands.additions.items():
+            spec = actor_spec(name, self.scenario.entities[name])
+            self.world.add(spec, placement)
+            self.stations.join(spec)
+        for name in self.stations.drivers:
+            self.world.set_driven(name, name in commands.driven)
+        self.stations.goals = commands.goals
+        for command in commands.custom:
+            self._command(command)
+
+    def _command(self, command: CustomCommand) -> None:
+        """A CustomCommandAction; one that is not ours is recorded and does nothing: it never starts a program."""
+        run = {
+            "eidrive.channel": self._command_channel,
+            "eidrive.criterion": self._command_criterion,
+            "eidrive.variation": _already_done,
+            "exitSuccess": self._command_exit,
+            "exitFailure": self._command_exit,
+        }.get(command.type)
+        if run is not None:
+            run(command)
+        elif command.type.startswith("eidrive."):
+            known = ["eidrive.channel", "eidrive.criterion", "eidrive.variation"]
+            raise ScenarioError(
+                Problem(
+                    f"unknown command type {command.type!r}",
+                    suggestion(command.type, known),
+                    command.source,
+                    command.line,
+                )
+            )
+        else:
+            self._warnings.append(
+                f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
+            )
+
+    def _command_channel(self, command: CustomCommand) -> None:
+        self.stations.use_channel(command.content, source=command.source, line=command.line)
+
+    def _command_criterion(self, command: CustomCommand) -> None:
+        self.criteria.extend(
+            parse_criteria(
+                command.content,
+                source=command.source,
+                line=command.line,
+                entities=self.scenario.entities,
+                taken=[criterion.name for criterion in self.criteria],
+            )
+        )
+
+    def _command_exit(self, command: CustomCommand) -> None:
+        self._exit = exit_verdict(command)
+
+    def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
+        verdicts = [criterion.verdict() for criterion in self.criteria]
+        if self._exit is not None:
+            verdicts.append(self._exit)
+        metrics: dict[str, float] = {}
+        for criterion in self.criteria:
+            metrics.update(criterion.metrics())
+        metrics.update(self.stations.metrics(frame.view.time))
+        passed = all(verdict.passed for verdict in verdicts)
+        timed_out = end == "time limit"
+        return RunResult(
+            scenario=self.scenario.name,
+            seed=self.seed,
+            channel=self.stations.channel_name,
+            passed=passed and not timed_out,
+            end=end,
+            exit_code=FAILED if not passed else BROKEN if timed_out else PASSED,
+            criteria=tuple(verdicts),
+            metrics=metrics,
+            trace_hash=self._trace.hexdigest(),
+            simulated_s=frame.view.time,
+            wall_s=wall_s,
+            warnings=tuple(self._warnings),
+        )
+
+
+def _already_done(_: CustomCommand) -> None:
+    """`eidrive.variation` is read before the scenario's parameters are resolved."""
+
+
+def run_file(
+    source: str | Path | bytes | etree._Element,
+    *,
+    seed: int = 0,
+    settings: RunSettings | None = None,
+    observers: Sequence[Observer] = (),
+) -> RunResult:
+    """Load a scenario with the parameters that its file draws for this seed, and play it.
+
+    Parameters given in `settings` win over drawn ones. Raises InputError for a wrong file or setting.
+    """
+    settings = settings or RunSettings()
+    scenario = load_for_seed(source, seed, settings.parameters)
+    return Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
+
+
+def load_for_seed(source: str | Path | bytes | etree._Element, seed: int, parameters: Mapping[str, str]) -> Scenario:
+    """The scenario as this seed has it: parameters of `eidrive.variation` drawn, those of the caller kept."""
+    scenario = load_scenario(source, parameters)
+    drawn = {name: value for name, value in drawn_parameters(scenario, seed).items() if name not in parameters}
+    return load_scenario(source, {**drawn, **parameters}) if drawn else scenario
