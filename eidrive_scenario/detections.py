@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,3 +43,15 @@ class Detections:
 
     def __len__(self) -> int:
         return len(self.boxes)
+
+    def subset(self, rows: Sequence[int]) -> Detections:
+        """These rows only, in the order given."""
+        picked = list(rows)
+        return Detections(
+            self.time,
+            self.boxes[picked],
+            self.scores[picked],
+            tuple(self.classes[row] for row in picked),
+            self.velocity[picked],
+            self.covariance[picked],
+        )

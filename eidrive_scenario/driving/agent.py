@@ -1,0 +1,203 @@
+"""The agent of one station: detect, fuse, plan, control, and say what it saw."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
+from eidrive_scenario.driving.step import AgentStep, Goal, Plan
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.registry import registry
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState, Readings
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.v2x.message import Message, Received, StationState
+from eidrive_scenario.v2x.size import cpm_size
+from eidrive_scenario.world.actor import ActorSpec, Control
+
+OWN_MARGIN = 0.9
+"""A reported box whose centre lies this near to the own outline is the own body: half the width of a car, so that the
+centre of another car can come as near only after a collision [m]."""
+TIME_TOLERANCE = 1e-9
+
+
+class Agent:
+    """One station. It sees its readings and its inbox, nothing else.
+
+    Of each sender it keeps the newest report until that is `report_timeout` old. It sends its own detections, never
+    fused ones: a box that came back to its first reporter would count twice. With `own_perception` it does not use its
+    own detections before the channel brings them back.
+    """
+
+    def __init__(
+        self,
+        spec: ActorSpec,
+        settings: AgentSettings,
+        *,
+        detector: Detector,
+        fusion: FusionMethod,
+        planner: Planner | None,
+        controller: Controller | None,
+        sensors: int,
+        dt: float,
+        own_perception: bool = False,
+    ) -> None:
+        self.name = spec.name
+        self.spec = spec
+        self.settings = settings
+        self.detector = detector
+        self.fusion = fusion
+        self.planner = planner
+        self.controller = controller
+        self.own_perception = own_perception
+        self._sensors = sensors
+        self._detections = Detections(0.0)
+        self._reports: dict[str, Report] = {}
+        self._own_places: deque[tuple[float, float, float, float]] = deque(
+            maxlen=math.ceil(settings.report_timeout / dt) + 2
+        )
+        self._number = 0
+        self._periods = -1
+
+    def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
+        """One tick at `now` [s]."""
+        ego = readings.ego
+        self._remember_place(ego)
+        fresh = _has_all(readings, self.detector.needs)
+        if fresh:
+            self._detections = self.detector.detect(readings)
+        detections = self._detections
+        self._listen(inbox, now)
+        if fresh and not self.own_perception:
+            self._reports[self.name] = Report(self.name, detections, now)
+        fused = self.fusion.fuse(list(self._reports.values()), now)
+        plan = self.planner.plan(ego, fused, goal, now) if self.planner is not None else None
+        return AgentStep(
+            detections=detections,
+            inbox=tuple(inbox),
+            fused=fused,
+            plan=plan,
+            control=self._control(ego, plan),
+            outbox=self._speak(ego, detections, now),
+        )
+
+    def _remember_place(self, ego: EgoState) -> None:
+        x, y, _ = ego.position.tolist()
+        cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
+        ahead, aside, _ = self.spec.offset
+        self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, ego.yaw))
+
+    def _listen(self, inbox: Sequence[Received], now: float) -> None:
+        """Keep the newest report of each sender that counts, and forget the old ones."""
+        for received in inbox:
+            message = received.message
+            sender = message.sender
+            if sender == self.name:
+                if not self.own_perception:
+                    continue
+            elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
+                continue
+            held = self._reports.get(sender)
+            if held is None or message.detections.time >= held.detections.time:
+                detections = message.detections if sender == self.name else self._without_own_body(message.detections)
+                self._reports[sender] = Report(sender, detections, received.arrived)
+        oldest = now - self.settings.report_timeout - TIME_TOLERANCE
+        for sender in [sender for sender, held in self._reports.items() if held.detections.time < oldest]:
+            del self._reports[sender]
+
+    def _without_own_body(self, detections: Detections) -> Detections:
+        """A report of others without the box that is this station itself: the vehicle must not brake for itself.
+
+        Judged against where this station was when the report was measured, so that delay does not matter.
+        """
+        if not len(detections):
+            return detections
+        place = min(reversed(self._own_places), key=lambda place: abs(place[0] - detections.time))
+        _, x, y, yaw = place
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        half_length, half_width = self.spec.size[0] / 2.0 + OWN_MARGIN, self.spec.size[1] / 2.0 + OWN_MARGIN
+        others = [
+            row
+            for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
+            if abs(cos * (bx - x) + sin * (by - y)) > half_length or abs(cos * (by - y) - sin * (bx - x)) > half_width
+        ]
+        return detections if len(others) == len(detections) else detections.subset(others)
+
+    def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
+        if self.controller is None:
+            return None
+        return self.controller.parked() if plan is None else self.controller.control(ego, plan)
+
+    def _speak(self, ego: EgoState, detections: Detections, now: float) -> tuple[Message, ...]:
+        """The message of this tick, if it is time for one; also where nothing is in sight, as that is news too."""
+        rate = self.settings.message_rate
+        if rate is not None:
+            period = math.floor(now * rate + 1e-6)
+            if period <= self._periods:
+                return ()
+            self._periods = period
+        x, y, z = ego.position.tolist()
+        state = StationState(ego.time, x, y, z, ego.yaw, ego.speed)
+        size = cpm_size(len(detections), self._sensors)
+        message = Message(self.name, self._number, now, state, detections, size)
+        self._number += 1
+        return (message,)
+
+
+def build_rig(settings: AgentSettings, spec: ActorSpec) -> Rig:
+    """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
+    needs = registry("detectors").load(settings.detector).needs
+    sensors = settings.rig_sensors(needs)
+    missing = needs - {sensor.kind for sensor in sensors.values()}
+    if missing:
+        message = f"detector {settings.detector!r} of {spec.name!r} needs a sensor of kind {', '.join(sorted(missing))}"
+        raise SettingError(Problem(message, "add it to the property 'sensors'"))
+    return Rig(spec, sensors)
+
+
+def build_agent(
+    settings: AgentSettings,
+    spec: ActorSpec,
+    roads: RoadNetwork | None,
+    *,
+    seed: int,
+    dt: float,
+    own_perception: bool = False,
+) -> Agent:
+    """The agent of the station on this body. Extensions are built as `Detector()`, `FusionMethod()` and
+    `Planner(settings, spec, roads, dt=dt, seed=seed)`.
+
+    A body with wheels follows a route if the settings name no planner; one without drives never.
+    Raises SettingError if a planner is asked of a body without wheels.
+    """
+    wheels = spec.wheelbase > 0.0
+    planner = settings.planner or ("route" if wheels else NO_PLANNER)
+    if planner != NO_PLANNER and not wheels:
+        raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
+    detector: Detector = registry("detectors").load(settings.detector)()
+    return Agent(
+        spec,
+        settings,
+        detector=detector,
+        fusion=registry("fusion").load(settings.fusion)(),
+        planner=None
+        if planner == NO_PLANNER
+        else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
+        controller=Controller(spec, dt) if wheels else None,
+        sensors=len(settings.rig_sensors(detector.needs)),
+        dt=dt,
+        own_perception=own_perception,
+    )
+
+
+def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:
+    """Whether a sensor of each of these kinds was due."""
+    present = {"truth": readings.truth is not None, "camera": bool(readings.cameras), "lidar": bool(readings.lidars)}
+    return all(present[kind] for kind in kinds)

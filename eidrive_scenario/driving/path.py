@@ -1,0 +1,90 @@
+"""A path: evenly spaced points, and the speed that its curves allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SPACING = 1.0
+"""Distance between the points of a path [m]."""
+LATERAL_ACCELERATION = 5.0
+"""In a curve of curvature k the speed is at most sqrt(5 / |k|), as in EI-Drive [m/s²]."""
+APPROACH_DECELERATION = 3.0
+"""How the speed falls towards a curve or the end [m/s²]."""
+SMOOTHING_PASSES = 4
+"""Each pass averages a point with its neighbours (1 2 1)/4; four take kinks of a polyline away and move a curve of
+radius R inwards by 1/R m² at most."""
+
+
+class Path:
+    """points (M, 2) [m], at least two; limits (M,) [m/s] that keep lateral and approach accelerations."""
+
+    def __init__(self, line: Array, *, ends: bool) -> None:
+        """From a polyline (K, 2). With `ends` its last point is where to stop; else the path goes on beyond it.
+
+        Raises ValueError if the line has no length.
+        """
+        self.points = _smooth(_resample(line))
+        self.ends = ends
+        self.limits = self._speed_limits()
+        self._x: list[float] = self.points[:, 0].tolist()
+        self._y: list[float] = self.points[:, 1].tolist()
+
+    def __len__(self) -> int:
+        return len(self._x)
+
+    def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
+        """Index of the point from which the nearest segment begins, among `reach` segments from `start` on."""
+        best, nearest = start, math.inf
+        for index in range(start, min(start + reach, len(self._x) - 1)):
+            distance = segment_distance(x, y, self._x[index], self._y[index], self._x[index + 1], self._y[index + 1])
+            if distance < nearest - 1e-9:
+                best, nearest = index, distance
+        return best
+
+    def _speed_limits(self) -> Array:
+        step = np.diff(self.points, axis=0)
+        length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-6)
+        heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        curvature = np.zeros(len(self.points))
+        curvature[1:-1] = np.abs(np.diff(heading)) / ((length[1:] + length[:-1]) / 2.0)
+        limits: list[float] = np.sqrt(LATERAL_ACCELERATION / np.maximum(curvature, 1e-6)).tolist()
+        if self.ends:
+            limits[-1] = 0.0
+        gains: list[float] = (2.0 * APPROACH_DECELERATION * length).tolist()
+        for index in range(len(limits) - 2, -1, -1):
+            limits[index] = min(limits[index], math.sqrt(limits[index + 1] ** 2 + gains[index]))
+        return np.array(limits)
+
+
+def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Distance of a point from a segment [m]."""
+    dx, dy = x1 - x0, y1 - y0
+    square = dx * dx + dy * dy
+    share = ((x - x0) * dx + (y - y0) * dy) / square if square > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(x - x0 - share * dx, y - y0 - share * dy)
+
+
+def _resample(line: Array) -> Array:
+    """(M, 2) points at equal distances of about SPACING along a polyline (K, 2), its ends included."""
+    line = np.asarray(line, dtype=float)[:, :2]
+    step = np.hypot(*np.diff(line, axis=0).T)
+    line = line[np.concatenate([[True], step > 1e-6])]
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    if len(line) < 2:
+        raise ValueError("a path needs two different points")
+    stations = np.linspace(0.0, along[-1], max(2, round(along[-1] / SPACING) + 1))
+    return np.stack([np.interp(stations, along, line[:, 0]), np.interp(stations, along, line[:, 1])], axis=1)
+
+
+def _smooth(points: Array) -> Array:
+    """The same points without kinks; the first and the last stay."""
+    for _ in range(SMOOTHING_PASSES):
+        points = points.copy()
+        points[1:-1] = (points[:-2] + 2.0 * points[1:-1] + points[2:]) / 4.0
+    return points

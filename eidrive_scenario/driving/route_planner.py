@@ -1,0 +1,132 @@
+"""The route planner: along the roads to the goal, as fast as target and curves allow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.path import SPACING, Path
+from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Goal, Plan
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import ActorSpec
+
+Array = NDArray[np.float64]
+
+HORIZON = 60
+"""Points of a plan ahead of the vehicle."""
+LOOK_AHEAD = 300
+"""Points of the lane that are followed at once where there is no destination."""
+BEHIND = 5
+"""Points behind the vehicle that stay when the path is carried on."""
+
+
+class RoutePlanner(Planner):
+    """Drives by the shortest route to the goal's last waypoint through the others, and stops there.
+
+    Without waypoints it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
+    joined by a smooth curve. Objects are not looked at. Raises RouteError if no road leads to a waypoint.
+    """
+
+    def __init__(
+        self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
+    ) -> None:
+        super().__init__(settings, spec, roads, dt=dt, seed=seed)
+        self._path: Path | None = None
+        self._waypoints: Array | None = None
+        self._progress = 0
+        self._lane: list[LaneLocation] = []
+        self._first_speed: float | None = None
+
+    def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
+        x, y, _ = ego.position.tolist()
+        path = self._current_path(x, y, ego.yaw, goal)
+        self._progress = path.project(x, y, self._progress)
+        if not path.ends and len(path) - self._progress < 2 * HORIZON:
+            path = self._path = self._lane_ahead(x, y, ego.yaw)
+            self._progress = path.project(x, y)
+        part = slice(self._progress, self._progress + HORIZON)
+        target = self._target_speed(ego, goal)
+        speeds = np.minimum(path.limits[part], target)
+        reason = "keep speed" if speeds[0] >= target else "curve or end of route ahead"
+        return Plan(path.points[part], speeds, reason)
+
+    def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
+        if goal is not None and goal.speed is not None:
+            return goal.speed
+        if self.settings.target_speed is not None:
+            return self.settings.target_speed
+        if self._first_speed is None:
+            self._first_speed = max(ego.speed, 0.0)
+        return self._first_speed
+
+    def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> Path:
+        waypoints = None if goal is None else goal.waypoints
+        if self._path is None or not _same(waypoints, self._waypoints):
+            self._waypoints, self._progress, self._lane = waypoints, 0, []
+            if waypoints is not None and len(waypoints):
+                line = self._by_road(x, y, waypoints)
+                self._path = Path(_curve(x, y, yaw, waypoints) if line is None else line, ends=True)
+            else:
+                self._path = self._lane_ahead(x, y, yaw)
+        return self._path
+
+    def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
+        """The route through all waypoints, None if one of them or the vehicle itself is on no road."""
+        if self.roads is None:
+            return None
+        places = [self.roads.locate_at(px, py) for px, py in [(x, y), *waypoints[:, :2].tolist()]]
+        on_road = [place for place in places if place is not None]
+        if len(on_road) < len(places):
+            return None
+        line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
+        return np.asarray(line)[:, :2]
+
+    def _lane_ahead(self, x: float, y: float, yaw: float) -> Path:
+        """Along the lane and those that follow it, from where the last call left off; straight on where no lane is."""
+        if self.roads is not None:
+            self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
+            onward = None
+            while self._lane and len(self._lane) < LOOK_AHEAD:
+                onward = self.roads.advance(self._lane[-1], SPACING)
+                if onward is None:
+                    break
+                self._lane.append(onward)
+            if len(self._lane) > 1:
+                poses = [self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0) for place in self._lane]
+                return Path(np.array([(pose.x, pose.y) for pose in poses]), ends=onward is None)
+        reach = np.array([[0.0], [float(LOOK_AHEAD)]])
+        return Path(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
+
+    def _lane_here(self, x: float, y: float, yaw: float) -> list[LaneLocation]:
+        """The lane under the vehicle, if it leads where the vehicle looks."""
+        if self.roads is None:
+            return []
+        place = self.roads.locate_at(x, y)
+        if place is None:
+            return []
+        heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
+        direction = self.roads.driving_direction(place.road, place.lane)
+        return [place] if direction * math.cos(yaw - heading) > 0.0 else []
+
+
+def _same(first: Array | None, second: Array | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return first is second or np.array_equal(first, second)
+
+
+def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:
+    """A smooth line from here through the waypoints, (K, 2); it leaves along the heading."""
+    nose = [x + SPACING * math.cos(yaw), y + SPACING * math.sin(yaw)]
+    knots = np.array([[x, y], nose, *waypoints[:, :2].tolist()])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(knots, axis=0).T))])
+    keep = np.concatenate([[True], np.diff(along) > 1e-6])
+    stations = np.linspace(0.0, along[-1], max(2, math.ceil(along[-1] / SPACING) + 1))
+    return np.asarray(PchipInterpolator(along[keep], knots[keep])(stations))

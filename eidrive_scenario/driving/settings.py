@@ -1,0 +1,193 @@
+"""What a Controller's Properties may say about a station: the typed table, and its reading."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.registry import registry
+from eidrive_scenario.sensing.settings import (
+    KINDS,
+    AnySensorSettings,
+    CameraSettings,
+    LidarSettings,
+    MountSetting,
+    TruthSettings,
+)
+from eidrive_scenario.settings import Settings, parse_settings
+
+MODULE = "eidrive"
+"""The value of the property `module` by which a controller is one of ours."""
+
+NO_PLANNER = "none"
+"""The planner of a station that does not drive: a parked vehicle, which keeps its brakes on."""
+
+_TEXTS = frozenset({"module", "detector", "fusion", "planner"})
+"""Properties whose values are names, not YAML."""
+
+_OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
+
+Polygon = tuple[tuple[float, float], ...]
+
+
+def _names(value: Any) -> Any:
+    """Names as a list, or as a text with commas; `all` is None, `none` is ()."""
+    if value is None or value == "all":
+        return None
+    if isinstance(value, str):
+        value = [] if value.strip() == "none" else value.split(",")
+    if isinstance(value, Sequence):
+        return tuple(str(name).strip() for name in value if str(name).strip())
+    return value
+
+
+def _sensors(value: Any) -> Any:
+    """Sensors as names of their kinds, or as a mapping from a name to its settings; the kind may be the name."""
+    if isinstance(value, str):
+        value = [part.strip() for part in value.split(",") if part.strip()]
+    if isinstance(value, Mapping):
+        entries = value.items()
+    elif isinstance(value, Sequence):
+        entries = dict.fromkeys(value).items()
+    else:
+        return value
+    sensors: dict[str, Any] = {}
+    for name, given in entries:
+        entry = dict(given) if isinstance(given, Mapping) else {} if given is None else given
+        if isinstance(entry, dict) and "kind" not in entry:
+            if name not in KINDS:
+                raise ValueError(f"sensor {name!r} needs a kind, or one for its name: {suggestion(str(name), KINDS)}")
+            entry["kind"] = name
+        sensors[str(name)] = entry
+    return sensors
+
+
+def _areas(value: Any) -> Any:
+    """Areas as polygons: given as [x0, x1, y0, y1], a list of such rectangles, one polygon, or a list of polygons."""
+    if value is None:
+        return None
+    explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in metres"
+    if not isinstance(value, Sequence) or isinstance(value, str) or not value:
+        raise ValueError(explanation)
+    if all(isinstance(entry, (int, float)) for entry in value) or all(_is_point(entry) for entry in value):
+        value = [value]
+    polygons: list[Polygon] = []
+    for entry in value:
+        if not isinstance(entry, Sequence) or isinstance(entry, str):
+            raise ValueError(explanation)
+        if len(entry) == 4 and all(isinstance(bound, (int, float)) for bound in entry):
+            x0, x1, y0, y1 = entry
+            if x0 >= x1 or y0 >= y1:
+                raise ValueError(f"the rectangle {list(entry)} is empty: x0 < x1 and y0 < y1 are expected")
+            polygons.append(((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+        elif len(entry) >= 3 and all(_is_point(point) for point in entry):
+            polygons.append(tuple((point[0], point[1]) for point in entry))
+        else:
+            raise ValueError(explanation)
+    return tuple(polygons)
+
+
+def _is_point(entry: Any) -> bool:
+    return (
+        isinstance(entry, (list, tuple)) and len(entry) == 2 and all(isinstance(part, (int, float)) for part in entry)
+    )
+
+
+class AgentSettings(Settings):
+    """One station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
+
+    detector, fusion, planner   names of extensions; planner `none` parks a vehicle, and is all that a mast can have
+    sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the detector needs
+    range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
+    cooperates_with senders whose messages count; None is all
+    message_rate    how often the station sends what it sees, None is each tick
+    report_timeout  a report older than this is forgotten: 1 s, the longest interval between two collective perception
+                    messages (ETSI TS 103 324, T_GenCpmMax)
+    target_speed    where the storyboard asks for none; None keeps the first one
+    conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
+    conflict_brake  [m/s²], until
+    conflict_hold   has gone by since an object was last known there
+    """
+
+    module: Literal["eidrive"] = "eidrive"
+    detector: str = "oracle"
+    fusion: str = "average"
+    planner: str | None = None
+    sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
+    range: PositiveFloat | None = None
+    field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
+    visibility: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    mount: MountSetting = None
+    cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
+    message_rate: PositiveFloat | None = None
+    report_timeout: PositiveFloat = 1.0
+    target_speed: NonNegativeFloat | None = None
+    conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
+    conflict_brake: PositiveFloat = 5.0
+    conflict_hold: NonNegativeFloat = 1.05
+
+    @model_validator(mode="after")
+    def _one_truth_sensor(self) -> AgentSettings:
+        truths = [name for name, sensor in (self.sensors or {}).items() if isinstance(sensor, TruthSettings)]
+        if len(truths) > 1:
+            raise ValueError(f"a station has one truth sensor, found {', '.join(truths)}")
+        return self
+
+    def rig_sensors(self, needs: frozenset[str]) -> dict[str, AnySensorSettings]:
+        """The sensors of this station, for a detector that reads these kinds."""
+        usual = {"truth": TruthSettings, "camera": CameraSettings, "lidar": LidarSettings}
+        sensors = dict(self.sensors) if self.sensors is not None else {kind: usual[kind]() for kind in sorted(needs)}
+        for name, sensor in sensors.items():
+            if isinstance(sensor, TruthSettings):
+                own = {key: getattr(self, key) for key in _OF_THE_TRUTH_SENSOR if key not in sensor.model_fields_set}
+                sensors[name] = sensor.model_copy(update={key: v for key, v in own.items() if v is not None})
+        return sensors
+
+
+def is_agent(controller: Controller) -> bool:
+    """Whether this controller is one of ours."""
+    found = controller.properties.property if controller.properties is not None else ()
+    return any(entry.name == "module" and entry.value == MODULE for entry in found)
+
+
+def agent_settings(controller: Controller) -> AgentSettings:
+    """The settings in a controller's Properties; values other than names are YAML.
+
+    Raises SettingError with file and line of each property that is unknown, doubled or wrong.
+    """
+    entries = controller.properties.property if controller.properties is not None else ()
+    source = controller.source
+    data: dict[str, Any] = {}
+    lines: dict[str, int] = {}
+    problems = []
+    for entry in entries:
+        if entry.name in data:
+            message = f"property {entry.name!r} is given twice, first in line {lines[entry.name]}"
+            problems.append(Problem(message, "keep one", source, entry.line))
+            continue
+        lines[entry.name] = entry.line
+        try:
+            data[entry.name] = entry.value if entry.name in _TEXTS else yaml.safe_load(entry.value)
+        except yaml.YAMLError:
+            message = f"property {entry.name!r} is {entry.value!r}, which is not valid YAML"
+            problems.append(Problem(message, "check brackets, commas and quotes", source, entry.line))
+    for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
+        known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
+        if name in data and data[name] not in known:
+            message = f"unknown {name} {data[name]!r}"
+            problems.append(Problem(message, suggestion(data[name], known), source, lines[name]))
+    if data.get("planner") == "conflict_area" and data.get("conflict_area") is None:
+        message = "planner 'conflict_area' has no area"
+        problems.append(Problem(message, "add the property 'conflict_area'", source, lines["planner"]))
+    try:
+        settings = parse_settings(AgentSettings, data, source=source, line=controller.line, lines=lines)
+    except SettingError as error:
+        raise SettingError([*problems, *error.problems]) from error
+    if problems:
+        raise SettingError(problems)
+    return settings

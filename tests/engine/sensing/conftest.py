@@ -1,0 +1,137 @@
+"""A small world of upright boxes whose rays are worked out one by one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.view import WorldView
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hits:
+    rows: NDArray[np.int64]
+    fraction: Array
+
+
+@dataclass
+class BoxScene:
+    """Actors are the boxes of a view; walls are boxes of no actor. `casts` counts the batches of rays."""
+
+    view: WorldView
+    walls: list[tuple[float, ...]] = field(default_factory=list)
+    ground: bool = False
+    casts: list[int] = field(default_factory=list)
+    pictures: list[tuple[Array, int, int, float]] = field(default_factory=list)
+
+    def cast(self, origins: Array, targets: Array) -> Hits:
+        self.casts.append(len(origins))
+        bodies = [(row, tuple(box)) for row, box in enumerate(self.view.boxes.tolist())]
+        bodies += [(-1, wall) for wall in self.walls]
+        rows, fractions = [], []
+        for origin, target in zip(origins.tolist(), targets.tolist(), strict=True):
+            nearest, row = 1.0, -2
+            for name, box in bodies:
+                share = meeting(origin, target, box)
+                if share is not None and share < nearest:
+                    nearest, row = share, name
+            if self.ground and origin[2] > 0.0 > target[2] and origin[2] / (origin[2] - target[2]) < nearest:
+                nearest, row = origin[2] / (origin[2] - target[2]), -1
+            rows.append(row)
+            fractions.append(nearest)
+        return Hits(np.array(rows, dtype=np.int64), np.array(fractions))
+
+    def camera(
+        self, pose: Array, width: int, height: int, fov: float, near: float, far: float
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
+        self.pictures.append((pose, width, height, fov))
+        return (
+            np.zeros((height, width, 3), np.uint8),
+            np.full((height, width), far, np.float32),
+            np.full((height, width), -1, np.int32),
+        )
+
+
+def meeting(origin: list[float], target: list[float], box: tuple[float, ...]) -> float | None:
+    """Where a ray from outside meets a box, as a share of the way; None where it does not, or begins inside."""
+    x, y, z, length, width, height, yaw = box
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    start = [origin[0] - x, origin[1] - y, origin[2] - z]
+    way = [b - a for a, b in zip(origin, target, strict=True)]
+    start = [cos * start[0] + sin * start[1], cos * start[1] - sin * start[0], start[2]]
+    way = [cos * way[0] + sin * way[1], cos * way[1] - sin * way[0], way[2]]
+    enter, leave = 0.0, 1.0
+    inside = True
+    for place, step, size in zip(start, way, (length, width, height), strict=True):
+        half = size / 2
+        inside &= abs(place) < half
+        if abs(step) < 1e-15:
+            if abs(place) > half:
+                return None
+            continue
+        first, second = sorted(((-half - place) / step, (half - place) / step))
+        enter, leave = max(enter, first), min(leave, second)
+    return enter if enter < leave and not inside else None
+
+
+CAR = (4.892, 1.837, 1.49)
+TRUCK = (8.468, 2.891, 3.827)
+
+
+def make_view(
+    actors: dict[str, tuple[float, float, float]],
+    sizes: dict[str, tuple[float, float, float]] | None = None,
+    *,
+    time: float = 0.0,
+    categories: dict[str, str] | None = None,
+    velocity: dict[str, tuple[float, float]] | None = None,
+) -> WorldView:
+    """Actors as name: x, y of the box centre, yaw; the reference point is below the centre, on the ground."""
+    sizes, categories, velocity = sizes or {}, categories or {}, velocity or {}
+    count = len(actors)
+    size = np.array([sizes.get(name, CAR) for name in actors])
+    offset = np.zeros((count, 3))
+    offset[:, 2] = size[:, 2] / 2
+    speeds = np.array([(*velocity.get(name, (0.0, 0.0)), 0.0) for name in actors])
+    return WorldView(
+        time=time,
+        tick=round(time / 0.05),
+        names=tuple(actors),
+        categories=tuple(categories.get(name, "car") for name in actors),
+        position=np.array([(x, y, 0.0) for x, y, _ in actors.values()]),
+        yaw=np.array([yaw for _, _, yaw in actors.values()]),
+        pitch=np.zeros(count),
+        roll=np.zeros(count),
+        velocity=speeds,
+        acceleration=np.zeros((count, 3)),
+        yaw_rate=np.zeros(count),
+        speed=np.hypot(speeds[:, 0], speeds[:, 1]),
+        size=size,
+        offset=offset,
+    )
+
+
+def make_spec(name: str, size: tuple[float, float, float] = CAR, wheelbase: float = 2.85) -> ActorSpec:
+    return ActorSpec(name, "car", "car", size, (0.0, 0.0, size[2] / 2), wheelbase=wheelbase)
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """The tools of this folder's tests."""
+
+    view = staticmethod(make_view)
+    spec = staticmethod(make_spec)
+    scene = BoxScene
+    truck = TRUCK
+
+
+@pytest.fixture
+def boxes() -> Boxes:
+    return Boxes()

@@ -1,0 +1,136 @@
+"""Rates, mounts, the own motion, camera and LiDAR."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from eidrive_scenario.sensing.mounting import mounting
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
+
+
+def test_a_sensor_with_a_rate_is_read_at_its_rate(boxes: Any) -> None:
+    """7 Hz at steps of 0.05 s: the first step at or after each multiple of 1/7 s."""
+    rig = Rig(boxes.spec("Ego"), {"truth": TruthSettings(rate=7.0), "front": CameraSettings(width=4, height=3)})
+    read = []
+    for tick in range(40):
+        view = boxes.view({"Ego": (0, 0, 0)}, time=tick * 0.05)
+        readings = rig.read(boxes.scene(view), view)
+        assert set(readings.cameras) == {"front"}
+        if readings.truth is not None:
+            read.append(tick)
+    assert read == [math.ceil(k / 7.0 / 0.05 - 1e-9) for k in range(14)]
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 20.0, 40.0])
+def test_rates_that_divide_the_step_are_kept_exactly(boxes: Any, rate: float) -> None:
+    rig = Rig(boxes.spec("Ego"), {"truth": TruthSettings(rate=rate)})
+    read = [tick for tick in range(400) if rig.due(tick * 0.05)]
+    assert read == list(range(0, 400, max(1, round(20 / rate))))
+
+
+def test_two_truth_sensors_are_refused(boxes: Any) -> None:
+    with pytest.raises(ValueError, match="more than one truth sensor"):
+        Rig(boxes.spec("Ego"), {"a": TruthSettings(), "b": TruthSettings()})
+
+
+def test_own_motion(boxes: Any) -> None:
+    view = replace(
+        boxes.view({"Ego": (1, 2, math.pi / 2)}, time=3.0),
+        speed=np.array([4.0]),
+        yaw_rate=np.array([0.2]),
+        acceleration=np.array([[5.0, -1.5, 0.0]]),
+    )
+    ego = Rig(boxes.spec("Ego"), {}).read(boxes.scene(view), view).ego
+    assert (ego.time, ego.yaw, ego.speed, ego.yaw_rate) == (3.0, math.pi / 2, 4.0, 0.2)
+    assert ego.position.tolist() == [1.0, 2.0, 0.0]
+    assert ego.acceleration == pytest.approx(-1.5)
+
+
+def test_the_usual_mounts_are_ei_drive_s_on_its_car(boxes: Any) -> None:
+    """Lincoln MKZ: front camera 2.5 m ahead and 1 m high, LiDAR half a metre behind the middle, 1.9 m high."""
+    spec = boxes.spec("Ego")
+    front, lidar = mounting(CameraSettings(), spec, "front"), mounting(LidarSettings(), spec, "roof")
+    assert (front.x, front.y, front.z, front.yaw) == pytest.approx((2.5, 0.0, 1.0, 0.0), abs=1e-3)
+    assert (lidar.x, lidar.y, lidar.z) == pytest.approx((-0.5, 0.0, 1.9), abs=1e-3)
+    left = mounting(CameraSettings(mount="left"), spec, "front")
+    assert (left.y, left.z, math.degrees(left.yaw)) == pytest.approx((0.3, 1.8, 100.0), abs=1e-3)
+
+
+def test_a_mount_is_a_list_in_a_file() -> None:
+    assert CameraSettings.model_validate({"mount": [1, 0, 2.5, 30, 10]}).mount == Mount(
+        x=1, y=0, z=2.5, yaw=30, pitch=10
+    )
+    assert CameraSettings.model_validate({"mount": "back"}).mount == "back"
+    for wrong in ([1, 2], [1, 2, 3, 4, 5, 6], "bonnet"):
+        with pytest.raises(ValidationError):
+            CameraSettings.model_validate({"mount": wrong})
+
+
+def test_camera_pose_and_intrinsics(boxes: Any) -> None:
+    """Looking north from a car heading north: right is east, down is down, forward is north."""
+    view = boxes.view({"Ego": (10, 20, math.pi / 2)})
+    scene = boxes.scene(view)
+    rig = Rig(boxes.spec("Ego"), {"front": CameraSettings(width=800, height=600, fov=90.0)})
+    picture = rig.read(scene, view).cameras["front"]
+    np.testing.assert_allclose(picture.pose[:3, :3], [[1, 0, 0], [0, 0, 1], [0, -1, 0]], atol=1e-12)
+    np.testing.assert_allclose(picture.pose[:3, 3], [10, 22.5, 1.0], atol=1e-3)
+    np.testing.assert_allclose(picture.intrinsics, [[400, 0, 400], [0, 400, 300], [0, 0, 1]])
+    assert picture.rgb.shape == (600, 800, 3)
+    assert scene.pictures[0][1:] == (800, 600, math.pi / 2)
+
+
+def test_pitch_turns_a_camera_down(boxes: Any) -> None:
+    view = boxes.view({"Ego": (0, 0, 0)})
+    rig = Rig(boxes.spec("Ego"), {"front": CameraSettings(mount=Mount(x=0, y=0, z=5, pitch=30), width=4, height=3)})
+    forward = rig.read(boxes.scene(view), view).cameras["front"].pose[:3, 2]
+    np.testing.assert_allclose(forward, [math.cos(math.pi / 6), 0, -0.5], atol=1e-12)
+
+
+LIDAR = LidarSettings(channels=8, points_per_second=8000, rotation=20.0, range=30.0)
+
+
+def test_a_sweep_is_one_revolution_in_a_step_of_one_revolution(boxes: Any) -> None:
+    """8000 points/s on 8 rings at 20 Hz: 50 columns a revolution, one revolution in each step of 0.05 s."""
+    view = boxes.view({"Ego": (0, 0, 0)})
+    lidar = Rig(boxes.spec("Ego"), {"lidar": LIDAR}).due(0.0)["lidar"]
+    first, second = lidar.directions(0.0), lidar.directions(0.05)  # type: ignore[union-attr]
+    assert first.shape == second.shape == (400, 3)
+    np.testing.assert_allclose(np.linalg.norm(first, axis=1), 1.0)
+    np.testing.assert_allclose(first, second, atol=1e-9)
+    elevations = np.unique(np.round(np.degrees(np.arcsin(first[:, 2])), 6))
+    np.testing.assert_allclose(elevations, np.linspace(-30, 10, 8), atol=1e-6)
+    assert lidar.directions(0.075).shape == (200, 3)  # type: ignore[union-attr]
+    assert view.time == 0.0
+
+
+def test_lidar_points_lie_on_ground_and_bodies(boxes: Any) -> None:
+    view = boxes.view({"Ego": (5, -3, 0.8), "Other": (15, -3, 0)})
+    scene = boxes.scene(view, ground=True)
+    dense = LIDAR.model_copy(update={"points_per_second": 32000})
+    sweep = Rig(boxes.spec("Ego"), {"lidar": dense}).read(scene, view).lidars["lidar"]
+    world = sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
+    on_ground = np.abs(world[:, 2]) < 1e-6
+    half = np.array([4.892, 1.837, 1.49]) / 2
+    inside = np.all(np.abs(world - [15, -3, 0.745]) < half + 1e-6, axis=1)
+    assert on_ground.sum() > 100
+    assert inside.sum() > 3
+    assert np.all(on_ground | inside)
+    distance = np.linalg.norm(sweep.points, axis=1)
+    assert distance.max() <= 30.0
+    np.testing.assert_allclose(sweep.intensity, np.exp(-0.004 * distance))
+
+
+def test_the_own_roof_hides_the_ground_near_by(boxes: Any) -> None:
+    view = boxes.view({"Ego": (0, 0, 0)})
+    settings = LIDAR.model_copy(update={"lower_fov": -80.0})
+    sweep = Rig(boxes.spec("Ego"), {"lidar": settings}).read(boxes.scene(view, ground=True), view).lidars["lidar"]
+    world = sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
+    assert len(world)
+    assert not np.any((np.abs(world[:, 0]) < 2.446) & (np.abs(world[:, 1]) < 0.918))
