@@ -1,1 +1,21 @@
-"""The world: bodies, motion, contacts, rays and pictures. The only room that imports pybullet."""
+"""The world: bodies, motion, contacts, rays and pictures. The only room that imports pybullet.
+
+`World` is imported when it is first asked for, so that the types of this room can be had without loading pybullet.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from eidrive_scenario.world.world import World
+
+__all__ = ["World"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "World":
+        from eidrive_scenario.world.world import World
+
+        return World
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

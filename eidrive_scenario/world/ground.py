@@ -1,0 +1,37 @@
+"""The road's surface under a vehicle that drives on it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from eidrive_scenario.roads import LaneLocation, RoadNetwork
+
+
+class GroundUnder:
+    """Height and slope of the ground below one vehicle; remembers the lane on which it stood last."""
+
+    def __init__(self, roads: RoadNetwork | None, height: float = 0.0) -> None:
+        self._roads = roads
+        self._last: LaneLocation | None = None
+        self._height = height
+
+    def at(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+        """Height z [m], pitch and roll [rad] of something at x, y with that heading.
+
+        Beside the road the ground is level, at the height at which the road was left.
+        """
+        if self._roads is None:
+            return self._height, 0.0, 0.0
+        self._last = self._roads.locate_at(x, y, self._last)
+        if self._last is None:
+            return self._height, 0.0, 0.0
+        pose = self._roads.road_pose_at(self._last.road, self._last.s, self._last.t)
+        pose = pose.turned(yaw - pose.h)
+        self._height = pose.z
+        return pose.z, pose.p, pose.r
+
+
+def is_level(roads: RoadNetwork | None) -> bool:
+    """Whether all roads lie in the plane z = 0."""
+    return roads is None or all(road.elevation.is_zero and road.superelevation.is_zero for road in roads.roads.values())

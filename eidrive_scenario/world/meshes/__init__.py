@@ -1,0 +1,30 @@
+"""Meshes of actors, made in code: low in polygons, to scale, the same for the same size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.meshes.cars import car
+from eidrive_scenario.world.meshes.frame import Frame
+from eidrive_scenario.world.meshes.solids import Array, Mesh
+
+BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
+    "car": car,
+}
+
+
+def actor_mesh(spec: ActorSpec) -> Mapping[str, Array]:
+    """Material to triangles (K, 3, 3) of an actor: origin at the centre of its box on the ground, x forward [m]."""
+    length, width, height = spec.size
+    if spec.wheelbase > 0.0:
+        rear, front, radius = -spec.offset[0], spec.wheelbase - spec.offset[0], spec.wheel_radius
+    else:
+        rear, front, radius = -0.3 * length, 0.3 * length, min(0.35, 0.3 * height)
+    return _mesh(spec.shape, Frame(length, width, height, front, rear, radius))
+
+
+@lru_cache(maxsize=256)
+def _mesh(shape: str, frame: Frame) -> Mapping[str, Array]:
+    return BUILDERS.get(shape, car)(frame).materials()

@@ -1,0 +1,118 @@
+"""Passenger cars, from the hatchback to the off-roader."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eidrive_scenario.world.meshes.frame import Frame, add_wheels
+from eidrive_scenario.world.meshes.solids import Array, Mesh, box, loft, polygon
+
+_TALL = 0.37
+"""Height over length above which a car is built as an off-roader or hatchback, without a boot."""
+
+
+def car(frame: Frame) -> Mesh:
+    """A saloon with bonnet and boot; a tall or short one gets an upright tail instead."""
+    mesh = Mesh()
+    upright = frame.height / frame.length > _TALL or frame.length < 4.3
+    belt, side = (0.60, 0.97) if upright else (0.635, 0.97)
+    _shell(mesh, frame, belt, side, upright)
+    rear, front = (0.03, 0.71) if upright else (0.13, 0.735)
+    roof = (0.10, 0.545) if upright else (0.30, 0.555)
+    _cabin(mesh, frame, belt, (rear, front), roof)
+    _details(mesh, frame, belt, upright)
+    add_wheels(mesh, frame, side * frame.side + 0.004, 0.24)
+    return mesh
+
+
+def _ring(frame: Frame, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
+    """A section of the shell at a share x of the length: shares of half the width and of the height."""
+    y, tilt = width * frame.side, 0.9
+    half = [(y * 0.86, bottom), (y, bottom + 0.07), (y * 1.0, waist), (y * tilt, top - 0.015), (y * 0.55, top)]
+    points = [(-a, b) for a, b in half] + [(a, b) for a, b in reversed(half)]
+    return np.array([(frame.x(x), a, frame.z(b)) for a, b in points])
+
+
+def _shell(mesh: Mesh, frame: Frame, belt: float, side: float, upright: bool) -> None:
+    """The body below the windows."""
+    tail = belt if upright else belt + 0.02
+    sections = [
+        (0.000, 0.80, 0.24, 0.40, 0.47),
+        (0.008, 0.90, 0.19, 0.46, 0.58),
+        (0.035, 0.955, 0.15, 0.50, tail),
+        (0.130, side, 0.13, 0.52, tail + 0.005),
+        (0.300, side, 0.12, 0.52, belt + 0.01),
+        (0.720, side, 0.12, 0.52, belt),
+        (0.760, side, 0.12, 0.52, belt - 0.01),
+        (0.880, 0.955, 0.13, 0.48, belt - 0.06),
+        (0.955, 0.90, 0.15, 0.42, belt - 0.12),
+        (0.988, 0.82, 0.18, 0.37, belt - 0.19),
+        (1.000, 0.72, 0.22, 0.34, belt - 0.25),
+    ]
+    # The rings run clockwise seen from the rear, as a loft wants it that goes forward.
+    mesh.add("paint", loft([_ring(frame, *section)[::-1] for section in sections]))
+
+
+def _cabin(mesh: Mesh, frame: Frame, belt: float, sill: tuple[float, float], roof: tuple[float, float]) -> None:
+    """Roof, pillars and windows above the belt line."""
+    low, high = frame.z(belt - 0.01), frame.z(0.975)
+    wide, narrow = 0.87 * frame.side, 0.66 * frame.side
+    (x0, x3), (x1, x2) = (frame.x(sill[0]), frame.x(sill[1])), (frame.x(roof[0]), frame.x(roof[1]))
+    bottom = np.array([(x0, -wide, low), (x3, -wide, low), (x3, wide, low), (x0, wide, low)])
+    top = np.array([(x1, -narrow, high), (x2, -narrow, high), (x2, narrow, high), (x1, narrow, high)])
+    crown = top * (1.0, 0.85, 1.0) + (0.0, 0.0, frame.z(0.025))
+    crown[:, 0] = np.array([0.93, 0.93, 0.93, 0.93]) * (crown[:, 0] - crown[:, 0].mean()) + crown[:, 0].mean()
+    mesh.add("paint", loft([crown, top, bottom]))
+    rear, front = _face(bottom[[3, 0]], top[[3, 0]]), _face(bottom[[1, 2]], top[[1, 2]])
+    mesh.add("glass", _pane(rear, 0.08, 0.92, 0.10, 0.92), _pane(front, 0.05, 0.95, 0.04, 0.95))
+    right = _face(bottom[[0, 1]], top[[0, 1]])
+    middle = 0.47
+    mesh.add_mirrored(
+        "glass",
+        _pane(right, 0.07, middle - 0.015, 0.10, 0.88),
+        _pane(right, middle + 0.015, 0.92, 0.10, 0.88),
+    )
+
+
+def _face(bottom: Array, top: Array) -> Array:
+    """The four corners of a face: bottom from left to right as seen from outside, then the top in the same way."""
+    return np.stack([bottom[0], bottom[1], top[0], top[1]])
+
+
+def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
+    """A window in a face, between shares of its width and height, lifted off the face by a centimetre."""
+    p00, p10, p01, p11 = face
+    normal = np.cross(p10 - p00, p01 - p00)
+    lift = 0.012 * normal / np.linalg.norm(normal)
+
+    def at(u: float, v: float) -> Array:
+        point: Array = (1 - v) * ((1 - u) * p00 + u * p10) + v * ((1 - u) * p01 + u * p11) + lift
+        return point
+
+    return polygon([at(left, low), at(right, low), at(right, high), at(left, high)])
+
+
+def _details(mesh: Mesh, frame: Frame, belt: float, upright: bool) -> None:
+    """Lights, grille, bumpers, plates, mirrors, door lines, handles."""
+    x, z, side = frame.x, frame.z, frame.side
+    nose, tail = x(1.0), x(0.0)
+    mesh.add("trim", box((nose - 0.03, 0, z(0.30)), (0.08, 0.95 * side, z(0.11))))
+    mesh.add("chrome", box((nose - 0.025, 0, z(0.365)), (0.08, 1.0 * side, z(0.012))))
+    mesh.add("plastic", box((nose - 0.05, 0, z(0.19)), (0.12, 1.36 * side, z(0.05))))
+    mesh.add("plastic", box((tail + 0.05, 0, z(0.235)), (0.12, 1.5 * side, z(0.08))))
+    mesh.add(
+        "plate", box((nose - 0.01, 0, z(0.22)), (0.05, 0.52, 0.11)), box((tail + 0.005, 0, z(0.42)), (0.03, 0.52, 0.11))
+    )
+    mesh.add_mirrored("headlight", box((x(0.972), 0.70 * side, z(belt - 0.19)), (0.16, 0.30 * side, z(0.055))))
+    mesh.add_mirrored("indicator", box((x(0.955), 0.865 * side, z(belt - 0.19)), (0.12, 0.07 * side, z(0.045))))
+    light = z(belt - 0.09)
+    mesh.add_mirrored("taillight", box((x(0.02), 0.74 * side, light), (0.15, 0.36 * side, z(0.085))))
+    mesh.add_mirrored("trim", box((x(0.70), 0.985 * side, z(belt + 0.05)), (0.10, 0.05, 0.05)))
+    mesh.add_mirrored("paint", box((x(0.705), 0.99 * side, z(belt + 0.075)), (0.12, 0.16, 0.12)))
+    for share in (0.245, 0.475, 0.70):
+        mesh.add_mirrored("trim", box((x(share), 0.969 * side, z(0.37)), (0.012, 0.008, z(0.34))))
+    for share in (0.30, 0.53):
+        mesh.add_mirrored("chrome", box((x(share), 0.965 * side, z(0.51)), (0.16, 0.03, 0.025)))
+    mesh.add_mirrored("plastic", box((x(0.49), 0.95 * side, z(0.135)), (0.42 * frame.length, 0.05, z(0.05))))
+    if upright:
+        mesh.add_mirrored("plastic", box((x(0.33), 0.60 * side, z(0.985)), (0.36 * frame.length, 0.04, z(0.025))))

@@ -1,0 +1,118 @@
+"""Solids as triangles (K, 3, 3) [m], counter-clockwise seen from outside: the clay of which all bodies are made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Point = Sequence[float]
+
+_BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+
+
+@dataclass
+class Mesh:
+    """Triangles by the name of their material, in the frame of the bounding box's centre on the ground."""
+
+    triangles: dict[str, list[Array]] = field(default_factory=dict)
+
+    def add(self, material: str, *solids: Array) -> None:
+        """Put solids, triangles (K, 3, 3), into the mesh."""
+        self.triangles.setdefault(material, []).extend(solids)
+
+    def add_mirrored(self, material: str, *solids: Array) -> None:
+        """Put solids and their mirror images on the other side (y -> -y) into the mesh."""
+        self.add(material, *solids, *(mirrored(solid) for solid in solids))
+
+    def materials(self) -> dict[str, Array]:
+        """Material to its triangles (K, 3, 3)."""
+        return {material: np.concatenate(solids) for material, solids in self.triangles.items()}
+
+
+def mirrored(solid: Array) -> Array:
+    """The mirror image at the plane y = 0, its faces still looking outwards."""
+    flipped: Array = (solid * (1.0, -1.0, 1.0))[:, ::-1]
+    return flipped
+
+
+def polygon(points: Sequence[Point] | Array) -> Array:
+    """A flat convex face (M, 3), given counter-clockwise as seen from outside."""
+    corners = np.asarray(points, dtype=float)
+    return np.stack([[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)])
+
+
+def hexahedron(corners: Sequence[Point] | Array) -> Array:
+    """A body with six faces: four corners of the bottom counter-clockwise from above, then four of the top."""
+    points = np.asarray(corners, dtype=float)
+    return np.concatenate([polygon(points[list(face)]) for face in _BOX_FACES])
+
+
+def box(centre: Point, size: Point) -> Array:
+    """An upright cuboid."""
+    return tapered_box(centre, size, size[:2])
+
+
+def tapered_box(centre: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
+    """A frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
+    x, y, z = centre
+    length, width, height = size
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    bottom = [(x + sx * length / 2, y + sy * width / 2, z - height / 2) for sx, sy in signs]
+    upper = [(x + shift + sx * top[0] / 2, y + sy * top[1] / 2, z + height / 2) for sx, sy in signs]
+    return hexahedron(bottom + upper)
+
+
+def side_prism(profile: Sequence[Point], y0: float, y1: float) -> Array:
+    """An outline (x, z), convex or star-shaped about its mean and counter-clockwise seen from the right (y < 0),
+    pulled from y0 to y1."""
+    outline = np.asarray(profile, dtype=float)
+    near = np.column_stack([outline[:, 0], np.full(len(outline), y0), outline[:, 1]])
+    return loft([near, moved(near, (0.0, y1 - y0, 0.0))])
+
+
+def loft(rings: Sequence[Array] | Array) -> Array:
+    """A skin over rings (S, M, 3), closed by a fan at each end.
+
+    The rings run counter-clockwise as seen from the first ring's side.
+    """
+    stack = np.asarray(rings, dtype=float)
+    following = np.roll(stack, -1, axis=1)
+    a, b, c, d = stack[:-1], following[:-1], following[1:], stack[1:]
+    skin = np.concatenate([np.stack([a, c, b], axis=-2), np.stack([a, d, c], axis=-2)]).reshape(-1, 3, 3)
+    return np.concatenate([skin, _fan(stack[0]), _fan(stack[-1])[:, ::-1]])
+
+
+def cylinder(start: Point, end: Point, radius: float, end_radius: float | None = None, sides: int = 14) -> Array:
+    """A cylinder, or the frustum of a cone, between two points."""
+    begin, finish = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    axis = (finish - begin) / np.linalg.norm(finish - begin)
+    across = np.cross(axis, (0.0, 0.0, 1.0) if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across)
+    up = np.cross(axis, across)
+    turns = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
+    circle = -np.cos(turns)[:, None] * across + np.sin(turns)[:, None] * up
+    last = radius if end_radius is None else end_radius
+    return loft([begin + radius * circle, finish + last * circle])
+
+
+def ball(centre: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array:
+    """An ellipsoid with its half-axes along x, y, z."""
+    tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[:, None, None]
+    turn = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)[None, :, None]
+    level = np.cos(tilt)
+    unit = np.concatenate(np.broadcast_arrays(level * np.cos(turn), -level * np.sin(turn), np.sin(tilt)), axis=-1)
+    return loft(unit * np.asarray(radius) + np.asarray(centre))
+
+
+def moved(solid: Array, by: Point) -> Array:
+    """The same solid elsewhere."""
+    return solid + np.asarray(by, dtype=float)
+
+
+def _fan(ring: Array) -> Array:
+    centre = np.broadcast_to(ring.mean(axis=0), ring.shape)
+    return np.stack([centre, ring, np.roll(ring, -1, axis=0)], axis=1)

@@ -1,0 +1,67 @@
+"""Rays through the world, to see by and to measure with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.bullet import bullet
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+GROUND, NOTHING = -1, -2
+"""Rows of a ray that ended at the ground or a building, and of one that met nothing."""
+
+_BATCH = 16_000
+_STEP_IN = 1e-4
+"""How far a ray is moved into a body that it may pass [m]; from inside, pybullet does not see a convex body."""
+
+
+@dataclass(frozen=True)
+class RayHits:
+    """What rays met first.
+
+    rows      (M,) row of the actor in the view; GROUND (-1) for the ground and buildings, NOTHING (-2)
+    fraction  (M,) share of the way from origin to target, 1 where nothing was met
+    position  (M, 3) where [m], the target where nothing was met
+    normal    (M, 3) of the surface, zero where nothing was met
+    """
+
+    rows: Integers
+    fraction: Array
+    position: Array
+    normal: Array
+
+
+def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Integers, passed: Integers) -> RayHits:
+    """Cast rays (M, 3) to (M, 3); those bodies whose rows are in `passed` are looked through."""
+    handles, fraction, normal = _cast(client, origins, targets)
+    rows = np.where(handles < 0, NOTHING, row_of_handle[handles])
+    if len(passed):
+        length = np.linalg.norm(targets - origins, axis=1)
+        for _ in range(len(passed)):
+            again = np.flatnonzero(np.isin(rows, passed))
+            if not len(again):
+                break
+            start = np.minimum(fraction[again] + _STEP_IN / np.maximum(length[again], _STEP_IN), 1.0)
+            begin = origins[again] + start[:, None] * (targets[again] - origins[again])
+            handles, further, normal[again] = _cast(client, begin, targets[again])
+            rows[again] = np.where(handles < 0, NOTHING, row_of_handle[handles])
+            fraction[again] = np.where(handles < 0, 1.0, start + further * (1.0 - start))
+    position = origins + fraction[:, None] * (targets - origins)
+    return RayHits(rows, fraction, position, normal)
+
+
+def _cast(client: int, origins: Array, targets: Array) -> tuple[Integers, Array, Array]:
+    count = len(origins)
+    handles, fraction, normal = np.empty(count, dtype=np.int64), np.empty(count), np.empty((count, 3))
+    for start in range(0, count, _BATCH):
+        part = slice(start, start + _BATCH)
+        hits = bullet.rayTestBatch(origins[part], targets[part], numThreads=1, physicsClientId=client)
+        handles[part] = [hit[0] for hit in hits]
+        fraction[part] = [hit[2] for hit in hits]
+        normal[part] = [hit[4] for hit in hits]
+    return handles, fraction, normal

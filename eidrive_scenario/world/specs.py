@@ -1,0 +1,157 @@
+"""From an entity of the scenario to the body of an actor."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.openscenario.model import MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.world.actor import ActorSpec, Vector3
+
+SHAPES = (
+    "car", "firetruck", "ambulance", "bus", "van", "truck", "motorbike", "bicycle", "pedestrian", "rsu", "box",
+)  # fmt: skip
+SHAPE_PROPERTY = "eidrive.shape"
+COLOUR_PROPERTY = "eidrive.colour"
+
+_WORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("firetruck", ("firetruck", "fire_truck", "fireengine", "fire_engine", "firebrigade")),
+    ("ambulance", ("ambulance",)),
+    ("bus", ("bus", "fusorosa", "coach")),
+    ("van", ("van", "sprinter", "transporter")),
+    ("truck", ("truck", "lorry", "semi", "trailer", "carlacola")),
+    ("motorbike", ("motorbike", "motorcycle", "mc", "harley", "yamaha", "vespa", "kawasaki")),
+    ("bicycle", ("bicycle", "bike", "cyclist", "crossbike", "gazelle", "omafiets")),
+    ("pedestrian", ("pedestrian", "walker", "person", "adult", "child")),
+    ("rsu", ("rsu", "roadside_unit")),
+)
+_VEHICLES = {
+    "bicycle": "bicycle",
+    "bus": "bus",
+    "car": "car",
+    "motorbike": "motorbike",
+    "semitrailer": "truck",
+    "trailer": "truck",
+    "train": "bus",
+    "tram": "bus",
+    "truck": "truck",
+    "van": "van",
+}
+_CATEGORIES = {"firetruck": "truck", "ambulance": "van", "rsu": "misc", "box": "misc"}
+_USUAL_MASS = {
+    "car": 1500.0,
+    "van": 2200.0,
+    "ambulance": 3000.0,
+    "truck": 9000.0,
+    "firetruck": 14000.0,
+    "bus": 12000.0,
+    "motorbike": 280.0,
+    "bicycle": 90.0,
+}
+_USUAL_SIZE: dict[str, Vector3] = {
+    "car": (4.5, 1.8, 1.5),
+    "firetruck": (8.5, 2.5, 3.3),
+    "ambulance": (6.0, 2.1, 2.6),
+    "bus": (12.0, 2.55, 3.1),
+    "van": (5.9, 2.0, 2.6),
+    "truck": (8.0, 2.5, 3.5),
+    "motorbike": (2.2, 0.8, 1.6),
+    "bicycle": (1.8, 0.6, 1.7),
+    "pedestrian": (0.5, 0.5, 1.75),
+    "rsu": (0.5, 0.5, 5.0),
+    "box": (0.5, 0.5, 0.5),
+}
+
+
+def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpec:
+    """The body of the actor `name`, as its Vehicle, Pedestrian or MiscObject says.
+
+    Its shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model; its paint
+    is the Property `eidrive.colour` (`#rrggbb`). A dimension of 0, with which some catalogs leave the box open, becomes
+    that of a common body of this shape. Raises ScenarioError with the line of the wrong Property or dimension.
+    """
+    properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
+    shape = _shape(entity, properties)
+    dimensions, centre = entity.bounding_box.dimensions, entity.bounding_box.center
+    given = (dimensions.length, dimensions.width, dimensions.height)
+    if min(given) < 0.0:
+        what = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
+        raise ScenarioError(Problem(what, "give length, width and height above 0", dimensions.source, dimensions.line))
+    length, width, height = (own or usual for own, usual in zip(given, _USUAL_SIZE[shape], strict=True))
+    lift = 0.0 if dimensions.height else height / 2
+    common = ActorSpec(
+        name=name,
+        shape=shape,
+        category=_CATEGORIES.get(shape, shape),
+        size=(length, width, height),
+        offset=(centre.x, centre.y, centre.z + lift),
+        mass=entity.mass or _USUAL_MASS.get(shape, 80.0),
+        properties=properties,
+        colour=_colour(entity, properties),
+    )
+    return _with_axles(common, entity) if isinstance(entity, Vehicle) else common
+
+
+def _with_axles(spec: ActorSpec, vehicle: Vehicle) -> ActorSpec:
+    axles, performance = vehicle.axles, vehicle.performance
+    front = axles.front_axle
+    wheelbase = front.position_x - axles.rear_axle.position_x if front is not None else 0.0
+    return replace(
+        spec,
+        wheelbase=wheelbase,
+        max_steering=abs(front.max_steering) if front is not None else 0.0,
+        wheel_radius=axles.rear_axle.wheel_diameter / 2,
+        max_speed=performance.max_speed,
+        max_acceleration=performance.max_acceleration,
+        max_deceleration=performance.max_deceleration,
+    )
+
+
+def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> str:
+    wanted = properties.get(SHAPE_PROPERTY)
+    if wanted is not None:
+        if wanted not in SHAPES:
+            line, source = _place(entity, SHAPE_PROPERTY)
+            raise ScenarioError(Problem(f"unknown shape {wanted!r}", suggestion(wanted, SHAPES), source, line))
+        return wanted
+    if isinstance(entity, Pedestrian):
+        return "pedestrian"
+    words = _words(entity)
+    if isinstance(entity, MiscObject):
+        return "rsu" if "rsu" in words else "box"
+    by_category = _VEHICLES[entity.vehicle_category.value]
+    named = next((shape for shape, known in _WORDS if any(word in words for word in known)), None)
+    allowed = {
+        "car": ("car", "van", "ambulance"),
+        "van": ("van", "ambulance"),
+        "truck": ("truck", "firetruck", "ambulance", "van"),
+    }
+    return named if named is not None and named in allowed.get(by_category, ()) else by_category
+
+
+def _words(entity: Vehicle | MiscObject) -> set[str]:
+    """The words in the entity's name and 3D model, single and in neighbouring pairs."""
+    words: set[str] = set()
+    for text in (entity.name, (entity.model3d or "").rsplit("/", 1)[-1]):
+        parts = [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)]
+        words.update(parts)
+        words.update(f"{first}_{second}" for first, second in pairwise(parts))
+    return words
+
+
+def _colour(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> Vector3 | None:
+    text = properties.get(COLOUR_PROPERTY)
+    if text is None:
+        return None
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        line, source = _place(entity, COLOUR_PROPERTY)
+        raise ScenarioError(Problem(f"colour {text!r} is not understood", "write it as #rrggbb", source, line))
+    red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return red, green, blue
+
+
+def _place(entity: Vehicle | Pedestrian | MiscObject, name: str) -> tuple[int, str]:
+    entries = entity.properties.property if entity.properties else ()
+    return next(((entry.line, entry.source) for entry in entries if entry.name == name), (entity.line, entity.source))

@@ -1,0 +1,364 @@
+"""The world of one run: who stands where, moved from one tick to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType, TracebackType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from eidrive_scenario.errors import Problem, SettingError, SimulationError, suggestion
+from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
+from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.contacts import ContactTracker, Touch, closing_speed
+from eidrive_scenario.world.ground import GroundUnder
+from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
+from eidrive_scenario.world.scenery import Scenery
+from eidrive_scenario.world.view import Contact, WorldView
+from eidrive_scenario.world.camera import Picture
+from eidrive_scenario.world.visuals import Visuals
+
+if TYPE_CHECKING:
+    from eidrive_scenario.roads import RoadNetwork
+
+Array = NDArray[np.float64]
+
+_ROLL = Control()
+
+
+def substeps_per_tick(dt: float, physics_rate: float) -> int:
+    """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them."""
+    exact = dt * physics_rate
+    count = round(exact)
+    if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
+        what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
+        raise SettingError(Problem(what, "choose dt and the rate so that this is a whole number, at least 1"))
+    return count
+
+
+class _Cast(NamedTuple):
+    """What the view says of the actors that stays as long as nobody enters or leaves."""
+
+    names: tuple[str, ...]
+    categories: tuple[str, ...]
+    rows: Mapping[str, int]
+    size: Array
+    offset: Array
+
+
+class World:
+    """Actors on roads, in one pybullet client without a window.
+
+    `step` moves scripted actors exactly to their placements and driven ones by their controls, in physics steps of
+    1 / `physics_rate` seconds. Everything is deterministic. Close it after use, or use it in a `with` statement.
+    """
+
+    def __init__(self, roads: RoadNetwork | None = None, *, dt: float = 0.05, physics_rate: float = 200.0) -> None:
+        self.dt = dt
+        self.tick = 0
+        self._substeps = substeps_per_tick(dt, physics_rate)
+        self._client: int = bullet.connect(bullet.DIRECT)
+        if self._client < 0:
+            raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=dt / self._substeps, deterministicOverlappingPairs=1, physicsClientId=self._client
+        )
+        self._roads = roads
+        self._bodies: dict[str, Body] = {}
+        self._driven: dict[str, DrivenBody] = {}
+        self._friction = 1.0
+        self._tracker = ContactTracker()
+        self._contacts: tuple[Contact, ...] = ()
+        self._view: WorldView | None = None
+        self._rows: dict[str, int] = {}
+        self._in_order: list[Body] = []
+        self._cast: _Cast | None = None
+        self._row_of_handle = np.empty(0, dtype=np.int64)
+        self._broadphase_fresh = False
+        self._scenery = Scenery(self._client, roads)
+        self._visuals: Visuals | None = None
+        self._changed()
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the pybullet client back; the world cannot be used any more."""
+        if self._client >= 0:
+            bullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    @property
+    def time(self) -> float:
+        """The present [s]."""
+        return self.tick * self.dt
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The actors in the order in which they entered."""
+        return tuple(self._bodies)
+
+    def spec(self, name: str) -> ActorSpec:
+        """The body of an actor. Raises SimulationError if it is not in the world."""
+        return self._body(name).spec
+
+    def add(self, spec: ActorSpec, placement: Placement, *, driven: bool = False) -> None:
+        """Bring an actor into the world. Raises SimulationError if one of that name is there already."""
+        if spec.name in self._bodies:
+            raise SimulationError(f"actor {spec.name!r} is in the world already")
+        self._enter(spec, placement, driven)
+        self._contacts = self._contacts + self._tracker.update(self._in_order, {})
+
+    def remove(self, name: str) -> None:
+        """Take an actor out of the world. Raises SimulationError if it is not there."""
+        self._body(name).remove()
+        del self._bodies[name]
+        self._driven.pop(name, None)
+        self._tracker.forget(name)
+        self._changed()
+
+    def set_driven(self, name: str, driven: bool) -> None:
+        """From the next step on the actor moves by controls, or else by placements; its speed carries over."""
+        body = self._body(name)
+        if driven == (name in self._driven):
+            return
+        order = list(self._bodies)
+        placement = Placement(body.x, body.y, body.z, body.yaw, body.pitch, body.roll, body.speed)
+        body.remove()
+        acceleration, yaw_rate, velocity = body.acceleration, body.yaw_rate, body.velocity
+        self._driven.pop(name, None)
+        self._enter(body.spec, placement, driven)
+        entered = self._bodies[name]
+        entered.acceleration, entered.yaw_rate, entered.velocity = acceleration, yaw_rate, velocity
+        self._bodies = {key: self._bodies[key] for key in order}
+        self._changed()
+
+    def set_friction(self, scale: float) -> None:
+        """Scale the grip of all tyres: 1 on a dry road, less on a wet one."""
+        if not scale > 0.0:
+            raise SettingError(Problem(f"the road's friction scale is {scale:g}", "give a number above 0"))
+        self._friction = scale
+
+    def add_building(
+        self, name: str, centre: Vector3, size: Vector3, yaw: float = 0.0, colour: Vector3 | None = None
+    ) -> None:
+        """Put up a building: a box around `centre` [m], length, width, height [m], that stops vehicles and rays."""
+        self._scenery.add_building(name, centre, size, yaw, colour)
+        self._changed()
+
+    def step(self, placements: Mapping[str, Placement], controls: Mapping[str, Control]) -> None:
+        """Move on by one tick. A scripted actor without a placement stands, a driven one without control rolls.
+
+        A placement of a driven actor is a jump. Raises SimulationError for a name that is not in the world.
+        """
+        for name in placements.keys() | controls.keys():
+            self._body(name)
+        for name, body in self._bodies.items():
+            placement = placements.get(name)
+            if isinstance(body, ScriptedBody):
+                if placement is None:
+                    body.rest()
+                else:
+                    body.place(placement)
+            elif placement is not None:
+                self._driven[name].jump(placement)
+        touches = self._drive(controls) if self._driven else {}
+        self.tick += 1
+        self._view = None
+        self._broadphase_fresh = False
+        self._contacts = self._tracker.update(self._in_order, touches)
+
+    def view(self) -> WorldView:
+        """The truth now; the same object until something changes."""
+        if self._view is None:
+            cast = self._cast or self._cast_of_actors()
+            table = np.array([body.row() for body in self._in_order], dtype=float).reshape(-1, 14)
+            table.flags.writeable = False
+            self._view = WorldView(
+                time=self.time,
+                tick=self.tick,
+                names=cast.names,
+                categories=cast.categories,
+                position=table[:, 0:3],
+                yaw=table[:, 3],
+                pitch=table[:, 4],
+                roll=table[:, 5],
+                velocity=table[:, 6:9],
+                acceleration=table[:, 9:12],
+                yaw_rate=table[:, 12],
+                speed=table[:, 13],
+                size=cast.size,
+                offset=cast.offset,
+                contacts=self._contacts,
+            )
+            self._view.__dict__["rows"] = cast.rows
+        return self._view
+
+    def distance(self, first: str, second: str) -> float:
+        """Distance between the boxes of two actors [m], 0 where they touch. Raises SimulationError."""
+        return box_distance(self._body(first).box, self._body(second).box)
+
+    def cast(self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> RayHits:
+        """What rays (M, 3) to (M, 3) meet first; the actors in `ignore` are looked through."""
+        self._refresh()
+        passed = np.array([self.view().rows[name] for name in ignore], dtype=np.int64)
+        begin, end = (np.ascontiguousarray(np.reshape(points, (-1, 3)), dtype=float) for points in (origins, targets))
+        begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
+        return cast_rays(self._client, begin, end, self._row_of_handle, passed)
+
+    def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
+        """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
+        clear: NDArray[np.bool_] = self.cast(origin, targets, ignore).fraction >= 1.0
+        return clear
+
+    def camera(
+        self,
+        pose: Array,
+        width: int,
+        height: int,
+        fov: float,
+        near: float = 0.1,
+        far: float = 300.0,
+        *,
+        ignore: Iterable[str] = (),
+    ) -> Picture:
+        """What a camera sees: rgb, depth and segmentation.
+
+        pose (4, 4) camera to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in
+        `ignore` are not drawn. The first picture of a world makes all meshes; a world without pictures never does.
+        """
+        if self._visuals is None:
+            self._visuals = Visuals(self._client, self._scenery)
+        rows = self.view().rows
+        hidden = frozenset(ignore)
+        shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}
+        return self._visuals.picture(shown, np.asarray(pose, dtype=float), width, height, fov, near, far)
+
+    def _body(self, name: str) -> Body:
+        body = self._bodies.get(name)
+        if body is None:
+            raise SimulationError(f"actor {name!r} is not in the world; {suggestion(name, self._bodies)}")
+        return body
+
+    def _enter(self, spec: ActorSpec, placement: Placement, driven: bool) -> None:
+        if driven:
+            ground = GroundUnder(None if self._scenery.level else self._roads, placement.z)
+            body = DrivenBody(self._client, spec, placement, self.dt, self.dt / self._substeps, ground)
+            self._driven[spec.name] = body
+            self._bodies[spec.name] = body
+        else:
+            self._bodies[spec.name] = ScriptedBody(self._client, spec, placement, self.dt)
+        self._changed()
+
+    def _changed(self) -> None:
+        """Somebody entered or left: what was prepared for the former actors is void."""
+        self._view = self._cast = None
+        self._broadphase_fresh = False
+        self._in_order = list(self._bodies.values())
+        self._rows = {name: row for row, name in enumerate(self._bodies)}
+        highest = max([self._scenery.highest_handle, *(body.handle for body in self._in_order)])
+        self._row_of_handle = np.full(highest + 1, GROUND, dtype=np.int64)
+        for row, body in enumerate(self._in_order):
+            self._row_of_handle[body.handle] = row
+
+    def _cast_of_actors(self) -> _Cast:
+        specs = [body.spec for body in self._in_order]
+        size = np.array([spec.size for spec in specs], dtype=float).reshape(-1, 3)
+        offset = np.array([spec.offset for spec in specs], dtype=float).reshape(-1, 3)
+        size.flags.writeable = offset.flags.writeable = False
+        names, categories = tuple(self._bodies), tuple(spec.category for spec in specs)
+        self._cast = _Cast(names, categories, MappingProxyType(self._rows), size, offset)
+        return self._cast
+
+    def _refresh(self) -> None:
+        """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
+        if not self._broadphase_fresh:
+            bullet.performCollisionDetection(physicsClientId=self._client)
+            self._broadphase_fresh = True
+
+    def _drive(self, controls: Mapping[str, Control]) -> dict[tuple[str, str], Touch]:
+        """All physics steps of this tick; returns the contacts that pybullet resolved in it."""
+        client, friction = self._client, self._friction
+        driven = [(body, controls.get(name, _ROLL)) for name, body in self._driven.items()]
+        passing, watched = self._within_reach()
+        touches: dict[tuple[str, str], Touch] = {}
+        for number in range(self._substeps):
+            for scripted in passing:
+                scripted.pass_through(number / self._substeps)
+            for body, control in driven:
+                body.drive(control, friction)
+            before = {body.handle: body.present_velocity() for body in watched}
+            bullet.stepSimulation(physicsClientId=client)
+            for body in watched:
+                self._note_touches(body, before, touches)
+        for scripted in passing:
+            scripted.settle()
+        for body, _ in driven:
+            body.read_back()
+        bullet.performCollisionDetection(physicsClientId=client)
+        self._broadphase_fresh = True
+        return touches
+
+    def _within_reach(self) -> tuple[list[ScriptedBody], list[DrivenBody]]:
+        """Scripted bodies that move near a driven one, and the driven ones near any other body or a building."""
+        passing: dict[str, ScriptedBody] = {}
+        watched: list[DrivenBody] = []
+        for name, body in self._driven.items():
+            near = self._scenery.near(body.centre_x, body.centre_y, self._reach(body))
+            for other_name, other in self._bodies.items():
+                if other_name == name:
+                    continue
+                dx, dy = other.centre_x - body.centre_x, other.centre_y - body.centre_y
+                reach = self._reach(body) + self._reach(other)
+                if dx * dx + dy * dy <= reach * reach:
+                    near = True
+                    if isinstance(other, ScriptedBody) and other.moved:
+                        passing[other_name] = other
+            if near:
+                watched.append(body)
+        return list(passing.values()), watched
+
+    def _reach(self, body: Body) -> float:
+        """How far any part of a body can be from its centre during a tick, with a margin for blows [m]."""
+        vx, vy, _ = body.velocity
+        return body.radius + (abs(vx) + abs(vy) + 20.0) * self.dt + 1.0
+
+    def _note_touches(
+        self, body: DrivenBody, before: Mapping[int, Vector3], touches: dict[tuple[str, str], Touch]
+    ) -> None:
+        """Add what pybullet resolved between this body and others in the last physics step."""
+        for point in bullet.getContactPoints(body.handle, physicsClientId=self._client):
+            gap, force, other_handle = point[8], point[9], point[2] if point[1] == body.handle else point[1]
+            if gap > 0.0 and force <= 0.0:
+                continue
+            row = self._row_of_handle[other_handle]
+            other = self._in_order[row] if row >= 0 else None
+            pair = self._pair(body, other, other_handle)
+            if pair in touches:
+                continue
+            if other is None:
+                # A wall has no centre that matters: what counts is the speed towards it.
+                sign = 1.0 if point[1] == body.handle else -1.0
+                nx, ny, nz = point[7]
+                speed = closing_speed(before[body.handle], (0.0, 0.0, 0.0), (-sign * nx, -sign * ny, -sign * nz))
+            else:
+                theirs = before.get(other_handle, other.velocity)
+                apart = (other.centre_x - body.centre_x, other.centre_y - body.centre_y, other.centre_z - body.centre_z)
+                speed = closing_speed(before[body.handle], theirs, apart)
+            touches[pair] = Touch(point[5], speed)
+
+    def _pair(self, body: Body, other: Body | None, handle: int) -> tuple[str, str]:
+        """The names of two bodies in the order of the view's rows; a building comes last."""
+        if other is None:
+            return body.name, self._scenery.name_of(handle)
+        first, second = (body, other) if self._rows[body.name] < self._rows[other.name] else (other, body)
+        return first.name, second.name
