@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -66,12 +66,19 @@ def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str
             field = current.model_fields.get(str(part))
             current = field.annotation if field is not None else current
         else:
-            current = next((member for member in get_args(current) if _tagged(member, part)), current)
+            current = next((member for member in _members(current) if _tagged(member, part)), current)
     if isinstance(current, type) and issubclass(current, BaseModel):
         return [name for name, field in current.model_fields.items()] + [
             field.alias for field in current.model_fields.values() if field.alias
         ]
     return []
+
+
+def _members(annotation: Any) -> Iterator[Any]:
+    """The models in a union, however deep it lies in a mapping or a sequence."""
+    for part in get_args(annotation):
+        yield part
+        yield from _members(part)
 
 
 def _tagged(member: Any, tag: int | str) -> bool:
@@ -80,10 +87,25 @@ def _tagged(member: Any, tag: int | str) -> bool:
     return any(tag in get_args(field.annotation) for field in fields.values())
 
 
+class _Loader(yaml.SafeLoader):
+    """YAML's safe loader, which by itself keeps the last of several equal keys."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"{key.value!r} stands here twice", key.start_mark)
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
 def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:
-    """YAML without object tags. Raises SettingError with the line of the mistake, counted from `line` if given."""
+    """YAML without object tags; a key that stands twice is a mistake, as one of its values would be lost.
+
+    Raises SettingError with the line of the mistake, counted from `line` if given.
+    """
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = (line or 1) + mark.line if mark is not None else line

@@ -21,8 +21,6 @@ CROSS_TRACK_GAIN = 1.5
 """How fast an offset from the path decays [1/s]."""
 SOFTENING = 1.0
 """Keeps the steering calm near standstill [m/s]."""
-STEERING_RATE = 1.0
-"""Of the front wheels [rad/s]."""
 STANDSTILL = 0.3
 """Below this speed a vehicle that is to stop holds its brake [m/s]."""
 HOLDING = 1.0
@@ -38,7 +36,6 @@ class Controller:
 
     def __init__(self, spec: ActorSpec, dt: float) -> None:
         self.spec = spec
-        self.dt = dt
         self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt)
         self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt)
         self._steering = 0.0
@@ -73,9 +70,7 @@ class Controller:
         y = float(ego.position[1]) + self.spec.wheelbase * math.sin(ego.yaw)
         heading, left = _nearest(plan.points[:12].tolist(), x, y)
         turn = math.atan2(-CROSS_TRACK_GAIN * left, SOFTENING + max(ego.speed, 0.0))
-        wanted = self._direction.update(wrap_angle(heading - ego.yaw) + turn)
-        most = STEERING_RATE * self.dt
-        self._steering += min(max(wanted - self._steering, -most), most)
+        self._steering = self._direction.update(wrap_angle(heading - ego.yaw) + turn)
         return self._steering
 
 

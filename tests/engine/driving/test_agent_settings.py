@@ -1,0 +1,117 @@
+"""What a controller's Properties may say."""
+
+from __future__ import annotations
+
+import pytest
+
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.openscenario.model.properties import Properties, Property
+from eidrive_scenario.sensing.settings import CameraSettings, Mount, TruthSettings
+
+
+def controller(*entries: tuple[str, str]) -> Controller:
+    """Properties from line 11 on, one a line."""
+    properties = tuple(
+        Property(name=name, value=value, line=11 + index, source="s.xosc")
+        for index, (name, value) in enumerate(entries)
+    )
+    return Controller(name="c", properties=Properties(property=properties), line=9, source="s.xosc")
+
+
+def settings(*entries: tuple[str, str]) -> AgentSettings:
+    return agent_settings(controller(("module", "eidrive"), *entries))
+
+
+def test_the_defaults() -> None:
+    found = settings()
+    assert (found.detector, found.fusion, found.planner, found.cooperates_with) == ("oracle", "average", None, None)
+    assert (found.report_timeout, found.conflict_brake, found.conflict_hold) == (1.0, 5.0, 1.05)
+    assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
+    assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
+
+
+def test_which_controllers_are_ours() -> None:
+    assert is_agent(controller(("module", "eidrive")))
+    assert not is_agent(controller(("module", "other")))
+    assert not is_agent(controller(("esminiController", "SumoController")))
+    assert not is_agent(Controller(name="empty"))
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("RSU", ("RSU",)),
+        ("RSU, Spectator", ("RSU", "Spectator")),
+        ("[RSU, Spectator]", ("RSU", "Spectator")),
+        ("none", ()),
+        ("all", None),
+        ("", None),
+        ("[]", ()),
+    ],
+)
+def test_cooperates_with(text: str, names: tuple[str, ...] | None) -> None:
+    assert settings(("cooperates_with", text)).cooperates_with == names
+
+
+SQUARE = ((29.0, 4.5), (32.0, 4.5), (32.0, 10.5), (29.0, 10.5))
+
+
+@pytest.mark.parametrize(
+    ("text", "areas"),
+    [
+        ("[29, 32, 4.5, 10.5]", (SQUARE,)),
+        ("[[29, 32, 4.5, 10.5]]", (SQUARE,)),
+        ("[[29, 32, 4.5, 10.5], [0, 1, 0, 1]]", (SQUARE, ((0, 0), (1, 0), (1, 1), (0, 1)))),
+        ("[[0, 0], [2, 0], [1, 2]]", (((0, 0), (2, 0), (1, 2)),)),
+        ("[[[0, 0], [2, 0], [1, 2]], [29, 32, 4.5, 10.5]]", (((0, 0), (2, 0), (1, 2)), SQUARE)),
+    ],
+)
+def test_conflict_areas(text: str, areas: object) -> None:
+    assert settings(("planner", "conflict_area"), ("conflict_area", text)).conflict_area == areas
+
+
+def test_sensors_by_kind_and_in_full() -> None:
+    plain = settings(("sensors", "truth, camera"), ("range", "60"), ("field_of_view", "120"), ("mount", "[0, 0, 5]"))
+    sensors = plain.rig_sensors(frozenset({"truth"}))
+    assert sensors["truth"] == TruthSettings(range=60, field_of_view=120, mount=Mount(x=0, y=0, z=5))
+    assert sensors["camera"] == CameraSettings()
+    full = settings(("sensors", "{truth: {range: 70}, front: {kind: camera, width: 320, rate: 10}}"), ("range", "60"))
+    sensors = full.rig_sensors(frozenset({"truth"}))
+    assert sensors["truth"] == TruthSettings(range=70)
+    assert sensors["front"] == CameraSettings(width=320, rate=10)
+
+
+WRONG = [
+    ([("detectr", "oracle")], "s.xosc:12: unknown setting 'detectr'; did you mean 'detector'?"),
+    ([("detector", "oracl")], "s.xosc:12: unknown detector 'oracl'; did you mean 'oracle'?"),
+    ([("planner", "conflictarea")], "s.xosc:12: unknown planner 'conflictarea'; did you mean 'conflict_area'?"),
+    ([("fusion", "mean")], "s.xosc:12: unknown fusion 'mean'"),
+    ([("range", "50"), ("range", "60")], "s.xosc:13: property 'range' is given twice, first in line 12"),
+    ([("range", "far")], "s.xosc:12: setting 'range' is 'far'"),
+    ([("target_speed", "-3")], "s.xosc:12: setting 'target_speed' is -3"),
+    ([("planner", "conflict_area")], "s.xosc:12: planner 'conflict_area' has no area"),
+    ([("conflict_area", "[3, 1, 0, 1]")], "the rectangle [3, 1, 0, 1] is empty"),
+    ([("conflict_area", "[1, 2, 3]")], "an area is [x0, x1, y0, y1]"),
+    ([("conflict_area", "5")], "an area is [x0, x1, y0, y1]"),
+    ([("conflict_area", "[1, 2")], "s.xosc:12: property 'conflict_area' is '[1, 2', which is not valid YAML"),
+    ([("sensors", "truth, radar")], "sensor 'radar' needs a kind"),
+    ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "a station has one truth sensor, found a, b"),
+    ([("sensors", "{truth: {rnge: 5}}")], "s.xosc:12: unknown setting 'sensors.truth.truth.rnge'; did you mean 'range'?"),
+    ([("mount", "[1, 2]")], "a mount has three to five numbers"),
+]
+
+
+@pytest.mark.parametrize(("entries", "message"), WRONG, ids=[str(row[0]) for row in WRONG])
+def test_a_wrong_property_says_where_and_what_would_be_right(entries: list[tuple[str, str]], message: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        settings(*entries)
+    assert message in str(caught.value)
+    assert "s.xosc:" in str(caught.value)
+
+
+def test_all_findings_come_at_once() -> None:
+    with pytest.raises(SettingError) as caught:
+        settings(("detector", "x"), ("colour", "red"), ("range", "-1"))
+    assert [problem.line for problem in caught.value.problems] == [12, 14, 13]

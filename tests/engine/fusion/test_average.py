@@ -1,0 +1,146 @@
+"""Late fusion by hand."""
+
+from __future__ import annotations
+
+import math
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.fusion.association import associate
+from eidrive_scenario.fusion.average import AverageFusion, mean_angle
+from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.registry import registry
+
+
+def report(
+    station: str,
+    *places: tuple[float, float],
+    yaw: float = 0.0,
+    length: float = 4.5,
+    velocity: tuple[float, float] = (math.nan, math.nan),
+    kind: str = "car",
+    covariance: float = math.nan,
+) -> Report:
+    count = len(places)
+    boxes = np.array([(x, y, 0.75, length, 1.8, 1.5, yaw) for x, y in places]).reshape(count, 7)
+    detections = Detections(
+        0.5,
+        boxes,
+        np.ones(count),
+        (kind,) * count,
+        np.array([velocity] * count).reshape(count, 2),
+        np.array([np.eye(2) * covariance] * count).reshape(count, 2, 2),
+    )
+    return Report(station, detections, 0.5)
+
+
+def fuse(*reports: Report) -> Detections:
+    return AverageFusion().fuse(reports, 1.0)
+
+
+def test_three_reports_of_one_car_give_one_box() -> None:
+    """The published code pairs boxes and leaves the third one over."""
+    fused = fuse(report("A", (10.0, 0.0)), report("B", (11.0, 0.6)), report("C", (12.0, 0.0)))
+    assert len(fused) == 1
+    np.testing.assert_allclose(fused.boxes[0, :3], [11.0, 0.2, 0.75])
+    assert fused.time == 1.0
+
+
+def test_position_size_and_velocity_are_means_and_yaw_is_one_on_the_circle() -> None:
+    fused = fuse(
+        report("A", (10, 0), yaw=math.radians(179), length=4.0, velocity=(2.0, 0.0), covariance=1.0),
+        report("B", (12, 0), yaw=math.radians(-177), length=5.0),
+        report("C", (11, 3), yaw=math.radians(-179), length=4.5, velocity=(4.0, 1.0), covariance=2.0),
+    )
+    np.testing.assert_allclose(fused.boxes[0, :6], [11, 1, 0.75, 4.5, 1.8, 1.5])
+    assert fused.boxes[0, 6] == pytest.approx(math.radians(-179), abs=1e-4)
+    np.testing.assert_allclose(fused.velocity, [[3.0, 0.5]])
+    np.testing.assert_allclose(fused.covariance[0], np.eye(2) * 1.5)
+
+
+def test_a_lone_box_stays_as_it_is() -> None:
+    fused = fuse(report("A", (10, 0)), report("B", (30, 0), yaw=1.0, velocity=(1.0, 2.0), kind="truck"))
+    assert len(fused) == 2
+    np.testing.assert_array_equal(fused.boxes[1], [30, 0, 0.75, 4.5, 1.8, 1.5, 1.0])
+    np.testing.assert_array_equal(fused.velocity[1], [1.0, 2.0])
+    assert np.isnan(fused.velocity[0]).all()
+    assert fused.classes == ("car", "truck")
+
+
+def test_the_gate_is_four_metres() -> None:
+    assert len(fuse(report("A", (10, 0)), report("B", (13.99, 0)))) == 1
+    assert len(fuse(report("A", (10, 0)), report("B", (14.0, 0)))) == 2
+
+
+def test_two_cars_of_one_station_stay_two_however_near() -> None:
+    fused = fuse(report("A", (10, 0), (10, 2.5)), report("B", (10, 0.2), (10, 2.7)))
+    assert len(fused) == 2
+    np.testing.assert_allclose(np.sort(fused.boxes[:, 1]), [0.1, 2.6])
+    assert len(fuse(report("A", (10, 0), (10, 2.5)))) == 2
+
+
+def test_each_box_goes_to_one_object_with_the_least_total_distance() -> None:
+    """B's middle box is nearest to A's left one, but then its right one would find none within the gate."""
+    pairs = associate(
+        np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]), np.array([[2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]]), gate=4.0
+    )
+    assert sorted(pairs) == [(0, 1), (1, 0)]
+    assert associate(np.zeros((1, 3)), np.array([[3.0, 0, 0], [1.0, 0, 0]]), gate=4.0) == [(0, 1)]
+    assert associate(np.empty((0, 3)), np.zeros((2, 3)), gate=4.0) == []
+
+
+def test_classes_are_not_compared_and_the_most_frequent_one_wins() -> None:
+    fused = fuse(
+        report("A", (10, 0), kind="van"), report("B", (10, 0), kind="truck"), report("C", (10, 0), kind="truck")
+    )
+    assert fused.classes == ("truck",)
+
+
+def test_no_reports_and_empty_ones() -> None:
+    assert len(fuse()) == 0
+    assert len(fuse(report("A"), report("B"))) == 0
+    assert len(fuse(report("A"), report("B", (1, 1)))) == 1
+
+
+def test_opposite_directions_cancel_out_to_the_first() -> None:
+    assert mean_angle([0.3, 0.3 + math.pi]) == 0.3
+
+
+PLACES = st.lists(st.tuples(st.floats(-60, 60), st.floats(-60, 60)), max_size=5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(PLACES, PLACES, PLACES)
+def test_the_order_of_the_reports_does_not_matter(a: list, b: list, c: list) -> None:  # type: ignore[type-arg]
+    reports = [report("A", *a), report("B", *b), report("C", *c)]
+    first = fuse(*reports)
+    most = max(len(a), len(b), len(c))
+    assert most <= len(first) <= len(a) + len(b) + len(c)
+    for order in permutations(reports):
+        other = fuse(*order)
+        np.testing.assert_array_equal(first.boxes, other.boxes)
+        assert first.classes == other.classes
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(-3, 3), st.floats(-50, 50), st.floats(-50, 50))
+def test_turning_and_shifting_the_world_turns_and_shifts_the_result(angle: float, dx: float, dy: float) -> None:
+    places = {"A": [(10.0, 0.0), (30.0, 5.0)], "B": [(11.0, 1.0), (31.0, 4.0)], "C": [(10.5, -1.0)]}
+    cos, sin = math.cos(angle), math.sin(angle)
+
+    def moved(x: float, y: float) -> tuple[float, float]:
+        return cos * x - sin * y + dx, sin * x + cos * y + dy
+
+    plain = fuse(*(report(name, *points) for name, points in places.items()))
+    turned = fuse(*(report(name, *(moved(*point) for point in points), yaw=angle) for name, points in places.items()))
+    np.testing.assert_allclose(turned.boxes[:, :2], [moved(*box[:2]) for box in plain.boxes], atol=1e-9)
+    np.testing.assert_allclose(np.cos(turned.boxes[:, 6] - angle), 1.0)
+
+
+def test_it_comes_through_its_entry_point() -> None:
+    assert registry("fusion").load("average") is AverageFusion
