@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 
 T = TypeVar("T")
@@ -36,7 +37,7 @@ def jobs_of(scenario: str, arms: dict[str, RunSettings], seeds: Sequence[int]) -
 
 def run_job(job: Job) -> RunResult:
     """The plain task: run it, keep the result."""
-    return run_file(job.scenario, seed=job.seed, settings=job.settings)
+    return run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings)
 
 
 def cores() -> int:

@@ -1,0 +1,142 @@
+"""The main job: the paper's scenarios 1 and 2 in all arms, the tables on the terminal, and a page with pictures.
+
+python -m eidrive_scenario.reporting.demo --out reports/demo.html
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from eidrive_scenario.driving.settings import agent_settings, is_agent
+from eidrive_scenario.errors import EidriveError, InputError
+from eidrive_scenario.experiments.paper import (
+    EGO,
+    HIDDEN,
+    LINKS,
+    OWN,
+    SCENARIOS,
+    Table,
+    checks,
+    difference,
+    run_settings,
+    tabulate,
+)
+from eidrive_scenario.experiments.repetitions import Job, jobs_of, repeat
+from eidrive_scenario.experiments.tables import render
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.reporting.demo_page import CameraPicture, Place, write_demo
+from eidrive_scenario.reporting.key_frames import KeyFrames, Story
+from eidrive_scenario.reporting.road_drawing import road_drawing
+from eidrive_scenario.reporting.street_view import driver_view, helper_view, street_picture
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
+
+Told = tuple[RunResult, Story | None]
+
+
+def tell(job: Job, watched: int) -> Told:
+    """Run a job; the runs of the seed `watched` also tell their story."""
+    path = resolve_scenario(job.scenario)
+    if job.seed != watched:
+        return run_file(path, seed=job.seed, settings=job.settings), None
+    observer = KeyFrames(EGO, HIDDEN)
+    result = run_file(path, seed=job.seed, settings=job.settings, observers=(observer,))
+    return result, observer.story()
+
+
+def place_of(name: str, seed: int, story: Story) -> Place:
+    """What the pictures of a scenario share, and camera pictures out of one of its runs."""
+    scenario = load_for_seed(resolve_scenario(name), seed, RunSettings().parameters)
+    roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+    areas = [
+        np.array(polygon)
+        for controller in scenario.controllers.get(EGO, ())
+        if is_agent(controller)
+        for polygon in agent_settings(controller).conflict_area or ()
+    ]
+    drawing = road_drawing(roads.roads.values() if roads is not None else ())
+    return Place(drawing, tuple(areas), _views(scenario, roads, story))
+
+
+def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple[CameraPicture, ...]:
+    """The street at the instant in which the ego brakes, as it and its helper see it."""
+    snapshot = story.moment("braked").snapshot or story.moment("seen").snapshot
+    if snapshot is None:
+        return ()
+    view, pictures = snapshot.view, []
+    pose = driver_view(view, EGO)
+    pictures.append(
+        CameraPicture(
+            f"What {EGO} sees",
+            f"at {view.time:.2f} s, when it brakes for a car that it has only heard of",
+            street_picture(scenario, roads, view, pose, without=EGO),
+        )
+    )
+    for sender in (heard.message.sender for heard in snapshot.heard):
+        pose = helper_view(view, sender, HIDDEN)
+        png = street_picture(scenario, roads, view, pose, without=sender)
+        pictures.append(CameraPicture(f"What {sender} sees", f"at {view.time:.2f} s, looking at {HIDDEN}", png))
+    return tuple(pictures[:2])
+
+
+def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
+    """All results as JSON, one object a run as `--json` prints it. Returns `out`."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    objects = [{**result.as_json(), "scenario": job.scenario} for job, result in runs]
+    out.write_text(json.dumps(objects, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return out
+
+
+def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console) -> tuple[Table, Table]:
+    """Run everything, print the tables, write the page and its numbers (`.json` beside it)."""
+    settings = run_settings(detector="oracle")
+    jobs = [job for scenario in SCENARIOS for job in jobs_of(scenario, settings, seeds)]
+    console.print(f"{len(SCENARIOS)} scenarios, {len(settings)} channels, {len(seeds)} seeds: {len(jobs)} runs")
+    answers = repeat(jobs, partial(tell, watched=seeds[0]), workers=workers, console=console, title="demo")
+    runs = [(job, result) for job, (result, _) in zip(jobs, answers, strict=True)]
+    stories: Mapping[tuple[str, str], Story] = {
+        (job.scenario, job.arm): story for job, (_, story) in zip(jobs, answers, strict=True) if story is not None
+    }
+    links, own = tabulate(runs, LINKS), tabulate(runs, OWN)
+    console.print()
+    for table in (links, own):
+        console.print(render(table, checks(table)))
+    console.print(Text(difference(links, own)))
+    places = {name: place_of(name, seeds[0], stories[name, "ideal"]) for name in SCENARIOS}
+    footer = f"eidrive-scenario {version('eidrive-scenario')}, seeds {seeds[0]} to {seeds[-1]}"
+    page = write_demo(out, links, own, stories, places, watched=seeds[0], footer=footer)
+    numbers = write_results(out.with_suffix(".json"), runs)
+    console.print(f"\nwritten: {page}, {numbers}")
+    return links, own
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; exit codes as those of `eidrive run`: 0 done, 2 wrong input, 3 broken."""
+    parser = argparse.ArgumentParser(prog="python -m eidrive_scenario.reporting.demo", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("reports/demo.html"), help="the page")
+    parser.add_argument("--seeds", type=int, default=20, help="runs of each arm, with seeds from 1 on")
+    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
+    given = parser.parse_args(arguments)
+    if given.seeds < 1 or (given.workers is not None and given.workers < 1):
+        parser.error("--seeds and --workers need at least 1")
+    try:
+        demo(given.out, range(1, given.seeds + 1), given.workers, Console())
+    except EidriveError as error:
+        Console(stderr=True).print(Text(str(error), style="red"))
+        return 2 if isinstance(error, InputError) else 3
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,103 @@
+"""The page of the demo, from tables and stories made by hand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from lxml import html
+
+from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, Rule, Table
+from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.demo_page import CameraPicture, Place, write_demo
+from eidrive_scenario.reporting.key_frames import KeyFrames, Story
+from eidrive_scenario.reporting.top_view import RoadDrawing
+
+AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
+
+
+def table(rule: Rule) -> Table:
+    cells = []
+    for (scenario, name), published in PUBLISHED.items():
+        arm = next(arm for arm in ARMS if arm.name == name)
+        centres = published.episodes
+        boxes = tuple(max(0.0, centre - 3.4) for centre in centres)
+        free = sum(box > 0 for box in boxes)
+        cells.append(Cell(scenario, arm, (1, 2, 3, 4, 5), centres, boxes, wilson(free, 5), published))
+    return Table(rule, tuple(cells))
+
+
+def story(frames: list[Frame]) -> Story:
+    observer = KeyFrames("Ego", "Incoming")
+    for frame in frames:
+        observer.observe(frame)
+    return observer.story()
+
+
+@pytest.fixture(scope="module")
+def page(street: Callable[..., list[Frame]], tmp_path_factory: pytest.TempPathFactory) -> str:
+    delays = {"none": None, "cooperation": 1, "latency": 6, "error": 2}
+    stories = {
+        (scenario, arm.channel(rule)): story(street(delays[arm.name]))
+        for scenario in SCENARIOS
+        for rule in RULES
+        for arm in ARMS
+    }
+    view = CameraPicture("What Ego sees", "a <truck>", b"\x89PNG")
+    place = Place(RoadDrawing(lanes=(("driving", AREA),)), (AREA,), (view,))
+    out = tmp_path_factory.mktemp("demo") / "reports" / "demo.html"
+    write_demo(out, table(LINKS), table(OWN), stories, dict.fromkeys(SCENARIOS, place), watched=1, footer="version 1")
+    return out.read_text(encoding="utf-8")
+
+
+def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert "<link" not in page
+    assert "<script" not in page
+    assert all(address.startswith(("#", "data:")) for address in re.findall(r'(?:href|src)="([^"]*)"', page))
+
+
+def test_every_arm_has_four_pictures_or_says_why_not(page: str) -> None:
+    root = html.fromstring(page)
+    strips = [strip for strip in root.iterfind(".//div[@class='strip']")]
+    assert len(strips) == len(SCENARIOS) * len(RULES) * len(ARMS)
+    assert all(len(strip.findall("figure")) == 4 for strip in strips)
+    silent = [figure.text_content().strip() for figure in strips[0].iterfind("figure[@class='empty']")]
+    assert silent == ["Ego never hears of Incoming", "Ego never brakes for it"]
+
+
+def test_captions_tell_time_distance_and_speed(page: str) -> None:
+    captions = [caption.text_content() for caption in html.fromstring(page).iterfind(".//figcaption")]
+    assert any(re.fullmatch(r"Ego hears of it from RSUat 1\.45 s, 26\.\d m between centres, .*", c) for c in captions)
+
+
+def test_tables_stand_beside_the_papers_numbers(page: str) -> None:
+    rows = [
+        [" ".join(cell.text_content().split()) for cell in row.iterfind("td")]
+        for row in html.fromstring(page).iterfind(".//tbody/tr")
+    ]
+    assert len(rows) == len(RULES) * len(PUBLISHED)
+    assert rows[3] == [
+        *("error 30 %", "3.15", "1.07", "1.82", "0.38", "0.00", "3/5", "0.23 … 0.88", "3.15 ± 1.07"),
+    ]
+
+
+def test_roads_are_drawn_once_for_each_scenario(page: str) -> None:
+    for name in ("roads-coop-scenario-1", "roads-coop-scenario-2"):
+        assert page.count(f'id="{name}"') == 1
+        assert page.count(f'href="#{name}"') > 10
+
+
+def test_checks_the_sentence_and_a_chart_per_table_are_there(page: str) -> None:
+    root = html.fromstring(page)
+    assert len(root.findall(".//li[@class='holds']")) == 12
+    assert "Delaying and dropping the ego's own detections" in root.text_content()
+    assert len(root.findall(".//svg[@class='chart']")) == 4
+
+
+def test_camera_pictures_are_inside_and_their_captions_escaped(page: str) -> None:
+    assert page.count("data:image/png;base64,iVBORw==") == 2
+    assert "a &lt;truck&gt;" in page
