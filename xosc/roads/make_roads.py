@@ -1,0 +1,470 @@
+"""Writes the roads of the scenario library: `python xosc/roads/make_roads.py` from the checkout.
+
+Each file is a crossing of two straight streets with the lanes of one of the paper's places. Frame: the ego vehicle
+starts at the origin and drives along x; y points left. Metres throughout. Connecting roads lead along lane centres:
+straight on for every lane, right from the outermost lane, left from the innermost; a turn is a line, then clothoid, arc
+and clothoid, so that the curvature has no jump.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from lxml import etree
+
+from eidrive_scenario.roads import curves
+
+LANE = 3.5
+SIDEWALK = 2.0
+KERB = 0.12
+CLOTHOID = math.radians(25.0)
+"""Part of a quarter turn that each of the two clothoids takes."""
+CORNER_MARGIN = 1.0
+"""Width between a right turn's lane and the kerb in the middle of the turn."""
+SPEED_LIMIT = "50"
+PROJECTION = "+proj=tmerc +lat_0=49 +lon_0=8 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
+"""The places are not tied to the globe; a projection lets V2X messages carry latitude and longitude."""
+
+Element = etree._Element
+
+
+@dataclass(frozen=True)
+class LaneSpec:
+    """One lane of a street: type, width and the marking on its outer edge (type, colour)."""
+
+    type: str
+    width: float
+    mark: tuple[str, str] = ("none", "white")
+
+
+@dataclass(frozen=True)
+class Street:
+    """The lanes of a street, from lane 0 outwards."""
+
+    left: tuple[LaneSpec, ...]
+    right: tuple[LaneSpec, ...]
+    centre: tuple[str, str]
+
+    def side(self, sign: int) -> tuple[LaneSpec, ...]:
+        return self.left if sign > 0 else self.right
+
+    def centre_of(self, lane: int) -> float:
+        """t of a lane's centre."""
+        specs = self.side(lane)
+        sign = 1 if lane > 0 else -1
+        return sign * (sum(spec.width for spec in specs[: abs(lane) - 1]) + specs[abs(lane) - 1].width / 2)
+
+    def driving(self, sign: int) -> list[int]:
+        """Ids of the driving lanes on one side, from the innermost."""
+        return [sign * (i + 1) for i, spec in enumerate(self.side(sign)) if spec.type == "driving"]
+
+    def edge(self, sign: int) -> float:
+        """|t| of the outer edge of the last driving lane."""
+        last = self.driving(sign)[-1]
+        return abs(self.centre_of(last)) + LANE / 2
+
+    def verge(self, sign: int) -> float:
+        """Width between the last driving lane and the sidewalk."""
+        specs = self.side(sign)[abs(self.driving(sign)[-1]) :]
+        return sum(spec.width for spec in specs if spec.type != "sidewalk")
+
+
+DRIVING_INNER = LaneSpec("driving", LANE, ("broken", "white"))
+DRIVING_OUTER = LaneSpec("driving", LANE, ("solid", "white"))
+GUTTER = LaneSpec("shoulder", 0.63, ("curb", "standard"))
+WALK = LaneSpec("sidewalk", SIDEWALK)
+AVENUE_SIDE = (DRIVING_INNER, DRIVING_OUTER, LaneSpec("shoulder", 2.5), GUTTER, WALK)
+AVENUE = Street(
+    left=(LaneSpec("bidirectional", LANE, ("solid broken", "yellow")), *AVENUE_SIDE),
+    right=AVENUE_SIDE,
+    centre=("broken solid", "yellow"),
+)
+"""Two lanes each way around a shared left-turn lane."""
+SIDE_STREET_SIDE = (DRIVING_OUTER, LaneSpec("parking", 3.5), LaneSpec("shoulder", 0.5), GUTTER, WALK)
+SIDE_STREET = Street(left=SIDE_STREET_SIDE, right=SIDE_STREET_SIDE, centre=("solid solid", "yellow"))
+"""One lane each way with parking on both sides."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A street up to (contact 'end') or from (contact 'start') the junction; its reference line points along `heading`.
+
+    x, y  where the reference line starts; approach  side of the lanes that lead to the junction: -1 right, +1 left
+    """
+
+    id: str
+    name: str
+    street: Street
+    x: float
+    y: float
+    heading: float
+    length: float
+    contact: str
+    right: str = ""
+    left: str = ""
+    ahead: str = ""
+
+    @property
+    def approach(self) -> int:
+        return -1 if self.contact == "end" else 1
+
+    def mouth(self, lane: int) -> tuple[float, float]:
+        """Where a lane's centre meets the junction."""
+        s, t = (self.length if self.contact == "end" else 0.0), self.street.centre_of(lane)
+        cos, sin = math.cos(self.heading), math.sin(self.heading)
+        return self.x + cos * s - sin * t, self.y + sin * s + cos * t
+
+    @property
+    def inward(self) -> float:
+        """Heading of traffic that enters the junction here."""
+        return self.heading if self.contact == "end" else self.heading + math.pi
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """The ego's street along x with its lane 0 at y = `y`, another along y with its lane 0 at x = `x`.
+
+    box  where the arms meet the junction: near x, far x, right y, left y; reach  where the arms end, in that order
+    """
+
+    name: str
+    ego_street: Street
+    cross_street: Street
+    y: float
+    x: float
+    box: tuple[float, float, float, float]
+    reach: tuple[float, float, float, float]
+    lights: bool
+
+    def arms(self) -> dict[str, Arm]:
+        near, far, right, left = self.box
+        near_end, far_end, right_end, left_end = self.reach
+        quarter = math.pi / 2
+        e, c = self.ego_street, self.cross_street
+        arms = (
+            Arm("1", "near", e, near_end, self.y, 0.0, near - near_end, "end", "4", "3", "2"),
+            Arm("2", "far", e, far, self.y, 0.0, far_end - far, "start", "3", "4", "1"),
+            Arm("3", "left", c, self.x, left, quarter, left_end - left, "start", "1", "2", "4"),
+            Arm("4", "right", c, self.x, right_end, quarter, right - right_end, "end", "2", "1", "3"),
+        )
+        return {arm.id: arm for arm in arms}
+
+
+CROSSINGS = (
+    Crossing(
+        name="coop_1",
+        ego_street=SIDE_STREET,
+        cross_street=AVENUE,
+        y=1.75,
+        x=38.25,
+        box=(20.0, 54.5, -11.5, 14.5),
+        reach=(-80.0, 134.5, -101.5, 114.5),
+        lights=False,
+    ),
+    Crossing(
+        name="coop_2",
+        ego_street=AVENUE,
+        cross_street=SIDE_STREET,
+        y=1.75,
+        x=26.75,
+        box=(13.4, 39.9, -13.7, 23.5),
+        reach=(-80.0, 129.9, -103.7, 113.5),
+        lights=True,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Way:
+    """A connecting road: lanes of one arm to lanes of another."""
+
+    start: Arm
+    end: Arm
+    lanes: tuple[tuple[int, int], ...]
+    turn: str
+
+
+def ways(arms: dict[str, Arm]) -> Iterator[Way]:
+    """All movements of a crossing."""
+    for arm in arms.values():
+        entering = arm.street.driving(arm.approach)
+        for turn, other in (("ahead", arms[arm.ahead]), ("right", arms[arm.right]), ("left", arms[arm.left])):
+            leaving = other.street.driving(-other.approach)
+            if turn == "ahead":
+                yield Way(arm, other, tuple(zip(entering, leaving, strict=True)), turn)
+            else:
+                yield Way(
+                    arm, other, ((entering[-1], leaving[-1]) if turn == "right" else (entering[0], leaving[0]),), turn
+                )
+
+
+def course(way: Way) -> list[curves.Curve]:
+    """The centre line of the way's first lane."""
+    (x, y), (x_end, y_end) = way.start.mouth(way.lanes[0][0]), way.end.mouth(way.lanes[0][1])
+    heading = way.start.inward
+    along = math.cos(heading) * (x_end - x) + math.sin(heading) * (y_end - y)
+    across = math.cos(heading) * (y_end - y) - math.sin(heading) * (x_end - x)
+    if way.turn == "ahead":
+        return [curves.Arc(0.0, x, y, heading, along)]
+    sign = 1.0 if way.turn == "left" else -1.0
+    tangent = min(along, abs(across))
+    pieces = [("line", along - tangent), *_quarter_turn(tangent), ("line", abs(across) - tangent)]
+    found: list[curves.Curve] = []
+    s, curvature = 0.0, 0.0
+    for kind, length, *target in pieces:
+        if length < 1e-9:
+            continue
+        if kind == "spiral":
+            found.append(curves.spiral(s, x, y, heading, length, curvature, sign * target[0]))
+            curvature = sign * target[0]
+        else:
+            found.append(curves.Arc(s, x, y, heading, length, curvature))
+        x, y, heading, *_ = found[-1].at(length)
+        s += length
+    return found
+
+
+def _quarter_turn(tangent: float) -> list[tuple[str, float] | tuple[str, float, float]]:
+    """Clothoid, arc and clothoid that turn by 90° and use up `tangent` metres of both straight lines."""
+    spiral_length, arc_length = 2.0 * CLOTHOID, math.pi / 2 - 2.0 * CLOTHOID
+    x, y, h = 0.0, 0.0, 0.0
+    for start, end, length in ((0.0, 1.0, spiral_length), (1.0, 1.0, arc_length), (1.0, 0.0, spiral_length)):
+        x, y, h, *_ = curves.spiral(0.0, x, y, h, length, start, end).at(length)
+    radius = tangent / x
+    return [
+        ("spiral", spiral_length * radius, 1.0 / radius),
+        ("arc", arc_length * radius),
+        ("spiral", spiral_length * radius, 0.0),
+    ]
+
+
+def text(value: float) -> str:
+    """A number as the files write it."""
+    return f"{value + 0.0:.12g}"
+
+
+def add(parent: Element, tag: str, **attributes: str | float) -> Element:
+    """A new child element."""
+    return etree.SubElement(
+        parent, tag, {key.rstrip("_"): text(v) if isinstance(v, float) else str(v) for key, v in attributes.items()}
+    )
+
+
+def add_width(lane: Element, pieces: Sequence[tuple[float, float, float, float, float]]) -> None:
+    for s, a, b, c, d in pieces:
+        add(lane, "width", sOffset=s, a=a, b=b, c=c, d=d)
+
+
+def eased(start: float, middle: float, end: float, length: float) -> list[tuple[float, float, float, float, float]]:
+    """A width that goes from start over middle to end without a kink."""
+    pieces = []
+    half = length / 2
+    for s, a, b in ((0.0, start, middle), (half, middle, end)):
+        pieces.append((s, a, 0.0, 3.0 * (b - a) / half**2, -2.0 * (b - a) / half**3))
+    return pieces
+
+
+def add_mark(lane: Element, mark: tuple[str, str]) -> None:
+    change = "both" if mark[0] in ("broken", "none") else "none"
+    add(lane, "roadMark", sOffset=0.0, type=mark[0], weight="standard", color=mark[1], width=0.13, laneChange=change)
+
+
+def add_lane(side: Element, number: int, spec: LaneSpec) -> Element:
+    lane = add(side, "lane", id=number, type=spec.type, level="false")
+    add(lane, "link")
+    add_width(lane, [(0.0, spec.width, 0.0, 0.0, 0.0)])
+    add_mark(lane, spec.mark)
+    if spec.type == "sidewalk":
+        add(lane, "height", sOffset=0.0, inner=KERB, outer=KERB)
+    return lane
+
+
+def add_road(root: Element, number: str, name: str, length: float, junction: str) -> tuple[Element, Element, Element]:
+    """A road with its fixed children; returns the road, its link and its planView."""
+    road = add(root, "road", rule="RHT", name=name, length=length, id=number, junction=junction)
+    link = add(road, "link")
+    kind = add(road, "type", s=0.0, type="town")
+    add(kind, "speed", max=SPEED_LIMIT, unit="km/h")
+    plan = add(road, "planView")
+    add(add(road, "elevationProfile"), "elevation", s=0.0, a=0.0, b=0.0, c=0.0, d=0.0)
+    add(road, "lateralProfile")
+    return road, link, plan
+
+
+def write_arm(root: Element, arm: Arm, crossing: Crossing) -> None:
+    road, link, plan = add_road(root, arm.id, arm.name, arm.length, "-1")
+    add(link, "successor" if arm.contact == "end" else "predecessor", elementType="junction", elementId="100")
+    geometry = add(plan, "geometry", s=0.0, x=arm.x, y=arm.y, hdg=arm.heading, length=arm.length)
+    add(geometry, "line")
+    section = add(add(road, "lanes"), "laneSection", s=0.0)
+    left = add(section, "left")
+    for i in range(len(arm.street.left), 0, -1):
+        add_lane(left, i, arm.street.left[i - 1])
+    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(centre, "link")
+    add_mark(centre, arm.street.centre)
+    right = add(section, "right")
+    for i, spec in enumerate(arm.street.right, start=1):
+        add_lane(right, -i, spec)
+    write_furniture(road, arm, crossing)
+
+
+def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
+    """Crosswalk, stop line, and a stop sign or a traffic light, for the traffic that enters the junction."""
+    sign = arm.approach
+    end, back = (arm.length, -1.0) if arm.contact == "end" else (0.0, 1.0)
+    kerbs = [side * (arm.street.edge(side) + arm.street.verge(side)) for side in (-1, 1)]
+    inner = min(abs(arm.street.centre_of(lane)) for lane in arm.street.driving(sign)) - LANE / 2
+    lanes = arm.street.driving(sign)
+    objects = add(road, "objects")
+    write_area(objects, "0", "crosswalk", end + back * 0.8, end + back * 3.8, kerbs[0], kerbs[1])
+    write_area(objects, "1", "roadMark", end + back * 5.0, end + back * 5.4, sign * inner, sign * arm.street.edge(sign))
+    kind = ("1000001", "-1", "yes", 0.86, 0.3, "light") if crossing.lights else ("206", "-1", "no", 0.75, 0.75, "stop")
+    signal = add(
+        add(road, "signals"),
+        "signal",
+        s=end + back * 4.4,
+        t=sign * (arm.street.edge(sign) + arm.street.verge(sign) + 0.5),
+        id=f"{arm.id}0",
+        name=f"{kind[5]} {arm.name}",
+        dynamic=kind[2],
+        orientation="+" if sign < 0 else "-",
+        zOffset=2.4,
+        country="DE",
+        type=kind[0],
+        subtype=kind[1],
+        height=kind[3],
+        width=kind[4],
+        hOffset=0.0,
+        pitch=0.0,
+        roll=0.0,
+    )
+    add(signal, "validity", fromLane=min(lanes), toLane=max(lanes))
+
+
+def write_area(objects: Element, number: str, kind: str, s: float, s_end: float, t: float, t_end: float) -> None:
+    """A painted area of the road between two s and two t."""
+    middle, across = (s + s_end) / 2, (t + t_end) / 2
+    item = add(
+        objects,
+        "object",
+        id=number,
+        name=kind,
+        type=kind,
+        s=middle,
+        t=across,
+        zOffset=0.0,
+        orientation="none",
+        length=abs(s_end - s),
+        width=abs(t_end - t),
+        height=0.0,
+        hdg=0.0,
+        pitch=0.0,
+        roll=0.0,
+    )
+    outline = add(add(item, "outlines"), "outline", id=0, fillType="paint", closed="true")
+    for i, (corner_s, corner_t) in enumerate(((s, t), (s_end, t), (s_end, t_end), (s, t_end))):
+        add(outline, "cornerRoad", id=i, s=corner_s, t=corner_t, dz=0.0, height=0.0)
+
+
+def write_way(root: Element, number: str, way: Way) -> None:
+    line = course(way)
+    length = sum(curve.length for curve in line)
+    road, link, plan = add_road(root, number, f"{way.start.name} {way.turn}", length, "100")
+    for tag, arm in (("predecessor", way.start), ("successor", way.end)):
+        add(link, tag, elementType="road", elementId=arm.id, contactPoint=arm.contact)
+    for curve in line:
+        geometry = add(plan, "geometry", s=curve.s, x=curve.x, y=curve.y, hdg=curve.h, length=curve.length)
+        if isinstance(curve, curves.Spiral):
+            add(geometry, "spiral", curvStart=curve.curvature, curvEnd=curve.curvature + curve.rate * curve.length)
+        elif isinstance(curve, curves.Arc) and curve.curvature:
+            add(geometry, "arc", curvature=curve.curvature)
+        else:
+            add(geometry, "line")
+    lanes = add(road, "lanes")
+    add(lanes, "laneOffset", s=0.0, a=LANE / 2, b=0.0, c=0.0, d=0.0)
+    section = add(lanes, "laneSection", s=0.0)
+    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(centre, "link")
+    add_mark(centre, ("none", "white"))
+    right = add(section, "right")
+    for i, (before, after) in enumerate(way.lanes, start=1):
+        lane = add_lane(right, -i, replace(DRIVING_INNER, mark=("none", "white")))
+        ends = lane.find("link")
+        assert ends is not None
+        add(ends, "predecessor", id=before)
+        add(ends, "successor", id=after)
+    if way.turn == "right":
+        write_corner(right, way, length)
+
+
+def write_corner(right: Element, way: Way, length: float) -> None:
+    """Between a right turn's lane and the corner: a margin up to the kerb, then the sidewalk."""
+    start = way.start.street.verge(way.start.approach)
+    end = way.end.street.verge(-way.end.approach)
+    margin = add_lane(right, -2, LaneSpec("shoulder", start, ("curb", "standard")))
+    for old in margin.findall("width"):
+        margin.remove(old)
+    for i, (s, a, b, c, d) in enumerate(eased(start, CORNER_MARGIN, end, length)):
+        width = etree.Element("width")
+        for key, value in (("sOffset", s), ("a", a), ("b", b), ("c", c), ("d", d)):
+            width.set(key, text(value))
+        margin.insert(1 + i, width)
+    add_lane(right, -3, WALK)
+
+
+def write(crossing: Crossing, path: Path) -> None:
+    """The OpenDRIVE file of a crossing."""
+    arms = crossing.arms()
+    near_end, far_end, right_end, left_end = crossing.reach
+    root = etree.Element("OpenDRIVE")
+    header = add(
+        root,
+        "header",
+        revMajor=1,
+        revMinor=6,
+        name=crossing.name,
+        version="1.00",
+        date="2025-01-01T00:00:00",
+        north=left_end,
+        south=right_end,
+        east=far_end,
+        west=near_end,
+        vendor="eidrive-scenario",
+    )
+    add(header, "geoReference").text = etree.CDATA(PROJECTION)
+    for arm in arms.values():
+        write_arm(root, arm, crossing)
+    found = [(str(101 + i), way) for i, way in enumerate(ways(arms))]
+    for number, way in found:
+        write_way(root, number, way)
+    if crossing.lights:
+        for number, pair in (("1", ("1", "2")), ("2", ("3", "4"))):
+            controller = add(root, "controller", id=number, name=f"phase {number}", sequence=int(number) - 1)
+            for arm_id in pair:
+                add(controller, "control", signalId=f"{arm_id}0", type="0")
+    junction = add(root, "junction", id="100", name=crossing.name, type="default")
+    for i, (number, way) in enumerate(found):
+        connection = add(
+            junction, "connection", id=i, incomingRoad=way.start.id, connectingRoad=number, contactPoint="start"
+        )
+        for lane, (before, _) in enumerate(way.lanes, start=1):
+            add(connection, "laneLink", from_=before, to=-lane)
+    if crossing.lights:
+        for i, number in enumerate(("1", "2")):
+            add(junction, "controller", id=number, type="0", sequence=i)
+    tree = etree.ElementTree(root)
+    etree.indent(tree, "  ")
+    tree.write(str(path), xml_declaration=True, encoding="UTF-8")
+
+
+def main() -> None:
+    for crossing in CROSSINGS:
+        write(crossing, Path(__file__).parent / f"{crossing.name}.xodr")
+
+
+if __name__ == "__main__":
+    main()
