@@ -1,0 +1,114 @@
+"""`eidrive run`: verdicts, exit codes, files."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from eidrive_scenario.recording import read_recording
+
+Eidrive = Callable[..., Result]
+
+
+def test_passed(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by)
+    assert result.exit_code == 0, result.output
+    assert "Ego and Parked came within 5.00 m (centre to centre) at 2.00 s" in result.stdout
+    assert "end: stop trigger at 3.00 s" in result.stdout
+    assert re.search(r"trace [0-9a-f]{64}", result.stdout)
+
+
+def test_failed_says_who_hit_whom_when(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--param", "OtherY=0")
+    assert result.exit_code == 1, result.output
+    # 4 m long, reference points 20 m apart: a gap of 16 m closes at 10 m/s.
+    assert re.search(r"collision +failed .*Ego and Parked hit each other at 1\.6[05] s", result.stdout)
+
+
+def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--json", "--repeat", "2", "--seed", "5")
+    lines = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [line["seed"] for line in lines] == [5, 6]
+    first = lines[0]
+    expected = {"scenario", "seed", "passed", "end", "criteria", "metrics", "trace_hash", "simulated_s", "wall_s"}
+    assert expected <= set(first)
+    assert set(first["criteria"][0]) == {"name", "passed", "value", "limit", "unit", "reason"}
+    assert first["passed"] is True
+    assert first["end"] == "stop trigger"
+    assert first["metrics"]["min_distance.Ego.Parked.centre"] == pytest.approx(5.0)
+    assert first["metrics"]["min_distance.Ego.Parked.box"] == pytest.approx(3.0)
+
+
+def test_out_keeps_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    printed = json.loads(eidrive("run", passing_by, "--json", "--out", tmp_path / "run").stdout)
+    kept = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    assert kept == printed
+    recording = read_recording(tmp_path / "run" / "recording.mcap")
+    assert recording.seed == 1
+    assert recording.attachments["scenario.xosc"] == passing_by.read_bytes()
+    frames = list(recording.frames())
+    assert frames[-1].view.time == pytest.approx(3.0)
+    assert frames[-1].view.position[0, 0] == pytest.approx(30.0, abs=0.6)
+
+
+def test_no_record_and_a_folder_per_seed(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path, "--no-record", "--repeat", "2", "--csv", tmp_path / "motion.csv")
+    files = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file())
+    assert files == ["motion-seed-1.csv", "motion-seed-2.csv", "seed-1/result.json", "seed-2/result.json"]
+
+
+def test_csv(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--csv", tmp_path / "motion.csv", "--dt", "0.1")
+    with (tmp_path / "motion.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    at_one = {row["name"]: row for row in rows if row["time"] == "1.000000"}
+    assert set(at_one) == {"Ego", "Parked"}
+    assert float(at_one["Ego"]["x"]) == pytest.approx(10.0)
+    assert float(at_one["Ego"]["speed"]) == pytest.approx(10.0)
+    assert float(at_one["Parked"]["y"]) == pytest.approx(5.0)
+    assert len(rows) == 2 * 31
+
+
+def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--time-limit", "1")
+    assert result.exit_code == 3
+    assert "end: time limit at 1.00 s" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["no/such"], "no scenario 'no/such'"),
+        (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
+        (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
+        (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
+        (["{file}", "--dt", "0"], "--dt is 0"),
+    ],
+)
+def test_wrong_input(eidrive: Eidrive, passing_by: Path, arguments: list[str], message: str) -> None:
+    result = eidrive("run", *(argument.format(file=passing_by) for argument in arguments))
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+
+
+def test_wrong_file(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.xosc"
+    broken.write_text(passing_by.read_text(encoding="utf-8").replace("of: Ego, to", "off: Ego, to"), encoding="utf-8")
+    result = eidrive("run", broken)
+    assert result.exit_code == 2, result.output
+    assert f"{broken}:47: unknown setting 'off'; did you mean 'of'?" in result.stderr
+
+
+def test_the_same_seed_gives_the_same_trace_in_another_process(eidrive: Eidrive, passing_by: Path) -> None:
+    here = json.loads(eidrive("run", passing_by, "--json").stdout)
+    command = [sys.executable, "-m", "eidrive_scenario", "run", str(passing_by), "--json"]
+    there = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert here["trace_hash"] == there["trace_hash"]

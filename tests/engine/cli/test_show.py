@@ -1,0 +1,86 @@
+"""`eidrive list`, `tree`, `view`, `report` and the help."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+Eidrive = Callable[..., Result]
+
+
+def test_help_names_the_commands_and_imports_no_engine() -> None:
+    script = (
+        "import sys; from eidrive_scenario.cli import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit as end:\n    assert end.code == 0, end.code\n"
+        "heavy = {'numpy', 'pybullet', 'pydantic', 'eidrive_scenario.simulation'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for command in ("run", "check", "list", "tree", "view", "report"):
+        assert f" {command} " in done.stdout
+
+
+def test_version(eidrive: Eidrive) -> None:
+    assert eidrive("--version").stdout.startswith("eidrive-scenario ")
+
+
+@pytest.mark.parametrize(
+    ("what", "expected"),
+    [
+        ("scenarios", "coop/scenario_1"),
+        ("channels", "none"),
+        ("criteria", "min_distance"),
+        ("detectors", "oracle"),
+        ("actions", "SpeedAction"),
+        ("conditions", "SimulationTimeCondition"),
+    ],
+)
+def test_list(eidrive: Eidrive, what: str, expected: str) -> None:
+    result = eidrive("list", what)
+    assert result.exit_code == 0
+    assert expected in [line.split()[0] for line in result.stdout.splitlines()]
+
+
+def test_list_is_about_scenarios_by_default(eidrive: Eidrive) -> None:
+    assert eidrive("list").stdout == eidrive("list", "scenarios").stdout
+
+
+def test_tree(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("tree", passing_by)
+    assert result.exit_code == 0, result.output
+    assert "3" in result.stdout
+
+
+def test_view_writes_a_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    result = eidrive("view", tmp_path)
+    assert result.exit_code == 0, result.output
+    page = tmp_path / "recording.html"
+    assert result.stdout.strip() == str(page)
+    assert "<html" in page.read_text(encoding="utf-8")
+
+
+def test_view_of_no_recording(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("view", passing_by)
+    assert result.exit_code == 2
+    assert f"{passing_by}: not an MCAP file" in result.stderr
+
+
+def test_report_over_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path / "runs" / "far", "--no-record", "--repeat", "2")
+    eidrive("run", passing_by, "--out", tmp_path / "runs" / "near", "--no-record", "--param", "OtherY=0")
+    result = eidrive("report", tmp_path / "runs", "-o", tmp_path / "report")
+    assert result.exit_code == 0, result.output
+    page = Path(result.stdout.strip())
+    assert page.is_relative_to(tmp_path / "report")
+    assert "hit each other" in page.read_text(encoding="utf-8")
+
+
+def test_report_without_runs(eidrive: Eidrive, tmp_path: Path) -> None:
+    result = eidrive("report", tmp_path, "-o", tmp_path / "report")
+    assert result.exit_code == 2
+    assert "no result.json in" in result.stderr

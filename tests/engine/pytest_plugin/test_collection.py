@@ -1,0 +1,85 @@
+"""Scenario files as pytest items: what is collected, and what is left alone."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+CATALOG = '<OpenSCENARIO><FileHeader/><Catalog name="cars"/></OpenSCENARIO>'
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester) -> pytest.Pytester:
+    """A foreign project: Python tests, and two scenarios and a catalog in a folder of data."""
+    pytester.makepyfile(test_own="def test_own():\n    pass")
+    data = pytester.mkdir("data")
+    for name in ("first", "second"):
+        shutil.copy(PASSING_BY, data / f"{name}.xosc")
+    (data / "cars.xosc").write_text(CATALOG)
+    (data / "other.xosc").write_text("<somethingElse/>")
+    return pytester
+
+
+def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
+    result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", *arguments)
+    return [line for line in result.outlines if "::" in line]
+
+
+def test_a_bare_pytest_is_left_alone(project: pytest.Pytester) -> None:
+    assert collected(project) == ["test_own.py::test_own"]
+
+
+def test_a_folder_that_is_named(project: pytest.Pytester) -> None:
+    assert collected(project, "data") == ["data/first.xosc::first[seed1]", "data/second.xosc::second[seed1]"]
+
+
+def test_a_file_and_an_item_that_are_named(project: pytest.Pytester) -> None:
+    assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
+    item = "data/first.xosc::first[none-seed2]"
+    assert collected(project, item, "--eidrive-channel", "ideal,none", "--eidrive-seeds", "2") == [item]
+
+
+def test_another_folder_does_not_count(project: pytest.Pytester) -> None:
+    assert collected(project, "test_own.py") == ["test_own.py::test_own"]
+
+
+def test_the_ini_option_decides_where_it_is_set(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\neidrive_paths = scenarios")
+    scenarios = project.mkdir("scenarios")
+    shutil.copy(PASSING_BY, scenarios / "third.xosc")
+    assert collected(project) == ["scenarios/third.xosc::third[seed1]", "test_own.py::test_own"]
+    assert collected(project, "data") == []
+    assert collected(project, "data/first.xosc") == ["data/first.xosc::first[seed1]"]
+
+
+def test_one_item_per_channel_and_seed(project: pytest.Pytester) -> None:
+    items = collected(
+        project, "data/first.xosc", "--eidrive-channel", "ideal,channels/bad.yaml", "--eidrive-seeds", "2"
+    )
+    assert [item.split("::")[1] for item in items] == [
+        "first[ideal-seed1]",
+        "first[ideal-seed2]",
+        "first[bad-seed1]",
+        "first[bad-seed2]",
+    ]
+
+
+def test_k_selects(project: pytest.Pytester) -> None:
+    items = collected(project, "data", "--eidrive-seeds", "3", "-k", "second and seed3")
+    assert items == ["data/second.xosc::second[seed3]"]
+
+
+def test_seeds_must_count(project: pytest.Pytester) -> None:
+    result = project.runpytest_inprocess("data", "--eidrive-seeds", "0")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--eidrive-seeds*invalid*"])
+
+
+def test_bare_pytest_under_xdist_is_left_alone_too(project: pytest.Pytester) -> None:
+    result = project.runpytest_subprocess("-n", "1", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1)

@@ -1,0 +1,91 @@
+"""The marker `scenario` and the fixture `run_scenario`."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester) -> pytest.Pytester:
+    folder = pytester.mkdir("drives")
+    for name in ("first", "second"):
+        shutil.copy(PASSING_BY, folder / f"{name}.xosc")
+    (folder / "cars.xosc").write_text('<OpenSCENARIO><FileHeader/><Catalog name="cars"/></OpenSCENARIO>')
+    return pytester
+
+
+def run(pytester: pytest.Pytester, text: str, *arguments: str) -> pytest.RunResult:
+    pytester.makepyfile(test_own="import pytest\n" + text)
+    return pytester.runpytest_inprocess("test_own.py", "-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
+
+
+def test_the_marker_runs_every_match_channel_and_seed(project: pytest.Pytester) -> None:
+    text = """
+@pytest.mark.scenario("drives/*.xosc", channel=["ideal", "none"], seeds=2)
+def test_far(run_scenario):
+    result = run_scenario()
+    assert result.passed
+    assert result.metrics["min_distance.Ego.Parked.centre"] == pytest.approx(5.0)
+"""
+    result = run(project, text, "--junitxml", "junit.xml")
+    result.assert_outcomes(passed=8)
+    result.stdout.fnmatch_lines(["*test_far?first-ideal-seed1? PASSED*", "*test_far?second-none-seed2? PASSED*"])
+    case = next(iter(ElementTree.parse(project.path / "junit.xml").iter("testcase")))
+    assert "min_distance.value" in {entry.get("name") for entry in case.iter("property")}
+
+
+def test_the_command_line_wins(project: pytest.Pytester) -> None:
+    text = """
+@pytest.mark.scenario("drives/first", channel="ideal", seeds=5)
+def test_far(run_scenario):
+    assert run_scenario().channel == "none"
+"""
+    run(project, text, "--eidrive-channel", "none", "--eidrive-seeds", "1").assert_outcomes(passed=1)
+
+
+def test_a_call_may_say_otherwise(project: pytest.Pytester) -> None:
+    text = """
+def test_any(run_scenario):
+    near = run_scenario("drives/first.xosc", seed=3, parameters={"OtherY": "0"})
+    assert not near.passed
+    assert near.seed == 3
+    assert run_scenario("drives/second.xosc").passed
+"""
+    run(project, text).assert_outcomes(passed=1)
+
+
+def test_a_wrong_input_fails_with_its_place(project: pytest.Pytester) -> None:
+    text = """
+def test_wrong(run_scenario):
+    run_scenario("drives/first.xosc", parameters={"OthreY": "0"})
+def test_missing(run_scenario):
+    run_scenario("drives/thrid.xosc")
+"""
+    result = run(project, text)
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(["*did you mean 'OtherY'?*", "*no scenario 'drives/thrid.xosc'*"])
+    result.stdout.no_fnmatch_line("*Traceback*")
+
+
+@pytest.mark.parametrize(
+    ("marker", "message"),
+    [('"none/*.xosc"', "no scenario matches 'none/*.xosc'"), ("", "the marker scenario needs a pattern")],
+)
+def test_a_marker_that_matches_nothing_is_an_error(project: pytest.Pytester, marker: str, message: str) -> None:
+    result = run(project, f"@pytest.mark.scenario({marker})\ndef test_none(run_scenario):\n    pass")
+    assert result.ret != 0
+    assert message in str(result.stdout) + str(result.stderr)
+
+
+def test_without_marker_a_name_is_needed(project: pytest.Pytester) -> None:
+    result = run(project, "def test_none(run_scenario):\n    run_scenario()")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*name a scenario*"])

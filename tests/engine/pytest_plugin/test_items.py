@@ -1,0 +1,94 @@
+"""Scenario files that run as tests: outcome, properties, what a failure says."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester) -> pytest.Pytester:
+    """One scenario that passes, one that fails, one that is wrong."""
+    text = PASSING_BY.read_text(encoding="utf-8")
+    folder = pytester.mkdir("xosc")
+    shutil.copy(PASSING_BY, folder / "far.xosc")
+    (folder / "near.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
+    (folder / "wrong.xosc").write_text(text.replace('"step"', '"stp"'), encoding="utf-8")
+    return pytester
+
+
+def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
+    result = project.runpytest_inprocess("xosc", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, failed=2)
+    result.stdout.fnmatch_lines(
+        [
+            "*failed with channel *, seed 1",
+            "collision: Ego and Parked hit each other at 1.6* s at *",
+            "min_distance: Ego and Parked came within * m (centre to centre) at * s (limit 3 m)",
+            "*wrong.xosc:61: *did you mean 'step'?",
+        ]
+    )
+    result.stdout.no_fnmatch_line("*Traceback*")
+    result.stdout.no_fnmatch_line("*.py:*: *Error*")
+
+
+def test_junit_of_all_seeds_over_two_workers(project: pytest.Pytester) -> None:
+    arguments = ("--eidrive-seeds", "2", "--eidrive-channel", "ideal,none", "-n", "2", "--junitxml", "junit.xml")
+    result = project.runpytest_subprocess("xosc/far.xosc", "xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=4, failed=4)
+    cases = {
+        f"{case.get('classname')}::{case.get('name')}": case
+        for case in ElementTree.parse(project.path / "junit.xml").iter("testcase")
+    }
+    assert sorted(cases) == [
+        f"xosc.{name}.xosc::{name}[{channel}-seed{seed}]"
+        for name in ("far", "near")
+        for channel in ("ideal", "none")
+        for seed in (1, 2)
+    ]
+    case = cases["xosc.far.xosc::far[ideal-seed2]"]
+    properties = {entry.get("name"): entry.get("value") for entry in case.iter("property")}
+    assert properties["min_distance.passed"] == "True"
+    assert float(properties["min_distance.value"] or "") == pytest.approx(5.0)
+    assert properties["min_distance.limit"] == "3.0"
+    assert float(properties["min_distance.Ego.Parked.box"] or "") == pytest.approx(3.0)
+    assert (properties["seed"], properties["end"]) == ("2", "stop trigger")
+    assert len(properties["trace_hash"] or "") == 64
+    failure = cases["xosc.near.xosc::near[none-seed1]"].find("failure")
+    assert failure is not None
+    assert "hit each other" in (failure.text or "")
+    assert "Traceback" not in (failure.text or "")
+
+
+def test_out_keeps_every_run(project: pytest.Pytester) -> None:
+    result = project.runpytest_inprocess(
+        "xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-seeds", "2", "-p", "no:cacheprovider"
+    )
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(["eidrive: seeds 2, out runs"])
+    kept = sorted(path.relative_to(project.path).as_posix() for path in project.path.glob("runs/**/*.*"))
+    assert kept == [f"runs/xosc/far/seed{seed}/{name}" for seed in (1, 2) for name in ("recording.mcap", "result.json")]
+    assert json.loads((project.path / kept[1]).read_text())["passed"] is True
+
+
+def test_the_trace_does_not_depend_on_the_order(project: pytest.Pytester) -> None:
+    def hashes(*arguments: str) -> dict[str, str]:
+        project.runpytest_inprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
+        found = {}
+        for case in ElementTree.parse(project.path / "junit.xml").iter("testcase"):
+            (trace,) = (entry.get("value") for entry in case.iter("property") if entry.get("name") == "trace_hash")
+            found[case.get("name") or ""] = trace or ""
+        return found
+
+    forwards = hashes("xosc/far.xosc", "xosc/near.xosc")
+    backwards = hashes("xosc/near.xosc", "xosc/far.xosc")
+    assert forwards == backwards
+    assert len(set(forwards.values())) == 2

@@ -1,0 +1,78 @@
+"""Names of the library and files."""
+
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario import library
+from eidrive_scenario.errors import SettingError
+
+OPENING = '<OpenSCENARIO><FileHeader revMajor="1" revMinor="3"/>'
+
+
+@pytest.fixture
+def own_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    root = tmp_path / "library"
+    for name in ("coop/scenario_1.xosc", "coop/scenario_2.xosc", "catalogs/vehicles.xosc"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        kind = "Catalog" if "catalogs" in name else "Storyboard"
+        (root / name).write_text(f"{OPENING}<{kind}/></OpenSCENARIO>")
+    (root / "channels").mkdir()
+    (root / "channels" / "latency_300ms.yaml").write_text("{}")
+    monkeypatch.setattr(library, "library_path", lambda: root)
+    return root
+
+
+def test_scenarios_without_catalogs(own_library: Path) -> None:
+    assert library.scenarios() == ["coop/scenario_1", "coop/scenario_2"]
+
+
+@pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_1.xosc"])
+def test_a_name_is_a_file_of_the_library(own_library: Path, name: str) -> None:
+    assert library.resolve_scenario(name) == own_library / "coop" / "scenario_1.xosc"
+
+
+def test_a_file_wins(own_library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    own = tmp_path / "coop" / "scenario_1.xosc"
+    own.parent.mkdir()
+    own.write_text("")
+    assert library.resolve_scenario("coop/scenario_1.xosc").resolve() == own
+    assert library.resolve_scenario(own) == own
+
+
+def test_the_nearest_name_is_offered(own_library: Path) -> None:
+    with pytest.raises(SettingError, match=r"no scenario 'coop/scenari_1'.*did you mean 'coop/scenario_1'\?"):
+        library.resolve_scenario("coop/scenari_1")
+    with pytest.raises(SettingError, match=r"no channel profile 'latency_300'.*did you mean 'latency_300ms'\?"):
+        library.resolve("channels", "latency_300")
+    with pytest.raises(SettingError, match="is a folder"):
+        library.resolve_scenario(own_library)
+
+
+def test_profiles(own_library: Path) -> None:
+    assert library.names("channels") == ["latency_300ms"]
+    assert library.names("weather") == []
+    assert library.resolve("channels", "latency_300ms") == own_library / "channels" / "latency_300ms.yaml"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        (f"{OPENING}<ParameterDeclarations/><CatalogLocations/><RoadNetwork/>", "scenario"),
+        (f"{OPENING}<Catalog name='c'/></OpenSCENARIO>", "catalog"),
+        (f"{OPENING}<ParameterValueDistribution/></OpenSCENARIO>", "distribution"),
+        ("<OpenDRIVE/>", "other"),
+        ("<OpenSCENARIO><FileHeader>", "unreadable"),
+        ("no XML", "unreadable"),
+        (f'<!DOCTYPE a [<!ENTITY e SYSTEM "file:///etc/hostname">]>{OPENING}<Storyboard>&e;</Storyboard>', "scenario"),
+    ],
+)
+def test_what_a_file_defines(tmp_path: Path, text: str, kind: str) -> None:
+    path = tmp_path / "file.xosc"
+    path.write_text(text)
+    assert library.definition(path) == kind
+
+
+def test_the_library_of_this_checkout_is_found() -> None:
+    assert (library.library_path() / "coop").is_dir()
