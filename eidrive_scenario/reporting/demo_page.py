@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 COLOURS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHES = {"none": "6 3", "cooperation": "", "latency": "", "error": "2 3"}
-HORIZON = 30.0
+HORIZON = 12.0
 """The chart begins where the two cars are this near [m]."""
 
 

@@ -14,7 +14,20 @@ from eidrive_scenario.recording.recorder import Recording
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.road_drawing import recorded_roads
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
-from eidrive_scenario.reporting.top_view import AREA, GROUND, LANE, LANES, LINK, LOST, OWN, PAINT, RECEIVED, RoadDrawing
+from eidrive_scenario.reporting.top_view import (
+    AREA,
+    GROUND,
+    LANE,
+    LANES,
+    LINK,
+    LOST,
+    OWN,
+    PAINT,
+    RECEIVED,
+    WHITE,
+    RoadDrawing,
+    is_broken,
+)
 
 COLOURS = {
     "own": OWN,
@@ -23,8 +36,6 @@ COLOURS = {
     "lost": LOST,
     "area": AREA,
     "ground": GROUND,
-    "lane": LANE,
-    "paint": PAINT,
 }
 
 
@@ -111,5 +122,7 @@ def _boxes(detections: Detections) -> list[list[float]]:
 def _roads(roads: RoadDrawing) -> dict[str, Any]:
     return {
         "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
-        "lines": [["broken" in kind, line.round(2).tolist()] for kind, line in roads.markings],
+        "lines": [
+            [is_broken(kind), PAINT.get(colour, WHITE), line.round(2).tolist()] for kind, colour, line in roads.markings
+        ],
     }

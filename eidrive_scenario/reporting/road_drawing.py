@@ -31,7 +31,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
     Lanes on which cars drive come last, so that they cover the shoulders of roads that cross them in a junction.
     """
     lanes: list[tuple[str, Array]] = []
-    markings: list[tuple[str, Array]] = []
+    markings: list[tuple[str, str, Array]] = []
     for road in roads:
         for section in road.sections:
             if section.length <= 0.0:
@@ -44,7 +44,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
                     polygon = np.concatenate([thinned(inner), thinned(outer)[::-1]])
                     if _reaches(polygon, window):
                         lanes.append((lane.type, polygon))
-                markings.extend(mark for mark in _marks(road, section, lane) if _reaches(mark[1], window))
+                markings.extend(mark for mark in _marks(road, section, lane) if _reaches(mark[2], window))
     lanes.sort(key=lambda entry: _LOWEST.index(entry[0]) if entry[0] in _LOWEST else len(_LOWEST))
     return RoadDrawing(tuple(lanes), tuple(markings))
 
@@ -94,7 +94,7 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
     return np.array(points)
 
 
-def _marks(road: Road, section: LaneSection, lane: Lane) -> Iterator[tuple[str, Array]]:
+def _marks(road: Road, section: LaneSection, lane: Lane) -> Iterator[tuple[str, str, Array]]:
     """The painted stretches on the lane's outer edge."""
     for index, mark in enumerate(lane.road_marks):
         after = lane.road_marks[index + 1].s_offset if index + 1 < len(lane.road_marks) else section.length
@@ -102,7 +102,7 @@ def _marks(road: Road, section: LaneSection, lane: Lane) -> Iterator[tuple[str, 
         if mark.type in ("none", "curb", "grass") or end - start < 1e-6:
             continue
         stations = np.linspace(start, end, max(2, math.ceil((end - start) / SPACING) + 1)).tolist()
-        yield mark.type, thinned(_edge(road, section, lane, stations, outer=True))
+        yield mark.type, mark.color, thinned(_edge(road, section, lane, stations, outer=True))
 
 
 def _reaches(points: Array, window: Window | None) -> bool:

@@ -22,8 +22,17 @@ Array = NDArray[np.float64]
 
 OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"
 TRUTH, STATION = "#334155", "#0f172a"
-LANES = {"driving": "#d5d9e0", "sidewalk": "#e9e6df", "shoulder": "#dfe2e6", "border": "#dfe2e6", "median": "#dde5d3"}
-LANE, GROUND, PAINT = "#dcdfe5", "#f1f3ee", "#ffffff"
+LANES = {
+    "sidewalk": "#e7e1d5",
+    "median": "#dbe5d0",
+    "shoulder": "#d8dce2",
+    "border": "#d8dce2",
+    "parking": "#cfd4dc",
+    "bidirectional": "#c9ced7",
+}
+LANE, GROUND = "#c1c7d1", "#f1f3ee"
+PAINT = {"yellow": "#f4c542"}
+WHITE = "#ffffff"
 
 
 @dataclass(frozen=True)
@@ -50,10 +59,10 @@ class Window:
 
 @dataclass(frozen=True)
 class RoadDrawing:
-    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, polyline (M, 2)) [m]."""
+    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, colour, polyline (M, 2)) [m]."""
 
     lanes: tuple[tuple[str, Array], ...] = ()
-    markings: tuple[tuple[str, Array], ...] = ()
+    markings: tuple[tuple[str, str, Array], ...] = ()
 
 
 def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
@@ -64,8 +73,8 @@ def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
         for kind, polygon in roads.lanes
     )
     lines = "".join(
-        f'<path d="{_path(line)}" fill="none" stroke="{PAINT}" stroke-width="0.16"{_dashes(kind)}/>'
-        for kind, line in roads.markings
+        f'<path d="{_path(line)}" fill="none" stroke="{PAINT.get(colour, WHITE)}" stroke-width="0.18"{_dashes(kind)}/>'
+        for kind, colour, line in roads.markings
     )
     return f'<g id="{escape(identifier)}">{lanes}{lines}</g>'
 
@@ -199,8 +208,13 @@ def _text_size(window: Window) -> float:
     return (window.right - window.left) / 24
 
 
+def is_broken(kind: str) -> bool:
+    """Whether a marking of this type is broken; of a double line, whether both are."""
+    return set(kind.split()) == {"broken"}
+
+
 def _dashes(kind: str) -> str:
-    return ' stroke-dasharray="3 3"' if "broken" in kind else ""
+    return ' stroke-dasharray="3 3"' if is_broken(kind) else ""
 
 
 def _path(points: Array) -> str:

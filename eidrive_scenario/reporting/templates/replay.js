@@ -75,9 +75,10 @@ function draw() {
   for (const [colour, polygon] of data.roads.lanes) {
     trace(polygon); pen.closePath(); pen.fillStyle = pen.strokeStyle = colour; pen.lineWidth = 0.05; pen.fill(); pen.stroke();
   }
-  pen.strokeStyle = C.paint;
-  pen.lineWidth = 0.16;
-  for (const [broken, line] of data.roads.lines) { pen.setLineDash(broken ? [3, 3] : []); trace(line); pen.stroke(); }
+  pen.lineWidth = 0.18;
+  for (const [broken, colour, line] of data.roads.lines) {
+    pen.setLineDash(broken ? [3, 3] : []); pen.strokeStyle = colour; trace(line); pen.stroke();
+  }
   if (station && poses[self]) for (const [sender, delivered] of station.links) if (poses[sender]) {
     pen.setLineDash(delivered ? [] : [0.9, 0.9]);
     pen.strokeStyle = delivered ? C.link : C.lost;

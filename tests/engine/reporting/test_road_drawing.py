@@ -47,7 +47,7 @@ def test_driving_lanes_cover_sidewalks() -> None:
 
 
 def test_markings_run_as_far_as_they_are_painted() -> None:
-    markings = dict(road_drawing(roads(b"<line/>")).markings)
+    markings = {kind: line for kind, _, line in road_drawing(roads(b"<line/>")).markings}
     assert set(markings) == {"solid", "broken"}
     assert markings["broken"] == pytest.approx(np.array([[10, 5], [40, 5]]))
     assert markings["solid"] == pytest.approx(np.array([[10, 8.5], [60, 8.5]]))
@@ -56,7 +56,7 @@ def test_markings_run_as_far_as_they_are_painted() -> None:
 def test_a_curved_edge_stays_within_the_tolerance() -> None:
     """Curvature 0.02: the left lane's outer edge is a circle of radius 46.5 m about (10, 55)."""
     drawing = road_drawing(roads(b'<arc curvature="0.02"/>'))
-    solid = dict(drawing.markings)["solid"]
+    solid = next(line for kind, _, line in drawing.markings if kind == "solid")
     ends = np.hypot(solid[:, 0] - 10.0, solid[:, 1] - 55.0)
     middles = np.hypot(*((solid[1:] + solid[:-1]) / 2 - (10.0, 55.0)).T)
     assert ends == pytest.approx(np.full(len(solid), 46.5))

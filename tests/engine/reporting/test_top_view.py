@@ -113,13 +113,13 @@ def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(st
 def test_conflict_area_and_roads_are_drawn_below_the_cars(street: Play) -> None:
     area = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
     lane = np.array([[0.0, -1.75], [60.0, -1.75], [60.0, 1.75], [0.0, 1.75]])
-    roads = RoadDrawing(lanes=(("driving", lane),), markings=(("broken", lane[:2]),))
+    roads = RoadDrawing(lanes=(("driving", lane),), markings=(("broken", "yellow", lane[:2]),))
     svg = top_view(snapshot_at(street(1), 40), WINDOW, roads=roads, conflict_areas=[area])
     (drawn,) = shapes(svg, "area")
     assert drawn == pytest.approx(area)
     assert svg.index('class="area"') < svg.index('class="received"') < svg.index('class="truth"')
     assert svg.index("M0.00 1.75L60.00 1.75L60.00 -1.75") < svg.index('class="area"')
-    assert 'stroke-dasharray="3 3"' in svg
+    assert 'stroke="#f4c542" stroke-width="0.18" stroke-dasharray="3 3"' in svg
 
 
 def test_roads_may_be_shared_by_many_pictures(street: Play) -> None:
