@@ -74,7 +74,7 @@ class Collision(Criterion):
             unit="",
             first_violation=first.time if first is not None else None,
             reason=reason,
-            fatal=self.fatal,
+            fatal=self.fatal and first is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:

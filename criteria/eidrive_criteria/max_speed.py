@@ -53,7 +53,7 @@ class MaxSpeed(Criterion):
             unit="m/s",
             first_violation=self._violated,
             reason=reason,
-            fatal=self.fatal,
+            fatal=self.fatal and self._violated is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:

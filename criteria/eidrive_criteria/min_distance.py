@@ -73,7 +73,7 @@ class MinDistance(Criterion):
             unit="m",
             first_violation=self._violated,
             reason=reason,
-            fatal=self.fatal,
+            fatal=self.fatal and self._violated is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:

@@ -66,7 +66,7 @@ class TimeToCollision(Criterion):
             unit="s",
             first_violation=self._violated,
             reason=reason,
-            fatal=self.fatal,
+            fatal=self.fatal and self._violated is not None,
         )
 
     def metrics(self) -> Mapping[str, float]:

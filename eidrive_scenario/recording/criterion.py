@@ -23,7 +23,7 @@ class Verdict:
     first_violation: float | None
     reason: str
     fatal: bool = False
-    """True ends the run as soon as it fails."""
+    """True where the failure shall end the run: it is final, and not that something has yet to appear or happen."""
 
 
 class CriterionSettings(Settings):
@@ -32,7 +32,7 @@ class CriterionSettings(Settings):
     name: str | None = None
     """What the verdict is called; the criterion's registered name where None."""
     fatal: bool = False
-    """End the run as soon as this criterion fails."""
+    """End the run as soon as this criterion has failed for good."""
 
 
 class Criterion(ABC):
