@@ -13,11 +13,11 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 LARGEST_ACCELERATION = 3.5
 LARGEST_DECELERATION = 6.5
 """What the regulator asks for at most, as EI-Drive's planner [m/s²]; an emergency brake of the plan may exceed it."""
-LONGITUDINAL = Gains(proportional=1.5, integral=0.1)
-"""On the error of the speed [1/s]: time constant 2/3 s; the integral carries the air's drag."""
-LATERAL = Gains(proportional=1.0, derivative=0.02)
-"""On the error of the direction of the front axle: 1, as the steered wheels are to point along the path."""
-CROSS_TRACK_GAIN = 1.5
+LONGITUDINAL = Gains(proportional=1.5, integral=0.2)
+"""On the error of the speed [1/s]: time constant 2/3 s; the integral carries rolling resistance and drag."""
+LATERAL = Gains(proportional=1.0, integral=0.1)
+"""On the turn towards the path; the integral carries the slip of the tyres in a curve."""
+CROSS_TRACK_GAIN = 2.0
 """How fast an offset from the path decays [1/s]."""
 SOFTENING = 1.0
 """Keeps the steering calm near standstill [m/s]."""
@@ -70,7 +70,7 @@ class Controller:
         y = float(ego.position[1]) + self.spec.wheelbase * math.sin(ego.yaw)
         heading, left = _nearest(plan.points[:12].tolist(), x, y)
         turn = math.atan2(-CROSS_TRACK_GAIN * left, SOFTENING + max(ego.speed, 0.0))
-        self._steering = self._direction.update(wrap_angle(heading - ego.yaw) + turn)
+        self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
         return self._steering
 
 

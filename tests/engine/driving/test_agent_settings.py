@@ -98,7 +98,10 @@ WRONG = [
     ([("conflict_area", "[1, 2")], "s.xosc:12: property 'conflict_area' is '[1, 2', which is not valid YAML"),
     ([("sensors", "truth, radar")], "sensor 'radar' needs a kind"),
     ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "a station has one truth sensor, found a, b"),
-    ([("sensors", "{truth: {rnge: 5}}")], "s.xosc:12: unknown setting 'sensors.truth.truth.rnge'; did you mean 'range'?"),
+    (
+        [("sensors", "{truth: {rnge: 5}}")],
+        "s.xosc:12: unknown setting 'sensors.truth.truth.rnge'; did you mean 'range'?",
+    ),
     ([("mount", "[1, 2]")], "a mount has three to five numbers"),
 ]
 

@@ -1,0 +1,146 @@
+"""Regulators, and the closed loop with the world's vehicle model."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.path import Path
+from eidrive_scenario.driving.pid import PID, Gains
+from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Goal, Plan
+from eidrive_scenario.world.actor import ActorSpec
+
+NOTHING = Detections(0.0)
+
+
+def test_pid_by_hand() -> None:
+    pid = PID(Gains(2.0, 0.5, 0.1), low=-10.0, high=10.0, dt=0.1)
+    assert pid.update(1.0) == pytest.approx(2.0 + 0.5 * 0.1)
+    assert pid.update(2.0) == pytest.approx(4.0 + 0.5 * 0.3 + 0.1 * 10.0)
+    assert pid.update(2.0, feed_forward=1.0) == pytest.approx(1.0 + 4.0 + 0.5 * 0.5)
+    pid.reset()
+    assert pid.update(1.0) == pytest.approx(2.05)
+
+
+def test_the_integral_does_not_wind_up_at_a_limit() -> None:
+    """An error of 10 for 20 s would give an integral of 200; it stands still, so the output turns at once."""
+    pid = PID(Gains(1.0, 1.0), low=-1.0, high=1.0, dt=0.1)
+    assert {pid.update(10.0) for _ in range(200)} == {1.0}
+    assert pid.update(-0.5) == pytest.approx(-0.55)
+
+
+def test_two_regulators_share_nothing(car: ActorSpec) -> None:
+    first, second = Controller(car, 0.05), Controller(car, 0.05)
+    assert first._speed is not first._direction
+    assert first._speed is not second._speed
+    assert first._speed.gains != first._direction.gains
+
+
+def planner(car: ActorSpec, **settings: Any) -> RoutePlanner:
+    return RoutePlanner(AgentSettings(**settings), car, None, dt=0.05, seed=0)
+
+
+def drive(vehicle: Any, route: RoutePlanner, goal: Goal | None, seconds: float) -> None:
+    controller = Controller(vehicle.spec, 0.05)
+    for _ in range(round(seconds / 0.05)):
+        ego = vehicle.state()
+        vehicle.drive(controller.control(ego, route.plan(ego, NOTHING, goal, vehicle.time)))
+
+
+def test_the_target_speed_is_reached_within_the_limits_and_kept(car: ActorSpec, vehicle: Any) -> None:
+    ego = vehicle()
+    drive(ego, planner(car, target_speed=8.0), None, 12.0)
+    speeds = np.array([speed for _, _, speed in ego.track])
+    gain = np.diff(speeds) / 0.05
+    assert gain.max() <= 3.5 + 1e-6
+    assert speeds.max() < 1.02 * 8.0
+    assert np.all(np.abs(speeds[100:] - 8.0) < 0.02 * 8.0), "8 / 3.5 s at the limit, then constants of 2/3 s"
+    assert max(abs(y) for _, y, _ in ego.track) < 1e-6
+
+
+def test_a_lower_goal_brakes_within_the_limits(car: ActorSpec, vehicle: Any) -> None:
+    ego, route = vehicle(speed=15.0), planner(car)
+    drive(ego, route, None, 2.0)
+    assert ego.speed == pytest.approx(15.0, rel=0.01), "without a target the first speed is kept"
+    drive(ego, route, Goal(speed=5.0), 6.0)
+    loss = -np.diff([speed for _, _, speed in ego.track]) / 0.05
+    assert loss.max() < 6.5 + 0.3, "the regulator's limit, and a little rolling resistance and drag"
+    assert ego.speed == pytest.approx(5.0, abs=0.1)
+
+
+def test_it_stops_at_the_destination_and_stays(car: ActorSpec, vehicle: Any) -> None:
+    ego = vehicle(speed=10.0)
+    drive(ego, planner(car, target_speed=10.0), Goal(waypoints=np.array([[60.0, 0.0, 0.0]])), 20.0)
+    assert ego.x == pytest.approx(60.0, abs=0.6)
+    assert max(x for x, _, _ in ego.track) < 60.6
+    assert abs(ego.speed) < 0.01
+
+
+@pytest.mark.parametrize("offset", [0.5, 1.5, -1.5])
+def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, offset: float) -> None:
+    ego = vehicle(y=offset, speed=10.0)
+    goal = Goal(speed=10.0, waypoints=np.array([[200.0, 0.0, 0.0]]))
+    route, controller = planner(car), Controller(car, 0.05)
+    route._path = Path(np.array([[0.0, 0.0], [300.0, 0.0]]), ends=True)
+    route._waypoints = goal.waypoints
+    for _ in range(120):
+        state = ego.state()
+        ego.drive(controller.control(state, route.plan(state, NOTHING, goal, ego.time)))
+    side = np.array([y for _, y, _ in ego.track]) / offset
+    assert side.min() > -0.07
+    assert abs(side[-1]) < 0.07
+
+
+@pytest.mark.parametrize(("radius", "speed"), [(12.0, 6.0), (40.0, 10.0), (-40.0, 12.0), (100.0, 20.0)])
+def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: float) -> None:
+    """The front axle keeps to it; the rear one, inside, cuts it by R - sqrt(R² - L²). sqrt(5 R) allows these speeds.
+
+    The curve begins at once, while the front axle is still on the tangent: judged from 3 s on.
+    """
+    angles = np.linspace(0.0, 1.5 * math.pi, 400)
+    circle = np.stack([abs(radius) * np.sin(angles), radius * (1.0 - np.cos(angles))], axis=1)
+    ego, route, controller = vehicle(speed=speed), planner(car, target_speed=speed), Controller(car, 0.05)
+    route._path = Path(circle, ends=True)
+    errors = []
+    for _ in range(int(1.2 * math.pi * abs(radius) / speed / 0.05)):
+        state = ego.state()
+        ego.drive(controller.control(state, route.plan(state, NOTHING, None, ego.time)))
+        front = ego.x + car.wheelbase * math.cos(ego.yaw), ego.y + car.wheelbase * math.sin(ego.yaw)
+        errors.append(math.hypot(front[0], front[1] - radius) - abs(radius))
+    late = np.abs(errors[60:])
+    assert late.max() < 0.35
+    assert late[-20:].max() < 0.11
+    assert ego.speed == pytest.approx(speed, abs=0.3)
+
+
+def test_a_demanded_deceleration_is_the_pedal_exactly_and_steering_goes_on(car: ActorSpec, vehicle: Any) -> None:
+    ego = vehicle(y=1.0, speed=8.0)
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]])
+    free, braked = (Plan(points, np.full(5, 8.0), "", braking) for braking in (None, 5.0))
+    first, second = (Controller(car, 0.05).control(ego.state(), plan) for plan in (free, braked))
+    assert (second.throttle, second.brake) == (0.0, pytest.approx(5.0 / 9.0))
+    assert second.steering == first.steering < 0.0
+    beyond = Plan(points, np.full(5, 8.0), "", 12.0)
+    assert Controller(car, 0.05).control(ego.state(), beyond).brake == 1.0
+
+
+def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: ActorSpec, vehicle: Any) -> None:
+    """From 8 m/s with 5 m/s²: 1.6 s and 6.4 m, a little less with rolling resistance and drag."""
+    ego, controller = vehicle(speed=8.0), Controller(car, 0.05)
+    points = np.stack([np.arange(60.0), np.zeros(60)], axis=1)
+    while ego.speed > 0.01 and ego.time < 5.0:
+        ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", 5.0)))
+    assert 1.5 <= ego.time < 1.61
+    assert 6.0 < ego.x < 6.4
+
+
+def test_parked(car: ActorSpec) -> None:
+    control = Controller(car, 0.05).parked()
+    assert (control.throttle, control.brake, control.steering) == (0.0, 1.0, 0.0)

@@ -1,0 +1,170 @@
+"""Paths and routes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scenariogeneration import xodr
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.path import Path
+from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Goal
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import ActorSpec
+
+NOTHING = Detections(0.0)
+
+
+def ego(x: float, y: float, yaw: float = 0.0, speed: float = 0.0) -> EgoState:
+    return EgoState(0.0, np.array([x, y, 0.0]), yaw, 0.0, 0.0, speed, 0.0, 0.0)
+
+
+def test_speed_in_a_curve_is_the_root_of_five_radii() -> None:
+    angles = np.linspace(0.0, math.pi, 200)
+    path = Path(np.stack([20.0 * np.sin(angles), 20.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
+    np.testing.assert_allclose(path.limits[8:-8], math.sqrt(5.0 * 20.0), rtol=0.02)
+
+
+def test_before_a_curve_the_speed_falls_with_three_metres_per_second_squared() -> None:
+    angles = np.linspace(0.0, math.pi / 2, 100)[1:]
+    straight = np.stack([np.linspace(-60.0, 0.0, 61), np.zeros(61)], axis=1)
+    curve = np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1)
+    path = Path(np.concatenate([straight, curve]), ends=False)
+    square = path.limits[5:50] ** 2
+    np.testing.assert_allclose(np.diff(square), -2 * 3.0 * 1.0, rtol=0.02)
+    assert path.limits.min() == pytest.approx(math.sqrt(50.0), rel=0.05)
+
+
+def test_the_end_is_a_stop_and_the_horizon_is_not() -> None:
+    line = np.array([[0.0, 0.0], [50.0, 0.0]])
+    assert Path(line, ends=True).limits[-1] == 0.0
+    assert Path(line, ends=True).limits[-25] == pytest.approx(math.sqrt(2 * 3.0 * 24), rel=1e-6)
+    assert Path(line, ends=False).limits.min() > 100.0
+
+
+def test_points_are_a_metre_apart_and_doubled_ones_do_no_harm() -> None:
+    path = Path(np.array([[0.0, 0.0], [0.0, 0.0], [4.0, 3.0], [4.0, 3.0], [8.0, 6.0]]), ends=True)
+    np.testing.assert_allclose(np.hypot(*np.diff(path.points, axis=0).T), 1.0)
+    assert len(path) == 11
+    with pytest.raises(ValueError, match="two different points"):
+        Path(np.zeros((3, 2)), ends=True)
+
+
+def test_smoothing_keeps_a_curve_within_a_decimetre() -> None:
+    angles = np.linspace(0.0, math.pi, 200)
+    path = Path(np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
+    radius = np.hypot(path.points[:, 0], path.points[:, 1] - 10.0)
+    assert np.abs(radius - 10.0).max() < 0.11
+
+
+def test_projection_goes_forward_only() -> None:
+    """A path that crosses itself: the vehicle stays on the branch that it is on."""
+    angles = np.linspace(0.0, 2 * math.pi, 300)
+    eight = np.stack([30 * np.sin(angles), 20 * np.sin(2 * angles)], axis=1)
+    path = Path(eight, ends=True)
+    progress = 0
+    for x, y in path.points[1:-1]:
+        onward = path.project(float(x), float(y), progress)
+        assert progress <= onward <= progress + 2
+        progress = onward
+    assert progress >= len(path) - 3
+
+
+@pytest.fixture(scope="module")
+def roads(tmp_path_factory: pytest.TempPathFactory) -> RoadNetwork:
+    """100 m straight, a left quarter circle of radius 30 m, 100 m straight; one lane of 3.5 m each way."""
+    road = xodr.create_road([xodr.Line(100), xodr.Arc(1 / 30, angle=math.pi / 2), xodr.Line(100)], id=1, lane_width=3.5)
+    drive = xodr.OpenDrive("quarter")
+    drive.add_road(road)
+    drive.adjust_roads_and_lanes()
+    path = tmp_path_factory.mktemp("roads") / "quarter.xodr"
+    drive.write_xml(str(path))
+    return RoadNetwork.load(path)
+
+
+def planner(car: ActorSpec, roads: RoadNetwork | None, **settings: float) -> RoutePlanner:
+    return RoutePlanner(AgentSettings(**settings), car, roads, dt=0.05, seed=0)  # type: ignore[arg-type]
+
+
+def distance_from_lane(points: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    """From the centre of the right lane, 1.75 m right of the reference line."""
+    x, y = points.T
+    straight = np.abs(y + 1.75)
+    arc = np.abs(np.hypot(x - 100.0, y - 30.0) - 31.75)
+    after = np.abs(x - 131.75)
+    return np.where(x < 100, straight, np.where(y < 30, arc, after))
+
+
+def test_without_a_goal_it_follows_its_lane_to_the_end_of_the_road(car: ActorSpec, roads: RoadNetwork) -> None:
+    route = planner(car, roads, target_speed=20.0)
+    plan = route.plan(ego(5.0, -1.7), NOTHING, None, 0.0)
+    assert plan.points[0] == pytest.approx((5.0, -1.75), abs=1e-6)
+    assert distance_from_lane(plan.points).max() < 0.06
+    path = route._path
+    assert path is not None
+    assert path.ends
+    assert path.points[-1] == pytest.approx((131.75, 130.0), abs=1.1)
+    assert distance_from_lane(path.points).max() < 0.06
+
+
+def test_oncoming_traffic_follows_the_other_lane_the_other_way(car: ActorSpec, roads: RoadNetwork) -> None:
+    plan = planner(car, roads, target_speed=5.0).plan(ego(50.0, 1.75, math.pi), NOTHING, None, 0.0)
+    assert plan.points[0] == pytest.approx((50.0, 1.75), abs=1e-6)
+    assert plan.points[-1][0] < 5.0
+    np.testing.assert_allclose(plan.points[:, 1], 1.75, atol=1e-6)
+
+
+def test_a_vehicle_that_looks_the_wrong_way_goes_straight_ahead(car: ActorSpec, roads: RoadNetwork) -> None:
+    plan = planner(car, roads).plan(ego(50.0, -1.75, math.pi), NOTHING, None, 0.0)
+    assert plan.points[-1][0] < 0.0
+    np.testing.assert_allclose(plan.points[:, 1], -1.75, atol=1e-6)
+
+
+def test_waypoints_lead_along_the_road_to_a_stop(car: ActorSpec, roads: RoadNetwork) -> None:
+    goal = Goal(waypoints=np.array([[60.0, -1.7, 0.0], [131.8, 80.0, 0.0]]))
+    route = planner(car, roads, target_speed=9.0)
+    route.plan(ego(5.0, -1.75), NOTHING, goal, 0.0)
+    path = route._path
+    assert path is not None
+    assert path.points[-1] == pytest.approx((131.75, 80.0), abs=0.05)
+    assert distance_from_lane(path.points).max() < 0.06
+    assert path.limits[-1] == 0.0
+    assert route._path is not None
+    route.plan(ego(6.0, -1.75), NOTHING, Goal(waypoints=goal.waypoints), 0.1)
+    assert route._path is path, "the same goal is not planned again"
+    route.plan(ego(6.0, -1.75), NOTHING, Goal(waypoints=np.array([[90.0, -1.75, 0.0]])), 0.1)
+    assert route._path.points[-1] == pytest.approx((90.0, -1.75), abs=0.05)
+
+
+def test_waypoints_off_the_road_are_joined_directly(car: ActorSpec, roads: RoadNetwork) -> None:
+    for network in (roads, None):
+        route = planner(car, network)
+        route.plan(ego(0.0, -40.0), NOTHING, Goal(waypoints=np.array([[20.0, -40.0, 0.0], [40.0, -50.0, 0.0]])), 0.0)
+        path = route._path
+        assert path is not None
+        assert path.points[0] == pytest.approx((0.0, -40.0))
+        assert path.points[-1] == pytest.approx((40.0, -50.0))
+        assert np.hypot(*(path.points - [20.0, -40.0]).T).min() < 1.0
+
+
+def test_speeds(car: ActorSpec) -> None:
+    route = planner(car, None, target_speed=7.0)
+    assert route.plan(ego(0, 0), NOTHING, None, 0.0).speeds[0] == 7.0
+    assert route.plan(ego(0, 0), NOTHING, Goal(speed=3.0), 0.0).speeds[0] == 3.0
+    free = planner(car, None)
+    assert free.plan(ego(0, 0, speed=4.5), NOTHING, None, 0.0).speeds[0] == 4.5
+    assert free.plan(ego(0, 0, speed=2.0), NOTHING, None, 0.0).speeds[0] == 4.5
+
+
+def test_a_straight_path_without_roads_never_ends(car: ActorSpec) -> None:
+    route = planner(car, None, target_speed=10.0)
+    for x in range(0, 2000, 5):
+        plan = route.plan(ego(float(x), 0.0), NOTHING, None, 0.0)
+        assert plan.points[0][0] <= x <= plan.points[1][0] + 1e-9
+        assert len(plan.points) == 60
+        assert plan.speeds[0] == 10.0
