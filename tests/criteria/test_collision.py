@@ -45,6 +45,14 @@ def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any, settings: di
     assert "never in the world" in verdict.reason
 
 
+def test_only_a_touch_is_fatal(frame: Any, car: Any) -> None:
+    judged = criterion(**{"with": "Incoming", "fatal": True})
+    (waiting,) = judge([frame(0.0, {"Ego": car(0)})], [judged])
+    cars = {"Ego": car(0), "Incoming": car(9)}
+    (hit,) = judge([frame(1.0, cars, [Contact("Ego", "Incoming", (0, 0, 0), 1.0)])], [judged])
+    assert (waiting.passed, waiting.fatal, hit.passed, hit.fatal) == (False, False, False, True)
+
+
 def test_one_that_comes_later_counts(frame: Any, car: Any) -> None:
     frames = [frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(0), "Incoming": car(9)}), frame(2.0, {"Ego": car(0)})]
     (verdict,) = judge(frames, [criterion(**{"with": "Incoming"})])
