@@ -41,6 +41,7 @@ from eidrive_scenario.reporting.road_drawing import road_drawing
 from eidrive_scenario.reporting.street_view import driver_view, helper_view, street_picture
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
+from eidrive_scenario.world.specs import actor_spec
 
 Told = tuple[RunResult, Story | None]
 
@@ -75,17 +76,18 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
     if snapshot is None:
         return ()
     view, pictures = snapshot.view, []
+    bodies = {name: actor_spec(name, scenario.entities[name]) for name in view.names}
     pose = driver_view(view, EGO)
     pictures.append(
         CameraPicture(
             f"What {EGO} sees",
             f"at {view.time:.2f} s, when it brakes for a car that it has only heard of",
-            street_picture(scenario, roads, view, pose, without=EGO),
+            street_picture(bodies, roads, view, pose, without=EGO),
         )
     )
     for sender in (heard.message.sender for heard in snapshot.heard):
         pose = helper_view(view, sender, HIDDEN)
-        png = street_picture(scenario, roads, view, pose, without=sender)
+        png = street_picture(bodies, roads, view, pose, without=sender)
         pictures.append(CameraPicture(f"What {sender} sees", f"at {view.time:.2f} s, looking at {HIDDEN}", png))
     return tuple(pictures[:2])
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import Placement
-from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
@@ -51,15 +50,21 @@ def helper_view(view: WorldView, name: str, target: str) -> Array:
 
 
 def street_picture(
-    scenario: Scenario, roads: RoadNetwork | None, view: WorldView, pose: Array, *, without: str, fov: float = 80.0
+    bodies: Mapping[str, ActorSpec],
+    roads: RoadNetwork | None,
+    view: WorldView,
+    pose: Array,
+    *,
+    without: str,
+    fov: float = 80.0,
 ) -> bytes:
     """A PNG of all actors of `view` where they were, taken from `pose`; the actor `without`, who holds the camera, is
-    left out. `fov` is horizontal [degrees]."""
+    left out. `bodies` are by name; `fov` is horizontal [degrees]."""
     with World(roads) as world:
         for row, name in enumerate(view.names):
             x, y, z = view.position[row].tolist()
             angles = (float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row]))
-            world.add(actor_spec(name, scenario.entities[name]), Placement(x, y, z, *angles))
+            world.add(bodies[name], Placement(x, y, z, *angles))
         picture = world.camera(pose, WIDTH, HEIGHT, math.radians(fov), ignore=(without,))
     done, png = cv2.imencode(".png", cv2.cvtColor(picture.rgb, cv2.COLOR_RGB2BGR))
     if not done:
