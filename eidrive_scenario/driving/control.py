@@ -14,7 +14,10 @@ LARGEST_ACCELERATION = 3.5
 LARGEST_DECELERATION = 6.5
 """What the regulator asks for at most, as EI-Drive's planner [m/s²]; an emergency brake of the plan may exceed it."""
 LONGITUDINAL = Gains(proportional=1.5, integral=0.2)
-"""On the error of the speed [1/s]: time constant 2/3 s; the integral carries rolling resistance and drag."""
+"""On the error of the speed [1/s]: time constant 2/3 s; the integral carries rolling resistance and drag, and learns
+them near the target, where the error is at most"""
+SPEED_BAND = 1.0
+"""[m/s]"""
 LATERAL = Gains(proportional=1.0, integral=0.1)
 """On the turn towards the path; the integral carries the slip of the tyres in a curve."""
 CROSS_TRACK_GAIN = 2.0
@@ -36,7 +39,7 @@ class Controller:
 
     def __init__(self, spec: ActorSpec, dt: float) -> None:
         self.spec = spec
-        self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt)
+        self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt, band=SPEED_BAND)
         self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt)
         self._steering = 0.0
 

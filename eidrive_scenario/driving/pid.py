@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -15,14 +16,18 @@ class Gains:
 
 
 class PID:
-    """output = kp·e + ki·∫e dt + kd·de/dt, within limits; the integral stands still while the output is at one of them
-    and the error would drive it further (conditional integration)."""
+    """output = kp·e + ki·∫e dt + kd·de/dt, within limits.
 
-    def __init__(self, gains: Gains, *, low: float, high: float, dt: float) -> None:
+    Conditional integration: the integral stands still while the output is at a limit and the error would drive it
+    further, and while the error is larger than `band`, where it would only learn the way to the target.
+    """
+
+    def __init__(self, gains: Gains, *, low: float, high: float, dt: float, band: float = math.inf) -> None:
         self.gains = gains
         self.low = low
         self.high = high
         self.dt = dt
+        self.band = band
         self._integral = 0.0
         self._last: float | None = None
 
@@ -36,8 +41,10 @@ class PID:
         gains = self.gains
         slope = 0.0 if self._last is None else (error - self._last) / self.dt
         self._last = error
+        fixed = feed_forward + gains.proportional * error + gains.derivative * slope
         integral = self._integral + error * self.dt
-        output = feed_forward + gains.proportional * error + gains.integral * integral + gains.derivative * slope
-        if self.low < output < self.high or (output >= self.high) == (error < 0.0):
+        output = fixed + gains.integral * integral
+        free = self.low < output < self.high or (output >= self.high) == (error < 0.0)
+        if free and abs(error) <= self.band:
             self._integral = integral
-        return min(max(output, self.low), self.high)
+        return min(max(fixed + gains.integral * self._integral, self.low), self.high)
