@@ -22,8 +22,8 @@ SUN = (0.45, -0.35, 0.82)
 class Visuals:
     """Bodies without collision shape: one for each material of each actor, moved to the actors before each picture."""
 
-    def __init__(self, client: int, scenery: Scenery) -> None:
-        self._client = client
+    def __init__(self, scenery: Scenery) -> None:
+        self._client: int = bullet.connect(bullet.DIRECT)
         self._scenery = scenery
         self._parts: dict[str, tuple[Body, list[int]]] = {}
         self._row_of_handle = np.empty(0, dtype=np.int32)
@@ -39,7 +39,11 @@ class Visuals:
             viewMatrix=view_matrix(pose),
             projectionMatrix=projection_matrix(width, height, fov, near, far),
             lightDirection=SUN,
-            shadow=1,
+            shadow=0,
+            lightColor=(1.0, 1.0, 1.0),
+            lightAmbientCoeff=0.62,
+            lightDiffuseCoeff=0.55,
+            lightSpecularCoeff=0.08,
             renderer=bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )

@@ -237,7 +237,7 @@ class World:
         `ignore` are not drawn. The first picture of a world makes all meshes; a world without pictures never does.
         """
         if self._visuals is None:
-            self._visuals = Visuals(self._client, self._scenery)
+            self._visuals = Visuals(self._scenery)
         rows = self.view().rows
         hidden = frozenset(ignore)
         shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}

@@ -7,11 +7,25 @@ from functools import lru_cache
 
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.meshes.cars import car
+from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
+from eidrive_scenario.world.meshes.figures import crate, pedestrian, roadside_unit
 from eidrive_scenario.world.meshes.frame import Frame
+from eidrive_scenario.world.meshes.heavy import bus, firetruck, truck
 from eidrive_scenario.world.meshes.solids import Array, Mesh
+from eidrive_scenario.world.meshes.vans import ambulance, van
 
 BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
     "car": car,
+    "firetruck": firetruck,
+    "ambulance": ambulance,
+    "bus": bus,
+    "van": van,
+    "truck": truck,
+    "motorbike": motorbike,
+    "bicycle": bicycle,
+    "pedestrian": pedestrian,
+    "rsu": roadside_unit,
+    "box": crate,
 }
 
 
@@ -27,4 +41,4 @@ def actor_mesh(spec: ActorSpec) -> Mapping[str, Array]:
 
 @lru_cache(maxsize=256)
 def _mesh(shape: str, frame: Frame) -> Mapping[str, Array]:
-    return BUILDERS.get(shape, car)(frame).materials()
+    return BUILDERS[shape](frame).materials()

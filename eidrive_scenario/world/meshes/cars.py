@@ -49,8 +49,7 @@ def _shell(mesh: Mesh, frame: Frame, belt: float, side: float, upright: bool) ->
         (0.988, 0.82, 0.18, 0.37, belt - 0.19),
         (1.000, 0.72, 0.22, 0.34, belt - 0.25),
     ]
-    # The rings run clockwise seen from the rear, as a loft wants it that goes forward.
-    mesh.add("paint", loft([_ring(frame, *section)[::-1] for section in sections]))
+    mesh.add("paint", loft([_ring(frame, *section) for section in sections]))
 
 
 def _cabin(mesh: Mesh, frame: Frame, belt: float, sill: tuple[float, float], roof: tuple[float, float]) -> None:

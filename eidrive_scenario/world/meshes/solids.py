@@ -66,6 +66,28 @@ def tapered_box(centre: Point, size: Point, top: Point, shift: float = 0.0) -> A
     return hexahedron(bottom + upper)
 
 
+def bevelled_box(centre: Point, size: Point, bevel: float) -> Array:
+    """An upright cuboid whose edges are cut off by `bevel`, as sheet metal looks from some way off."""
+    x, y, z = centre
+    length, width, height = (extent / 2 for extent in size)
+
+    def ring(at: float, inset: float) -> Array:
+        w, h, b = width - inset, height - inset, bevel
+        outline = [
+            (-w + b, -h),
+            (w - b, -h),
+            (w, -h + b),
+            (w, h - b),
+            (w - b, h),
+            (-w + b, h),
+            (-w, h - b),
+            (-w, -h + b),
+        ]
+        return np.array([(x + at, y + across, z + up) for across, up in reversed(outline)])
+
+    return loft([ring(-length, bevel), ring(bevel - length, 0.0), ring(length - bevel, 0.0), ring(length, bevel)])
+
+
 def side_prism(profile: Sequence[Point], y0: float, y1: float) -> Array:
     """An outline (x, z), convex or star-shaped about its mean and counter-clockwise seen from the right (y < 0),
     pulled from y0 to y1."""
