@@ -52,7 +52,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
     """The parameters that this scenario draws for `seed`. Raises SettingError with file:line."""
     drawn: dict[str, str] = {}
     for action in _commands(scenario):
-        data = load_yaml(action.value, source=action.source, line=action.line)
+        data = load_yaml(action.content, source=action.source, line=action.line)
         if not isinstance(data, dict):
             raise SettingError(
                 Problem(
@@ -84,9 +84,7 @@ def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, sp
 
 def _commands(scenario: Scenario) -> Iterator[CustomCommandAction]:
     init = scenario.storyboard.init
-    if init.actions is None:
-        return
     for user_defined in init.actions.user_defined_action:
         command = user_defined.custom_command_action
-        if command is not None and command.type == COMMAND:
+        if command.type == COMMAND:
             yield command

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model.element import Element, children
 from eidrive_scenario.openscenario.model.enumerations import ParameterType, Rule
+from eidrive_scenario.openscenario.model.scalars import ParameterName
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +28,7 @@ class ValueConstraintGroup(Element):
 class ParameterDeclaration(Element):
     """A parameter with its type and its default."""
 
-    name: str
+    name: ParameterName
     parameter_type: ParameterType
     value: str
     constraint_group: tuple[ValueConstraintGroup, ...] = children(since="1.1")
@@ -44,7 +45,7 @@ class ParameterDeclarations(Element):
 class ParameterAssignment(Element):
     """The value that a referenced entry gets for one of its parameters."""
 
-    parameter_ref: str
+    parameter_ref: ParameterName
     value: str
 
 

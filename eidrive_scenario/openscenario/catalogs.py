@@ -1,0 +1,185 @@
+"""Entries of catalogs: found where the scenario says that its catalogs lie, and read with the values they get."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.openscenario.document import VERSIONS, version_of
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
+from eidrive_scenario.openscenario.parameters import Assignment, Parameter, Scope
+from eidrive_scenario.openscenario.parsing import Document, line_of, open_document
+from eidrive_scenario.openscenario.reader import FoundReference, Reader
+from eidrive_scenario.openscenario.scalars import Version
+from eidrive_scenario.openscenario.schema import rules
+
+
+@dataclass(frozen=True)
+class CatalogFile:
+    """A catalog and its entries by name."""
+
+    name: str
+    document: Document
+    version: Version
+    entries: dict[str, etree._Element]
+
+
+class CatalogLibrary:
+    """The catalogs that a scenario can reach. Each file is read once, each entry once for each set of values.
+
+    An entry should declare the parameters that it uses; where it does not, the scenario's are lent, with a warning.
+    """
+
+    def __init__(
+        self,
+        locations: CatalogLocations | None,
+        folder: Path,
+        parameters: Mapping[str, Parameter],
+        findings: Findings,
+    ) -> None:
+        self.entries: dict[CatalogReference, Element] = {}
+        self._parameters = parameters
+        self._findings = findings
+        self._places: dict[str, Path] = {}
+        for location in locations.children() if locations else ():
+            directory = getattr(location, "directory", None)
+            if directory is not None and isinstance(directory.path, str):
+                path = Path(directory.path.replace("\\", "/"))
+                self._places[type(location).__name__.removesuffix("CatalogLocation")] = folder / path
+        self._files: dict[Path, CatalogFile | None] = {}
+
+    def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
+        """Reads the entries that the references name, and those that these refer to in turn."""
+        for one in found:
+            reference = one.reference
+            names = (reference.catalog_name, reference.entry_name)
+            if not all(isinstance(name, str) for name in names):
+                continue
+            if names in active:
+                self._wrong(reference, f"the catalog entry {names[1]!r} refers to itself", "break the circle")
+                continue
+            if reference not in self.entries:
+                entry = self._entry(one, (*active, names))
+                if entry is not None:
+                    self.entries[reference] = entry
+            self._check_kind(one)
+
+    def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> Element | None:
+        reference = found.reference
+        catalog = self._catalog(found)
+        if catalog is None:
+            return None
+        node = catalog.entries.get(reference.entry_name)
+        if node is None:
+            self._wrong(
+                reference,
+                f"the catalog {catalog.name!r} has no entry {reference.entry_name!r}",
+                suggestion(reference.entry_name, catalog.entries),
+            )
+            return None
+        rule = rules(Catalog, catalog.version).children.get(node.tag)
+        if rule is None:
+            self._wrong(reference, f"{node.tag} is nothing that a catalog may hold", str(catalog.document.name))
+            return None
+        reader = Reader(catalog.document.name, catalog.version, self._findings)
+        lent = Scope(parameters=dict(self._parameters), lent=set())
+        entry = reader.read(node, rule.cls, _assignments(reference), lent)
+        for name in sorted(lent.lent or ()):
+            self._findings.warn(
+                f"the catalog entry {reference.entry_name!r} uses the scenario's parameter {name!r}",
+                "declare it in the entry and assign it where the entry is used",
+                source=entry.source,
+                line=entry.line,
+            )
+        self.resolve(reader.references, active)
+        return entry
+
+    def _check_kind(self, found: FoundReference) -> None:
+        entry = self.entries.get(found.reference)
+        if entry is not None and not isinstance(entry, found.kinds):
+            wanted = " or ".join(kind.__name__ for kind in found.kinds)
+            self._wrong(
+                found.reference,
+                f"the catalog entry {found.reference.entry_name!r} is of the kind {type(entry).__name__}",
+                f"{wanted} is wanted here",
+            )
+
+    def _catalog(self, found: FoundReference) -> CatalogFile | None:
+        """The catalog of that name: a file of the name first, then any that says so within."""
+        name = found.reference.catalog_name
+        places = self._ordered_places(found.kinds)
+        if not places:
+            wanted = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
+            self._wrong(found.reference, f"no place is given for the catalog {name!r}", f"add {wanted}")
+            return None
+        files = list(_candidates(places, name))
+        before = len(self._findings.problems)
+        catalogs = {path: catalog for path in files if (catalog := self._file(path)) is not None}
+        named = next((catalog for catalog in catalogs.values() if catalog.name == name), None)
+        if named is not None:
+            return named
+        if len(self._findings.problems) > before or any(path.stem == name and path not in catalogs for path in files):
+            return None
+        for path, catalog in catalogs.items():
+            if path.stem == name:
+                message = f"the catalog in {path.name} is named {catalog.name!r}"
+                line = line_of(catalog.document.root)
+                self._findings.warn(message, f"name it {name!r}", source=catalog.document.name, line=line)
+                return catalog
+        where = ", ".join(str(place) for place in places)
+        known = suggestion(name, {catalog.name for catalog in catalogs.values()})
+        self._wrong(found.reference, f"no catalog {name!r} in {where}", known)
+        return None
+
+    def _ordered_places(self, kinds: Iterable[type[Element]]) -> list[Path]:
+        """Where catalogs of these kinds lie, then all other places: not every author keeps them apart."""
+        own = [self._places[kind.__name__] for kind in kinds if kind.__name__ in self._places]
+        return list(dict.fromkeys([*own, *self._places.values()]))
+
+    def _file(self, path: Path) -> CatalogFile | None:
+        """The catalog in a file, or None if it has none; what is wrong with it is found once."""
+        if path not in self._files:
+            try:
+                self._files[path] = self._read(path)
+            except ScenarioError as error:
+                self._findings.problems.extend(error.problems)
+                self._files[path] = None
+        return self._files[path]
+
+    def _read(self, path: Path) -> CatalogFile | None:
+        document = open_document(path)
+        catalog = document.root.find("Catalog")
+        if catalog is None:
+            return None
+        version = version_of(document, self._findings, older=VERSIONS[0])
+        if version is None:
+            return None
+        entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
+        return CatalogFile(catalog.get("name", path.stem), document, version, entries)
+
+    def _wrong(self, reference: CatalogReference, message: str, remedy: str) -> None:
+        self._findings.error(message, remedy, source=reference.source, line=reference.line)
+
+
+def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
+    given = reference.parameter_assignments
+    return {
+        one.parameter_ref: Assignment(one.value, Problem("", "", one.source, one.line))
+        for one in (given.parameter_assignment if given else ())
+        if isinstance(one.parameter_ref, str) and isinstance(one.value, str)
+    }
+
+
+def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
+    """Files that may hold a catalog of that name, the likely ones first."""
+    for place in places:
+        if place.is_file():
+            yield place
+        elif place.is_dir():
+            files = sorted(place.glob("*.xosc"))
+            yield from sorted(files, key=lambda file: file.stem != name)

@@ -1,0 +1,155 @@
+"""Expressions in `${…}`: arithmetic and logic over parameters, and nothing else of Python.
+
+Operators: + - * / % and the unary minus, not, and, or, brackets. Functions and constants: see FUNCTIONS and CONSTANTS.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import simpleeval
+
+from eidrive_scenario.errors import suggestion
+
+Value: TypeAlias = float | int | bool | str
+
+MAX_LENGTH = 1000
+"""Characters in one expression."""
+
+_PARAMETER = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
+_WORD = re.compile(r"(?<![\w$.])[A-Za-z_]\w*", re.ASCII)
+_GLUED = re.compile(r"(?<![\w$.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+[A-Za-z_]", re.ASCII)
+_PREFIX = "parameter_"
+
+
+class ExpressionError(Exception):
+    """An expression is wrong: what is wrong, and the remedy."""
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message, remedy)
+        self.message = message
+        self.remedy = remedy
+
+
+def _round(value: float) -> int:
+    return int(math.copysign(math.floor(abs(value) + 0.5), value))
+
+
+def _sign(value: float) -> int:
+    return (value > 0) - (value < 0)
+
+
+def _remainder(left: float, right: float) -> float:
+    rest = math.fmod(left, right)
+    return int(rest) if isinstance(left, int) and isinstance(right, int) else rest
+
+
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "abs": abs,
+    "acos": math.acos,
+    "asin": math.asin,
+    "atan": math.atan,
+    "ceil": math.ceil,
+    "cos": math.cos,
+    "floor": math.floor,
+    "max": max,
+    "min": min,
+    "pow": math.pow,
+    "round": _round,
+    "sign": _sign,
+    "sin": math.sin,
+    "sqrt": math.sqrt,
+    "tan": math.tan,
+}
+CONSTANTS: Mapping[str, Value] = {"pi": math.pi, "e": math.e, "true": True, "false": False}
+
+_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Mod: _remainder,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Not: operator.not_,
+}
+_NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.boolop, ast.Call, ast.Name, ast.Constant, ast.Load)
+HELP = "it takes + - * / % not and or, brackets, and " + " ".join(FUNCTIONS)
+_KEYWORDS = {"and", "or", "not"}
+
+
+def parameters_of(text: str) -> list[str]:
+    """The parameters that an expression names."""
+    return _PARAMETER.findall(text)
+
+
+def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
+    """The value of an expression, without its `${` and `}`. Raises ExpressionError."""
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"the expression has {len(text)} characters", f"at most {MAX_LENGTH} are allowed")
+    if _GLUED.search(text):
+        raise ExpressionError(f"{text!r} is not an expression", "a number ends before a word begins")
+    source = _PARAMETER.sub(rf" {_PREFIX}\1 ", text).strip()
+    names = {_PREFIX + name: _number(name, value) for name, value in parameters.items()}
+    evaluator = simpleeval.SimpleEval(
+        operators=dict(_OPERATORS), functions=dict(FUNCTIONS), names=names | dict(CONSTANTS)
+    )
+    try:
+        tree = ast.parse(source, mode="eval")
+        _check(tree, text)
+        result = evaluator.eval(source, previously_parsed=tree.body)
+        if not isinstance(result, int | float) or not math.isfinite(result):
+            raise ExpressionError(f"the expression {text!r} has no finite value")
+        return result
+    except ExpressionError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        raise ExpressionError(f"the expression {text!r} has no value: {error}") from error
+    except (SyntaxError, TypeError, simpleeval.InvalidExpression, RecursionError, MemoryError) as error:
+        raise ExpressionError(f"{text!r} is not an expression", HELP) from error
+
+
+def concatenate(text: str, parameters: Mapping[str, str]) -> str:
+    """The text that an expression such as `brake_ + $side` joins: words as they stand, parameters by their values."""
+    parts = [part.strip() for part in text.split("+")]
+    return "".join(_PARAMETER.sub(lambda match: parameters[match.group(1)], part) for part in parts)
+
+
+def joins_text(text: str, parameters: Mapping[str, Value]) -> bool:
+    """Whether an expression joins text: it has a bare word that is no function, or a parameter that is no number."""
+    words = set(_WORD.findall(text)) - _KEYWORDS - FUNCTIONS.keys() - CONSTANTS.keys()
+    return bool(words) or any(isinstance(value, str) for value in parameters.values())
+
+
+def _number(name: str, value: Value) -> float | int | bool:
+    if isinstance(value, str):
+        raise ExpressionError(f"${name} is {value!r}, which is no number")
+    return value
+
+
+def _check(tree: ast.Expression, text: str) -> None:
+    """Only what the standard has may reach the evaluator."""
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.operator | ast.unaryop):
+            allowed = isinstance(node, tuple(_OPERATORS))
+        elif isinstance(node, ast.Constant):
+            allowed = type(node.value) in (int, float)
+        elif isinstance(node, ast.Call):
+            allowed = isinstance(node.func, ast.Name) and not node.keywords
+        else:
+            allowed = isinstance(node, _NODES)
+        if not allowed:
+            what = type(node).__name__
+            raise ExpressionError(f"{text!r} is not an expression of the standard: {what} is not part of it")
+        if isinstance(node, ast.Name) and not node.id.startswith(_PREFIX):
+            known = FUNCTIONS if id(node) in called else CONSTANTS
+            if node.id not in known:
+                kind = "function" if id(node) in called else "word"
+                remedy = suggestion(node.id, known) if kind == "function" else "a parameter begins with $"
+                raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {text!r}", remedy)

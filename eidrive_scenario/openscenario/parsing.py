@@ -1,0 +1,110 @@
+"""Bytes of a file into an XML tree: no network, no document type, no entities, bounded size and depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias, cast
+from xml.parsers import expat
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, ScenarioError
+
+Source: TypeAlias = "Path | str | bytes | etree._Element"
+
+MAX_BYTES = 64 * 2**20
+"""Size of a file."""
+MAX_DEPTH = 100
+"""Levels of elements."""
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed file.
+
+    name    what messages call it
+    path    where it lies; None where it was handed in otherwise
+    folder  what its relative paths start from
+    """
+
+    root: etree._Element
+    name: str
+    path: Path | None
+    folder: Path
+
+
+class _PrologEnds(Exception):
+    """The first element has begun: nothing dangerous can follow."""
+
+
+def open_document(source: Source) -> Document:
+    """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
+    if isinstance(source, etree._Element):
+        base = Path(source.base) if source.base else None
+        return Document(source, str(base or "<element>"), base, base.parent if base else Path())
+    if isinstance(source, bytes):
+        return Document(parse(source, "<bytes>"), "<bytes>", None, Path())
+    path = Path(source)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ScenarioError(Problem(f"the file is larger than {MAX_BYTES // 2**20} MiB", "split it", str(source)))
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ScenarioError(Problem(f"cannot be read: {reason}", "check the path", str(source))) from error
+    return Document(parse(content, str(source)), str(source), path, path.parent)
+
+
+def parse(content: bytes, name: str) -> etree._Element:
+    """The root element of an XML file's bytes. Raises ScenarioError with file:line."""
+    if len(content) > MAX_BYTES:
+        raise ScenarioError(Problem(f"the file is larger than {MAX_BYTES // 2**20} MiB", "split it", name))
+    _refuse_document_type(content, name)
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        root = etree.fromstring(content, parser)
+    except etree.XMLSyntaxError as error:
+        raise ScenarioError(_not_well_formed(error.msg, error.lineno, name)) from error
+    too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)
+    if too_deep is not None:
+        problem = Problem(f"elements are nested more than {MAX_DEPTH} deep", "flatten them", name, line_of(too_deep))
+        raise ScenarioError(problem)
+    return root
+
+
+def line_of(node: etree._Element) -> int | None:
+    """The line where an element begins."""
+    return cast("int | None", node.sourceline)
+
+
+def _refuse_document_type(content: bytes, name: str) -> None:
+    """Reads no further than to the first element; a document type, where entities are declared, ends it at once."""
+    parser = expat.ParserCreate()
+
+    def document_type(*_: object) -> None:
+        raise ScenarioError(
+            Problem(
+                "the file has a document type declaration (DOCTYPE), which may bring in entities and other files",
+                "remove it; OpenSCENARIO needs none",
+                name,
+                parser.CurrentLineNumber,
+            )
+        )
+
+    def first_element(*_: object) -> None:
+        raise _PrologEnds
+
+    parser.StartDoctypeDeclHandler = document_type
+    parser.StartElementHandler = first_element
+    try:
+        parser.Parse(content, True)
+    except _PrologEnds:
+        return
+    except expat.ExpatError as error:
+        raise ScenarioError(_not_well_formed(expat.ErrorString(error.code), error.lineno, name)) from error
+
+
+def _not_well_formed(what: str | None, line: int | None, name: str) -> Problem:
+    remedy = "every tag has to be closed, every value quoted, & written as &amp;"
+    return Problem(f"not well-formed XML: {what or 'unreadable'}", remedy, name, line)

@@ -1,0 +1,233 @@
+"""XML elements into the model, as the classes of the model say; every finding with its file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, cast
+
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.openscenario.expressions import ExpressionError
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import (
+    Catalog,
+    CatalogReference,
+    Element,
+    Enumeration,
+    ParameterDeclaration,
+    ParameterDeclarations,
+)
+from eidrive_scenario.openscenario.parameters import REFERENCE, Assignment, Parameter, Scope, declare
+from eidrive_scenario.openscenario.parsing import line_of
+from eidrive_scenario.openscenario.scalars import STRING, Version, availability
+from eidrive_scenario.openscenario.schema import AttributeRule, Rules, rules
+from eidrive_scenario.openscenario.structure import check_children
+
+_SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
+_IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
+_WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
+
+
+@dataclass(frozen=True)
+class FoundReference:
+    """A catalog reference and the kinds of entry that fit there."""
+
+    reference: CatalogReference
+    kinds: tuple[type[Element], ...]
+
+
+class Reader:
+    """Reads elements of one file.
+
+    Elements that are wrong are built as far as they go, so that all findings of a file come in one go; use what
+    was built only if `findings` has no problems.
+    """
+
+    def __init__(self, source: str, version: Version, findings: Findings) -> None:
+        self.source = source
+        self.version = version
+        self.findings = findings
+        self.references: list[FoundReference] = []
+        self.declared: Scope | None = None
+        """The parameters that the element read declares itself."""
+        self._with_text: set[etree._Element] = set()
+
+    def read(
+        self,
+        node: etree._Element,
+        cls: type[Element],
+        assignments: Mapping[str, Assignment] | None = None,
+        lent: Scope | None = None,
+    ) -> Element:
+        """The element and all below.
+
+        assignments  values for the parameters that it declares itself
+        lent         parameters of another file, for those that it does not declare
+        """
+        self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
+        open_assignments = dict(assignments or {})
+        element = self._element(node, cls, lent or Scope(), open_assignments)
+        self._unknown_parameters(open_assignments, ())
+        return element
+
+    def _element(
+        self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
+    ) -> Element:
+        known = rules(cls, self.version)
+        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        below = list(node.iterchildren(etree.Element))
+        if "ParameterDeclarations" in known.children:
+            declarations = next((child for child in below if child.tag == "ParameterDeclarations"), None)
+            if declarations is not None:
+                scope = Scope(scope)
+                self.declared = self.declared or scope
+                values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
+        self._attributes(node, known, scope, values)
+        self._text(node, known, values)
+        for child in below:
+            self._child(node, child, known, scope, values)
+        if below or known.children:
+            check_children(node, below, known, self.version, self._error)
+        if "catalog_reference" in values:
+            self._note_references(known, values["catalog_reference"])
+        return make(cls, values)
+
+    def _attributes(self, node: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]) -> None:
+        present = set()
+        for name, text in cast(list[tuple[str, str]], node.items()):
+            rule = known.attributes.get(name)
+            if rule is not None:
+                present.add(name)
+                values[rule.field] = self._value(node, name, text, rule, scope)
+            elif name not in _IGNORED:
+                usage = known.other_attributes.get(name)
+                remedy = availability(usage, self.version) if usage else suggestion(name, known.attributes)
+                self._error(f"{node.tag} has no attribute {name!r}", remedy, node)
+        for name, rule in known.attributes.items():
+            if rule.required and name not in present:
+                self._error(f"{node.tag} lacks the attribute {name!r}", f"it is {rule.scalar.name}", node)
+
+    def _value(self, node: etree._Element, name: str, text: str, rule: AttributeRule, scope: Scope) -> Any:
+        value: Any = None
+        try:
+            value = self._converted(text, rule, scope)
+        except ExpressionError as error:
+            if error.message:
+                self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
+        except ValueError as error:
+            self._error(f"{name} of {node.tag} is {text!r}, which is not {rule.scalar.name}", str(error), node)
+        if rule.deprecated:
+            self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
+        if isinstance(value, Enumeration) and rule.scalar.is_deprecated(value):
+            self._deprecated(f"{value.value!r} of {type(value).__name__}", value.usage.deprecated, node)
+        return value
+
+    def _converted(self, text: str, rule: AttributeRule, scope: Scope) -> Any:
+        if not text.startswith("$"):
+            return rule.scalar.convert(text)
+        if rule.points_to == "parameter" and REFERENCE.fullmatch(text):
+            return text[1:]
+        if text.startswith("${") and self.version < (1, 1):
+            if rule.scalar is STRING:
+                return text
+            raise ExpressionError(f"{text!r} is an expression", "OpenSCENARIO has them since 1.1")
+        return scope.resolve(text, rule.scalar)
+
+    def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
+        if known.text_field:
+            values[known.text_field] = "".join(cast(list[str], node.xpath("text()")))
+        elif node in self._with_text:
+            self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
+
+    def _child(
+        self, node: etree._Element, child: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]
+    ) -> None:
+        rule = known.children.get(child.tag)
+        if rule is None:
+            return
+        if rule.deprecated:
+            self._deprecated(f"{child.tag} in {node.tag}", rule.deprecated, child)
+        if rule.cls is ParameterDeclarations:
+            return
+        element = self._element(child, rule.cls, scope, {})
+        if rule.many:
+            values[rule.field] = (*values.get(rule.field, ()), element)
+        else:
+            values.setdefault(rule.field, element)
+
+    def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
+        """Reads declarations one by one, so that each may use those before it."""
+        known = rules(ParameterDeclarations, self.version)
+        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        below = list(node.iterchildren(etree.Element))
+        self._attributes(node, known, scope, values)
+        self._text(node, known, values)
+        check_children(node, below, known, self.version, self._error)
+        declared = []
+        for child in below:
+            if child.tag in known.children:
+                before = len(self.findings.problems)
+                declaration = self._element(child, ParameterDeclaration, scope, {})
+                sound = len(self.findings.problems) == before
+                declared.append(self._declared(cast(ParameterDeclaration, declaration), scope, assignments, sound))
+        values["parameter_declaration"] = tuple(declared)
+        self._unknown_parameters(assignments, scope.parameters)
+        assignments.clear()
+        return make(ParameterDeclarations, values)
+
+    def _declared(
+        self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], sound: bool
+    ) -> ParameterDeclaration:
+        """Puts a parameter into its scope. The declaration comes back with the value that counts."""
+        name = str(declaration.name)
+        given = assignments.pop(name, None)
+        other = scope.parameters.get(name)
+        if other is not None:
+            self._declared_twice(declaration, other)
+            return replace(declaration, value=other.text)
+        if not sound:
+            scope.parameters[name] = Parameter(name, "", "", "", sound=False)
+            return declaration
+        declare(scope, declaration, given, self.findings)
+        return replace(declaration, value=given.text) if given else declaration
+
+    def _declared_twice(self, declaration: ParameterDeclaration, other: Parameter) -> None:
+        message = f"the parameter {declaration.name!r} is declared twice"
+        report = self.findings.warn if declaration.value == other.declared else self.findings.error
+        report(message, "rename or remove one", source=self.source, line=declaration.line)
+
+    def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
+        for name, assignment in assignments.items():
+            place = assignment.origin or Problem("", "", self.source)
+            self.findings.error(
+                f"unknown parameter {name!r}", suggestion(name, declared), source=place.source, line=place.line
+            )
+
+    def _note_references(self, known: Rules, value: Any) -> None:
+        entries = {child.cls for child in rules(Catalog, self.version).children.values()}
+        kinds = tuple(child.cls for child in known.children.values() if child.cls in entries)
+        references = value if isinstance(value, tuple) else (value,)
+        self.references.extend(FoundReference(reference, kinds) for reference in references)
+
+    def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
+        self.findings.warn(f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node))
+
+    def _error(self, message: str, remedy: str, node: etree._Element) -> None:
+        self.findings.error(message, remedy, source=self.source, line=line_of(node))
+
+
+def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
+    """An element with these values and its defaults, complete or not: a wrong file is reported, not half refused."""
+    defaults = _DEFAULTS.get(cls)
+    if defaults is None:
+        defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
+        _DEFAULTS[cls] = defaults
+    element = object.__new__(cls)
+    element.__dict__.update(defaults)
+    element.__dict__.update(values)
+    return element
+
+
+_DEFAULTS: dict[type[Element], dict[str, Any]] = {}

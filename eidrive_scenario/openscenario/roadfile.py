@@ -1,0 +1,55 @@
+"""Where the road file of a scenario lies."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import File, RoadNetwork
+
+MAPS = "EIDRIVE_MAPS"
+"""Environment variable: folders in which a road file is looked for by its name."""
+SUFFIX = ".xodr"
+
+
+def find_road_file(network: RoadNetwork | None, folder: Path, findings: Findings) -> Path | None:
+    """The road file that the scenario names, or None if it names none.
+
+    It is looked for beside the scenario, then by its bare name in the folders of EIDRIVE_MAPS; a name without a
+    suffix, such as Town01, means Town01.xodr.
+    """
+    logic = network.logic_file if network else None
+    if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
+        return None
+    for candidate in _candidates(logic, folder):
+        if candidate.is_file():
+            return candidate
+    findings.error(
+        f"no road file {logic.filepath!r} beside the scenario nor in the folders of {MAPS}",
+        _remedy(logic, folder),
+        source=logic.source,
+        line=logic.line,
+    )
+    return None
+
+
+def _candidates(logic: File, folder: Path) -> Iterator[Path]:
+    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    for name in (named, named.with_name(named.name + SUFFIX)) if named.name else ():
+        yield folder / name
+        for maps in _map_folders():
+            yield maps / name.name
+
+
+def _map_folders() -> list[Path]:
+    return [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
+
+
+def _remedy(logic: File, folder: Path) -> str:
+    named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
+    places = [(folder / named).parent, *_map_folders()]
+    known = {file.name for place in places if place.is_dir() for file in place.glob(f"*{SUFFIX}")}
+    return suggestion(named.name, known) if known else f"check LogicFile, or set {MAPS} to where the maps lie"

@@ -1,0 +1,133 @@
+"""Text of a file into values, as XML Schema's simple types say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.openscenario.model import Enumeration
+from eidrive_scenario.openscenario.model.element import Usage
+from eidrive_scenario.openscenario.model.scalars import INT, Limits
+
+Version = tuple[int, int]
+
+_DOUBLE = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|-?INF|NaN", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+_DATE_TIME = re.compile(
+    r"(-?\d{4,})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(?:\.(\d+))?(Z|[+-](?:0\d|1[0-3]):[0-5]\d|[+-]14:00)?", re.ASCII
+)
+_WHITE_SPACE = " \t\r\n"
+_BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A simple type. `convert` raises ValueError, with the remedy as its text, where a text does not fit."""
+
+    name: str
+    """As in "is not …"."""
+    convert: Callable[[str], Any]
+    takes_expressions: bool = False
+    deprecated: frozenset[Any] = frozenset()
+    """Values that the version still knows, but deprecates."""
+
+    def is_deprecated(self, value: Any) -> bool:
+        """Whether the version deprecates this value."""
+        return value in self.deprecated
+
+
+def _double(text: str) -> float:
+    text = text.strip(_WHITE_SPACE)
+    if not _DOUBLE.fullmatch(text):
+        raise ValueError("write it as 12.5 or 1e-3")
+    return float(text)
+
+
+def integer(limits: Limits) -> Callable[[str], int]:
+    """A converter for whole numbers within limits."""
+
+    def convert(text: str) -> int:
+        text = text.strip(_WHITE_SPACE)
+        if not _INTEGER.fullmatch(text):
+            raise ValueError("write it in digits, without a decimal point")
+        value = int(text) if len(text) < 64 else limits.highest + 1
+        if not limits.lowest <= value <= limits.highest:
+            raise ValueError(f"it has to lie between {limits.lowest} and {limits.highest}")
+        return value
+
+    return convert
+
+
+def _boolean(text: str) -> bool:
+    value = _BOOLEANS.get(text.strip(_WHITE_SPACE))
+    if value is None:
+        raise ValueError("write true or false")
+    return value
+
+
+def _date_time(text: str) -> datetime:
+    match = _DATE_TIME.fullmatch(text.strip(_WHITE_SPACE))
+    if match is None:
+        raise ValueError("write it as 2026-01-31T12:00:00")
+    year, month, day, hour, minute, second = (int(part) for part in match.groups()[:6])
+    fraction, zone = match.group(7) or "", match.group(8) or ""
+    midnight = hour == 24 and minute == second == 0 and not fraction.strip("0")
+    try:
+        moment = datetime(year, month, day, 0 if midnight else hour, minute, second, int(fraction[:6].ljust(6, "0")))
+        zoned = datetime.fromisoformat(moment.isoformat() + zone)
+        return zoned + timedelta(days=1) if midnight else zoned
+    except (ValueError, OverflowError) as error:
+        raise ValueError(str(error)) from error
+
+
+DOUBLE = Scalar("a number", _double, True)
+INTEGER = Scalar("a whole number", integer(INT), True)
+BOOLEAN = Scalar("a truth value", _boolean, True)
+STRING = Scalar("a text", str, True)
+DATE_TIME = Scalar("a date and time", _date_time)
+
+
+def whole_number(limits: Limits) -> Scalar:
+    """A whole number within limits."""
+    return Scalar("a whole number", integer(limits), True)
+
+
+def enumeration(cls: type[Enumeration], version: Version) -> Scalar:
+    """A word of an enumeration, out of those that the version knows."""
+    words = {member.value: member for member in cls if is_known(member.usage, version)}
+
+    def convert(text: str) -> Enumeration:
+        member = words.get(text)
+        if member is None:
+            try:
+                other = cls(text)
+            except ValueError:
+                raise ValueError(suggestion(text, words)) from None
+            raise ValueError(availability(other.usage, version))
+        return member
+
+    deprecated = {
+        member for member in words.values() if member.usage.deprecated and version >= parsed(member.usage.deprecated)
+    }
+    return Scalar(f"a word of {cls.__name__}", convert, deprecated=frozenset(deprecated))
+
+
+def parsed(version: str) -> Version:
+    """The numbers of a version that is written as in "1.2"."""
+    major, minor = version.split(".")
+    return int(major), int(minor)
+
+
+def is_known(usage: Usage, version: Version) -> bool:
+    """Whether a version has the word, the attribute or the element."""
+    return not (usage.since and version < parsed(usage.since)) and not (usage.until and version > parsed(usage.until))
+
+
+def availability(usage: Usage, version: Version) -> str:
+    """Which versions have it, and which one the file is."""
+    span = f"since {usage.since}" if usage.since and version < parsed(usage.since) else f"up to {usage.until} only"
+    return f"OpenSCENARIO has it {span}; the file says {version[0]}.{version[1]}"

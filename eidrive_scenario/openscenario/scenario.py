@@ -1,0 +1,135 @@
+"""A scenario, read and checked: what everything above this room works with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.openscenario.catalogs import CatalogLibrary
+from eidrive_scenario.openscenario.document import read_root
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import (
+    CatalogReference,
+    Controller,
+    Element,
+    MiscObject,
+    OpenScenario,
+    ParameterDeclarations,
+    Pedestrian,
+    ScenarioObject,
+    Storyboard,
+    VariableDeclarations,
+    Vehicle,
+)
+from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.openscenario.parsing import Source, open_document
+from eidrive_scenario.openscenario.participants import scenario_objects
+from eidrive_scenario.openscenario.roadfile import find_road_file
+from eidrive_scenario.openscenario.rules import check_rules
+
+EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A scenario whose parameters are put in and whose catalog references lead somewhere.
+
+    name         the file's name without its suffix; the header's description where there is no file
+    version      of the standard that the file is written for, as (1, 3)
+    parameters   of the scenario as a whole, with the values that count
+    variables    of the scenario, with their values at the start
+    entities     by name, trailers included; catalog references resolved
+    controllers  of each entity, in the order of the file; catalog references resolved
+    road_file    None if the scenario names none
+    warnings     what the file's version of the standard deprecates
+    """
+
+    name: str
+    path: Path | None
+    version: tuple[int, int]
+    document: OpenScenario
+    parameters: Mapping[str, str]
+    variables: Mapping[str, str]
+    entities: Mapping[str, EntityObject]
+    controllers: Mapping[str, tuple[Controller, ...]]
+    road_file: Path | None
+    warnings: tuple[Problem, ...]
+    entries: Mapping[CatalogReference, Element] = field(repr=False)
+
+    @property
+    def storyboard(self) -> Storyboard:
+        """What happens when."""
+        assert self.document.storyboard is not None
+        return self.document.storyboard
+
+    def resolved(self, reference: CatalogReference) -> Element:
+        """The catalog's entry, with the values that the reference assigns to its parameters."""
+        return self.entries[reference]
+
+
+def load_scenario(source: Source, parameters: Mapping[str, str] | None = None) -> Scenario:
+    """Reads a scenario from a file, from its bytes or from a parsed tree, with other values for its parameters.
+
+    Raises ScenarioError with everything that is wrong with the file and its catalogs, each as file:line.
+    """
+    document = open_document(source)
+    findings = Findings()
+    assignments = {name: Assignment(str(value)) for name, value in (parameters or {}).items()}
+    read = read_root(document, findings, assignments)
+    if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
+        findings.settle()
+        raise ScenarioError(_other_kind(read.root if read else None, document.name))
+    root = read.root
+    library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, findings)
+    library.resolve(read.references)
+    road_file = find_road_file(root.road_network, document.folder, findings)
+    check_rules(root, read.version, library.entries, findings)
+    warnings = findings.settle()
+    objects = list(scenario_objects(root.entities, library.entries))
+    return Scenario(
+        name=document.path.stem if document.path else root.file_header.description,
+        path=document.path,
+        version=read.version,
+        document=root,
+        parameters=_values(root.parameter_declarations),
+        variables=_values(root.variable_declarations),
+        entities={one.name: body for one, body in objects if isinstance(body, Vehicle | Pedestrian | MiscObject)},
+        controllers={one.name: _controllers(one, library.entries) for one, _ in objects},
+        road_file=road_file,
+        warnings=warnings,
+        entries=library.entries,
+    )
+
+
+def _values(declarations: ParameterDeclarations | VariableDeclarations | None) -> dict[str, str]:
+    if declarations is None:
+        return {}
+    if isinstance(declarations, ParameterDeclarations):
+        return {one.name: one.value for one in declarations.parameter_declaration}
+    return {one.name: one.value for one in declarations.variable_declaration}
+
+
+def _controllers(one: ScenarioObject, entries: Mapping[CatalogReference, Element]) -> tuple[Controller, ...]:
+    found: list[Element | None] = []
+    for given in one.object_controller:
+        found.append(entries.get(given.catalog_reference) if given.catalog_reference else given.controller)
+    return tuple(controller for controller in found if isinstance(controller, Controller))
+
+
+def _other_kind(root: OpenScenario | None, name: str) -> Problem:
+    if root is not None and root.catalog is not None:
+        return Problem(
+            "this is a catalog, not a scenario", "name a scenario that refers to it", name, root.catalog.line
+        )
+    distribution = root.parameter_value_distribution if root else None
+    if distribution is None:
+        return Problem("this is no scenario", "", name)
+    return Problem(
+        "this is a distribution of parameter values, not a scenario",
+        f"its scenario is {distribution.scenario_file.filepath!r}",
+        name,
+        distribution.line,
+    )

@@ -1,0 +1,74 @@
+"""What is wrong with the children of one element: unknown, missing, too many, in the wrong place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from lxml import etree
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.openscenario.matching import Automaton
+from eidrive_scenario.openscenario.scalars import Version, availability
+from eidrive_scenario.openscenario.schema import Rules
+
+Report = Callable[[str, str, etree._Element], None]
+"""Takes what is wrong, the remedy, and the element where it is."""
+
+
+def check_children(
+    node: etree._Element, below: Iterable[etree._Element], known: Rules, version: Version, report: Report
+) -> None:
+    """Reports every child that the rules forbid, and every one that they miss."""
+    standing = []
+    for child in below:
+        if child.tag in known.children:
+            standing.append(child)
+        else:
+            report(f"unknown element {child.tag} in {node.tag}", _instead(node, child.tag, known, version), child)
+    if known.order is None:
+        _check_each_once(node, standing, known, report)
+    else:
+        _check_order(node, standing, known, known.order, report)
+
+
+def _instead(node: etree._Element, name: str, known: Rules, version: Version) -> str:
+    usage = known.other_children.get(name)
+    if usage:
+        return availability(usage, version)
+    return suggestion(name, known.children) if known.children else f"{node.tag} holds no elements"
+
+
+def _check_each_once(node: etree._Element, standing: list[etree._Element], known: Rules, report: Report) -> None:
+    seen: set[str] = set()
+    for child in standing:
+        if child.tag in seen:
+            report(f"{node.tag} holds {child.tag} twice", "remove one", child)
+        seen.add(child.tag)
+    for name, rule in known.children.items():
+        if rule.minimum and name not in seen:
+            report(f"{node.tag} lacks the element {name}", f"it holds {known.summary}", node)
+
+
+def _check_order(
+    node: etree._Element, standing: list[etree._Element], known: Rules, order: Automaton, report: Report
+) -> None:
+    """Follows the automaton; where it is stuck, that is reported once, and it goes on as if all had been right."""
+    state, misplaced = 0, False
+    seen: set[str] = set()
+    for child in standing:
+        following = order.steps[state].get(child.tag)
+        if following is None:
+            if not misplaced:
+                what = "may not stand here again" if child.tag in seen else "may not stand here"
+                report(f"{child.tag} {what}", f"{node.tag} holds {known.summary}", child)
+            misplaced = True
+            following = min(order.entrances(child.tag), default=state)
+        state = following
+        seen.add(child.tag)
+    if state in order.accepting:
+        return
+    for names in order.missing(state):
+        if not (misplaced and seen & set(names)):
+            another = "another " if seen & set(names) else ""
+            what = f"the element {another}{names[0]}" if len(names) == 1 else "one of " + ", ".join(names)
+            report(f"{node.tag} lacks {what}", f"it holds {known.summary}", node)
