@@ -1,22 +1,123 @@
-"""The surface that extensions may import: behaviors, criteria, and third-party packages. The engine never does."""
+"""The surface that extensions import: behaviors, criteria, detectors, channels, fusion methods. The engine never does."""
 
-from __future__ import annotations
-
-from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.driving.step import AgentStep, Goal, Plan
+from eidrive_scenario.errors import (
+    EidriveError,
+    InputError,
+    Problem,
+    ScenarioError,
+    SettingError,
+    SimulationError,
+    suggestion,
+)
+from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.geometry import box_distance, footprint_distance, overlap, wrap_angle
+from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+from eidrive_scenario.storyboard.actor import Actor, is_ours
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour, Domain
+from eidrive_scenario.storyboard.commands import Commands, CustomCommand, LightState, Override, Visibility
+from eidrive_scenario.storyboard.condition import Condition, EntityCondition, compares, in_words
+from eidrive_scenario.storyboard.distances import box_of, distance, frame_of, kind_of
+from eidrive_scenario.storyboard.motion import Motion, Place, Steering
+from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve
+from eidrive_scenario.storyboard.progress import Progress, Watch
+from eidrive_scenario.storyboard.route import route_of
+from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.trajectory import Layout, lay_out
+from eidrive_scenario.storyboard.transition import Transition as ValueTransition
+from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [
+    "CLASSES",
+    "Absent",
+    "ActionBehaviour",
+    "Actor",
+    "ActorSpec",
+    "AgentStep",
+    "Channel",
+    "Commands",
+    "Condition",
     "Contact",
+    "Control",
     "Criterion",
     "CriterionSettings",
+    "CustomCommand",
+    "Detections",
+    "Detector",
+    "Domain",
+    "EidriveError",
+    "EntityCondition",
     "Frame",
+    "FusionMethod",
+    "Goal",
+    "InputError",
+    "LaneLocation",
+    "Layout",
+    "LightState",
+    "LinkEvent",
+    "Message",
+    "Motion",
+    "Override",
+    "Place",
+    "Placement",
+    "Plan",
+    "Pose",
+    "Problem",
+    "Progress",
+    "Readings",
+    "Received",
+    "Report",
+    "RoadNetwork",
+    "Route",
+    "Scenario",
+    "ScenarioError",
+    "SettingError",
     "Settings",
+    "SimulationError",
+    "Stage",
+    "State",
+    "StateChange",
+    "Steering",
+    "Transition",
+    "ValueTransition",
     "Verdict",
+    "Visibility",
+    "Watch",
     "WorldView",
     "box_distance",
+    "box_of",
+    "compares",
+    "count_lanes",
+    "distance",
+    "facing",
+    "footprint_distance",
+    "frame_of",
+    "generator",
+    "in_words",
+    "is_ours",
     "judge",
+    "kind_of",
+    "lay_out",
+    "load_yaml",
+    "model",
     "never_appeared",
+    "overlap",
+    "parse_settings",
+    "references",
+    "resolve",
+    "route_of",
+    "suggestion",
+    "wrap_angle",
 ]

@@ -1,0 +1,1 @@
+"""Actions of the standard, one family per module."""

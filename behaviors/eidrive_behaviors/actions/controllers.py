@@ -1,0 +1,130 @@
+"""Actions on controllers: assign, activate, and hold pedals and wheel against their will."""
+
+from __future__ import annotations
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Override, Stage, is_ours, model
+
+GEARS = {"n": 0.0, "p": 0.0, "r": -1.0, "d": 1.0}
+
+
+class ActivateControllerAction(ActionBehaviour):
+    """Turns the actor's controller on or off per domain; a domain that is left out stays as it is.
+
+    An eidrive controller drives where both domains are on. Where it lets go, the actor keeps lane and speed; where it
+    takes over, it goes on from there. Controllers of other tools leave the actor to the scripted motion.
+    """
+
+    action: model.ActivateControllerAction
+
+    def update(self) -> Status:
+        """Switch."""
+        switch(self, self.action.lateral, self.action.longitudinal)
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Which domains."""
+        words = {True: "on", False: "off"}
+        domains = (("lateral", self.action.lateral), ("longitudinal", self.action.longitudinal))
+        named = [f"{name} {words[value]}" for name, value in domains if value is not None]
+        return f"controller {', '.join(named) or 'unchanged'}"
+
+
+class AssignControllerAction(ActionBehaviour):
+    """Gives the actor a controller of another tool, which here means the scripted motion.
+
+    Raises ScenarioError for one of our own: a station is built before the run, from the entity's ObjectController.
+    """
+
+    action: model.AssignControllerAction
+
+    def __init__(
+        self,
+        action: model.AssignControllerAction,
+        stage: Stage,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(action, stage, actor=actor, parent=parent)
+        self._controller = self._found()
+        if self._controller is not None and is_ours(self._controller):
+            raise self.problem(
+                "assigns an eidrive controller during the run",
+                "give it to the entity in ObjectController, and switch it by ActivateControllerAction",
+            )
+
+    def update(self) -> Status:
+        """Assign it, and switch the domains that the action names."""
+        if self._controller is not None and self._controller not in self.actor.controllers:
+            self.actor.controllers.append(self._controller)
+        switch(self, self.action.activate_lateral, self.action.activate_longitudinal)
+        return Status.SUCCESS
+
+    def _found(self) -> model.Controller | None:
+        holder = self.action if self.action.object_controller is None else self.action.object_controller
+        if holder.controller is not None:
+            return holder.controller
+        if holder.catalog_reference is not None:
+            return self.stage.catalog_entry(holder.catalog_reference, model.Controller)
+        return None
+
+    def describe(self) -> str:
+        """Which one."""
+        return f"assign controller {self._controller.name if self._controller is not None else 'none'}"
+
+
+class OverrideControllerValueAction(ActionBehaviour):
+    """Holds pedals, steering wheel or gear at a value, or gives them back. It counts for who drives itself."""
+
+    action: model.OverrideControllerValueAction
+
+    def update(self) -> Status:
+        """Hold or give back."""
+        held = self.stage.overrides.setdefault(self.actor.name, {})
+        for override in self._overrides():
+            if override.active:
+                held[override.control] = override
+            else:
+                held.pop(override.control, None)
+        return Status.SUCCESS
+
+    def _overrides(self) -> list[Override]:
+        action, found = self.action, []
+        simple = (("throttle", action.throttle), ("clutch", action.clutch), ("steeringWheel", action.steering_wheel))
+        for control, entry in simple:
+            if entry is not None:
+                found.append(Override(control, entry.value, entry.active))
+        for control, brake in (("brake", action.brake), ("parkingBrake", action.parking_brake)):
+            if brake is not None:
+                share = brake.brake_percent or brake.brake_force
+                found.append(Override(control, share.value if share is not None else brake.value or 0.0, brake.active))
+        if action.gear is not None:
+            found.append(Override("gear", self._gear(action.gear), action.gear.active))
+        return found
+
+    @staticmethod
+    def _gear(gear: model.OverrideGearAction) -> float:
+        if gear.manual_gear is not None:
+            return float(gear.manual_gear.number)
+        if gear.automatic_gear is not None:
+            return GEARS[gear.automatic_gear.gear.value]
+        return gear.number or 0.0
+
+    def describe(self) -> str:
+        """Which controls."""
+        words = [f"{o.control} {o.value:g}" if o.active else f"{o.control} free" for o in self._overrides()]
+        return f"override {', '.join(words)}"
+
+
+def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool | None) -> None:
+    """Turn the domains of an actor's own controller on or off; None leaves one as it is."""
+    actor = behaviour.actor
+    before = actor.driven
+    if lateral is not None:
+        actor.lateral = lateral
+    if longitudinal is not None:
+        actor.longitudinal = longitudinal
+    if before and not actor.driven and actor.present:
+        actor.motion.land()

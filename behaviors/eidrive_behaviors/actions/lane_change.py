@@ -1,0 +1,154 @@
+"""LaneChangeAction: move an actor over to another lane."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from py_trees.common import Status
+
+from eidrive_behaviors.actions.speed import dynamics_in_words
+from eidrive_scenario.api import (
+    ActionBehaviour,
+    Domain,
+    Goal,
+    LaneLocation,
+    Stage,
+    Steering,
+    ValueTransition,
+    count_lanes,
+    facing,
+    model,
+)
+
+TINY = 1e-6
+STANDING = 1e-6
+"""Slower than this an actor does not change lanes [m/s]."""
+NEAR = 0.2
+"""A driven vehicle that is this near to its place in the new lane has arrived [m]."""
+LOOKOUT = 100.0
+"""How far ahead a driven vehicle is given points of the new lane [m]."""
+
+
+class LaneChangeAction(ActionBehaviour):
+    """Takes the offset from the target lane's centre over to `targetLaneOffset` by the given dynamics.
+
+    A distance is measured along the lane. The actor covers its speed's distance on the slanted way; a demand to go
+    sideways faster than that is cut to it. A standing actor waits.
+    """
+
+    domains = Domain.LATERAL
+    action: model.LaneChangeAction
+
+    def __init__(
+        self,
+        action: model.LaneChangeAction,
+        stage: Stage,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(action, stage, actor=actor, parent=parent)
+        self._dynamics = action.lane_change_action_dynamics
+        self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
+        target = action.lane_change_target.absolute_target_lane
+        if target is not None and not target.value.lstrip("-").isdigit():
+            raise self.problem(f"aims at lane {target.value!r}", "give the lane's number")
+        if stage.roads is None:
+            raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
+        self._roads = stage.roads
+        self._lane = 0
+
+    def initialise(self) -> None:
+        """Find the target lane, and see the actor's place as an offset from its centre."""
+        here = self.stage.location(self.actor.name)
+        if here is None:
+            raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+        self._lane = self._target_lane(here)
+        if self._lane not in self._roads.lane_ids(here.road, here.s):
+            raise self.problem(
+                f"aims at lane {self._lane} of road {here.road!r}, which it does not have at s = {here.s:.1f}",
+                f"its lanes there: {', '.join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))}",
+            )
+        if self.actor.motion.location is None:
+            self.actor.motion.land()
+        moved = self.actor.motion.relate_to_lane(self._lane) or here
+        way = self._roads.driving_direction(moved.road, self._lane)
+        start, target = moved.offset * way, (self.action.target_lane_offset or 0.0) * way
+        shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
+            self._transition = ValueTransition.by_rate(shape, start, target, value)
+        else:
+            self._transition = ValueTransition(shape, start, target, value)
+        self._offset = start
+
+    def update(self) -> Status:
+        """The offset at the end of the step."""
+        if self.actor.driven:
+            return self._ask_driver()
+        way = abs(self.actor.motion.speed) * self.stage.dt
+        if self._transition.extent <= 0.0:
+            self.actor.motion.steer(Steering(self._transition.target, 0.0, slows=False))
+            return Status.SUCCESS
+        if abs(self.actor.motion.speed) < STANDING or way == 0.0:
+            return Status.RUNNING
+        wanted = self._next(way)
+        if abs(wanted - self._offset) > way:
+            wanted = self._offset + math.copysign(way, wanted - self._offset)
+        self._offset = wanted
+        arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
+        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None))
+        return Status.SUCCESS if arrived else Status.RUNNING
+
+    def _next(self, way: float) -> float:
+        transition = self._transition
+        if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+            return transition.advance(self.stage.dt)
+        before = transition.progress
+        sideways = transition.advance(way) - self._offset
+        along = math.sqrt(max(0.0, way * way - sideways * sideways))
+        transition.progress = before
+        return transition.advance(along)
+
+    def _target_lane(self, here: LaneLocation) -> int:
+        target = self.action.lane_change_target
+        if target.absolute_target_lane is not None:
+            return int(target.absolute_target_lane.value)
+        assert target.relative_target_lane is not None
+        name = target.relative_target_lane.entity_ref
+        reference = self.stage.location(name)
+        if reference is None:
+            raise self.problem(f"counts lanes from {name}, which is on no road")
+        left = facing(self.stage, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
+        return count_lanes(reference.lane, target.relative_target_lane.value * left)
+
+    def _ask_driver(self) -> Status:
+        here = self.stage.location(self.actor.name)
+        if here is None:
+            return Status.RUNNING
+        target = self.action.target_lane_offset or 0.0
+        if here.lane == self._lane and abs(here.offset - target) < NEAR:
+            return Status.SUCCESS
+        lane: LaneLocation | None = self._roads.location(here.road, self._lane, here.s, target)
+        points = []
+        while lane is not None and 5.0 * len(points) < LOOKOUT:
+            lane = self._roads.advance(lane, 5.0, route=self.actor.motion.route)
+            if lane is not None:
+                points.append(self._roads.pose(lane)[:3])
+        if points:
+            goal = self.actor.goal
+            self.actor.goal = Goal(None if goal is None else goal.speed, np.array(points))
+        return Status.RUNNING
+
+    def describe(self) -> str:
+        """Target and dynamics."""
+        target = self.action.lane_change_target
+        if target.absolute_target_lane is not None:
+            where = f"lane {target.absolute_target_lane.value}"
+        else:
+            assert target.relative_target_lane is not None
+            count, name = target.relative_target_lane.value, target.relative_target_lane.entity_ref
+            where = f"the lane of {name}" if count == 0 else f"{count:+d} lanes from {name}"
+        offset = self.action.target_lane_offset
+        aside = f", {offset:g} m off its centre" if offset else ""
+        return f"change to {where}{aside}, {dynamics_in_words(self._dynamics, 'm/s')}"

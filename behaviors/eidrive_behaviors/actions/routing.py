@@ -1,0 +1,77 @@
+"""AssignRouteAction and AcquirePositionAction: where an actor goes."""
+
+from __future__ import annotations
+
+import numpy as np
+from py_trees.common import Status
+
+from eidrive_scenario.api import (
+    ActionBehaviour,
+    EidriveError,
+    Goal,
+    Route,
+    resolve,
+    route_of,
+)
+from eidrive_scenario.api import model as model
+
+ARRIVED = 2.0
+"""A vehicle that drives itself has arrived when it is this near to its destination [m]."""
+
+
+class AssignRouteAction(ActionBehaviour):
+    """Gives the actor a route over the lanes. At forks it takes the route's way; who drives itself gets its points."""
+
+    action: model.AssignRouteAction
+
+    def update(self) -> Status:
+        """Lay the route out, from where the actor is if there is a way from there."""
+        route = self.action.route or self.stage.catalog_entry(self.action.catalog_reference, model.Route)
+        here = self.stage.location(self.actor.name) if self.actor.present else None
+
+        def place(position: model.Position) -> object:
+            return resolve(position, self.stage, self.actor.name)
+
+        try:
+            found = route_of(route, self.stage.roads, place, here)  # type: ignore[arg-type]
+        except EidriveError:
+            if here is None:
+                raise
+            found = route_of(route, self.stage.roads, place)  # type: ignore[arg-type]
+        follow(self, found)
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Which one."""
+        if self.action.route is not None:
+            return f"route {self.action.route.name} over {len(self.action.route.waypoint)} waypoints"
+        return "route from a catalog"
+
+
+class AcquirePositionAction(ActionBehaviour):
+    """Routes the actor to a position, by the shortest way over the lanes; without roads straight to it."""
+
+    action: model.AcquirePositionAction
+
+    def update(self) -> Status:
+        """Lay the route out."""
+        place = resolve(self.action.position, self.stage, self.actor.name)
+        here = self.stage.location(self.actor.name)
+        if self.stage.roads is not None and here is not None and place.location is not None:
+            follow(self, self.stage.roads.route(here, place.location))
+        elif self.actor.driven:
+            goal = self.actor.goal
+            self.actor.goal = Goal(None if goal is None else goal.speed, np.array([place.pose[:3]]))
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Where to."""
+        return f"drive to {type(self.action.position.chosen()).__name__}"
+
+
+def follow(behaviour: ActionBehaviour, route: Route) -> None:
+    """Make a route the actor's own."""
+    actor = behaviour.actor
+    actor.motion.route = route
+    if actor.driven:
+        actor.goal = Goal(None if actor.goal is None else actor.goal.speed, route.polyline(2.0))

@@ -1,0 +1,129 @@
+"""SpeedAction: bring an actor to a speed."""
+
+from __future__ import annotations
+
+import math
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Stage, ValueTransition, model
+
+TINY = 1e-6
+REACHED = 0.2
+"""A driven vehicle that is this near to the target speed has reached it [m/s]."""
+
+
+class SpeedAction(ActionBehaviour):
+    """Takes the speed over to an absolute or relative target by the given dynamics.
+
+    Speed follows its shape over time; where the dynamics say a distance, the time in which that distance is covered.
+    A relative target is read anew in each step; a continuous one is kept up until a younger action ends it. The
+    vehicle's Performance bounds target and steepest slope (not those of a step). A vehicle that drives itself is given
+    the speed as its goal, and has reached it when it drives that fast.
+    """
+
+    domains = Domain.LONGITUDINAL
+    action: model.SpeedAction
+
+    def __init__(
+        self, action: model.SpeedAction, stage: Stage, *, actor: str | None = None, parent: model.Element | None = None
+    ) -> None:
+        super().__init__(action, stage, actor=actor, parent=parent)
+        self._dynamics = action.speed_action_dynamics
+        self._absolute = action.speed_action_target.absolute_target_speed
+        self._relative = action.speed_action_target.relative_target_speed
+        self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
+
+    @property
+    def _continuous(self) -> bool:
+        return self._relative is not None and self._relative.continuous
+
+    def initialise(self) -> None:
+        """Lay the transition from the present speed."""
+        top, faster, slower = self.actor.limits()
+        start, target = self._present(), self._target()
+        shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
+            self._transition = ValueTransition.by_rate(shape, start, target, value)
+        elif self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE:
+            self._transition = ValueTransition(shape, start, target, duration_over(start, target, value))
+        else:
+            self._transition = ValueTransition(shape, start, target, value)
+        self._transition.limit_rate(faster if target > start else slower)
+
+    def update(self) -> Status:
+        """The speed at the end of the step."""
+        transition = self._transition
+        if self._relative is not None:
+            transition.target = self._target()
+        if transition.done and transition.extent > 0.0:
+            speed = self._approach(transition.target)
+        else:
+            speed = transition.advance(self.stage.dt)
+        reached = transition.done and abs(speed - transition.target) < TINY
+        if self.actor.driven:
+            goal = self.actor.goal
+            self.actor.goal = Goal(speed, None if goal is None else goal.waypoints)
+            reached = reached and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
+        else:
+            self.actor.motion.speed = speed
+        return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
+
+    def _present(self) -> float:
+        return self.stage.speed(self.actor.name) if self.actor.driven else self.actor.motion.speed
+
+    def _approach(self, target: float) -> float:
+        """The next speed after the transition, where a relative target moves on: as fast as the vehicle can."""
+        _, faster, slower = self.actor.limits()
+        present = self.actor.motion.speed
+        return present + min(max(target - present, -slower * self.stage.dt), faster * self.stage.dt)
+
+    def _target(self) -> float:
+        top = self.actor.limits()[0]
+        if self._absolute is not None:
+            speed = self._absolute.value
+        else:
+            assert self._relative is not None
+            reference = self.stage.speed(self._relative.entity_ref)
+            factor = self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
+            speed = reference * self._relative.value if factor else reference + self._relative.value
+        return math.copysign(min(abs(speed), top), speed)
+
+    def describe(self) -> str:
+        """Target and dynamics."""
+        if self._absolute is not None:
+            target = f"{self._absolute.value:g} m/s"
+        else:
+            assert self._relative is not None
+            sign = (
+                "times" if self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR else "m/s above"
+            )
+            target = f"{self._relative.value:g} {sign} the speed of {self._relative.entity_ref}"
+            target += ", kept up" if self._continuous else ""
+        return f"speed to {target}, {dynamics_in_words(self._dynamics, 'm/s²')}"
+
+
+def duration_over(start: float, target: float, distance: float) -> float:
+    """Time [s] in which a change of speed covers a distance: all shapes but the step have the mean of both speeds.
+
+    Where the direction of travel turns, the distances before and after the turn are as the squares of the speeds.
+    """
+    if abs(target - start) < TINY:
+        return 0.0
+    if start * target < 0.0:
+        before = distance * start * start / (start * start + target * target)
+        return 2.0 * before / abs(start) + 2.0 * (distance - before) / abs(target)
+    return 2.0 * distance / abs(start + target)
+
+
+def dynamics_in_words(dynamics: model.TransitionDynamics, rate: str) -> str:
+    """Shape and extent, as `linear in 3 s`."""
+    shape = dynamics.dynamics_shape.value
+    if dynamics.dynamics_shape is model.DynamicsShape.STEP:
+        return "at once"
+    value = f"{abs(dynamics.value):g}"
+    return {
+        model.DynamicsDimension.TIME: f"{shape} in {value} s",
+        model.DynamicsDimension.DISTANCE: f"{shape} over {value} m",
+        model.DynamicsDimension.RATE: f"{shape} at {value} {rate}",
+    }[dynamics.dynamics_dimension]

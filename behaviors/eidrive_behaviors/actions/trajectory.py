@@ -1,0 +1,118 @@
+"""FollowTrajectoryAction: move along a given curve, at the actor's speed or at given times."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Layout, Place, Pose, Stage, lay_out, model, resolve
+
+TINY = 1e-6
+
+
+class FollowTrajectoryAction(ActionBehaviour):
+    """Moves the actor along a trajectory, from its start (or `initialDistanceOffset`) to its end.
+
+    Without timing the actor keeps its own speed, which other actions may set, and only the way is given. With timing
+    the vertex of time v is passed at `scale * v + offset`, counted from the start of the run or of the action. After
+    the end the actor keeps its speed and looks for its lane.
+    """
+
+    action: model.FollowTrajectoryAction
+
+    def __init__(
+        self,
+        action: model.FollowTrajectoryAction,
+        stage: Stage,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(action, stage, actor=actor, parent=parent)
+        self._timing = action.time_reference.timing
+        self._trajectory = self._found()
+
+    @property
+    def controls(self) -> Domain:
+        """The way alone, or the speed too."""
+        return Domain.LATERAL if self._timing is None else Domain.LATERAL | Domain.LONGITUDINAL
+
+    def initialise(self) -> None:
+        """Lay the trajectory out; positions relative to entities mean where those are now."""
+        self._layout: Layout = lay_out(self._trajectory, lambda position: self._resolved(position))
+        if self._timing is not None and self._layout.times is None:
+            raise self.problem("has a Timing, but the trajectory has no times", "give each vertex a time, or say None")
+        self._s = self.action.initial_distance_offset or 0.0
+        self._started = self.stage.time
+        self._backwards = self.actor.present and self.actor.motion.speed < 0.0
+
+    def update(self) -> Status:
+        """The pose at the end of the step."""
+        if self.actor.driven:
+            return self._ask_driver()
+        motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
+        if self._timing is None:
+            after, done = self._s + abs(motion.speed) * dt, False
+            if not layout.closed:
+                done = dt > 0.0 and after > layout.length - TINY
+        else:
+            clock = self._clock(dt)
+            after = layout.at_time(clock)
+            done = clock >= layout.end_time - TINY
+            if dt > 0.0 and not (done and clock > layout.end_time + TINY):
+                motion.speed = math.copysign((after - self._s) / dt, motion.speed if self._backwards else 1.0)
+        self._s = after
+        pose = self._pose(after)
+        if done:
+            rest = self._rest(after, dt)
+            pose = pose._replace(x=pose.x + rest * math.cos(pose.h), y=pose.y + rest * math.sin(pose.h))
+        if dt == 0.0 or not self.actor.present:
+            self.stage.enter(self.actor.name, Place(pose))
+        else:
+            motion.go_to(pose, land=done)
+        return Status.SUCCESS if done else Status.RUNNING
+
+    def _clock(self, dt: float) -> float:
+        assert self._timing is not None
+        elapsed = self.stage.time + dt
+        if self._timing.domain_absolute_relative is model.ReferenceContext.RELATIVE:
+            elapsed -= self._started
+        return (elapsed - self._timing.offset) / self._timing.scale
+
+    def _rest(self, s: float, dt: float) -> float:
+        """What the step has left beyond the end of the trajectory [m]."""
+        if self._timing is None:
+            return max(0.0, s - self._layout.length)
+        return max(0.0, self._clock(dt) - self._layout.end_time) * self._timing.scale * self.actor.motion.speed
+
+    def _pose(self, s: float) -> Pose:
+        pose = self._layout.at(s)
+        return pose.turned(math.pi) if self._backwards and not self._layout.given else pose
+
+    def _ask_driver(self) -> Status:
+        count = max(2, math.ceil(self._layout.length / 2.0) + 1)
+        points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
+        goal = self.actor.goal
+        self.actor.goal = Goal(None if goal is None else goal.speed, points)
+        here = self.actor.motion.pose
+        return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
+
+    def _resolved(self, position: model.Position) -> Pose:
+        return resolve(position, self.stage, self.actor.name).pose
+
+    def _found(self) -> model.Trajectory:
+        if self.action.trajectory is not None:
+            return self.action.trajectory
+        reference = self.action.catalog_reference
+        if self.action.trajectory_ref is not None:
+            if self.action.trajectory_ref.trajectory is not None:
+                return self.action.trajectory_ref.trajectory
+            reference = self.action.trajectory_ref.catalog_reference
+        return self.stage.catalog_entry(reference, model.Trajectory)
+
+    def describe(self) -> str:
+        """Which one."""
+        timing = "at its own speed" if self._timing is None else "by its times"
+        return f"follow trajectory {self._trajectory.name} {timing}"

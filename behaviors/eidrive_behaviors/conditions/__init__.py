@@ -1,0 +1,1 @@
+"""Conditions of the standard, one family per module."""

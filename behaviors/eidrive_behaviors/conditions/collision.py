@@ -1,0 +1,46 @@
+"""CollisionCondition: an entity touches another one."""
+
+from __future__ import annotations
+
+from eidrive_scenario.api import EntityCondition, Stage, box_of, model, overlap
+
+TYPES: dict[str, type[model.Element]] = {
+    "vehicle": model.Vehicle,
+    "pedestrian": model.Pedestrian,
+    "miscellaneous": model.MiscObject,
+}
+
+
+class CollisionCondition(EntityCondition):
+    """Its bounding box overlaps that of a named entity, or of any entity of a type."""
+
+    element: model.CollisionCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Look for overlap."""
+        return bool(self._touched(stage, entity))
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """Whom it touches."""
+        touched = self._touched(stage, entity)
+        return f"{entity}: collides with {', '.join(touched)}" if touched else f"{entity}: touches nobody"
+
+    def describe_for(self) -> str:
+        """With whom."""
+        if self.element.entity_ref is not None:
+            return f"collides with {self.element.entity_ref.entity_ref}"
+        assert self.element.by_type is not None
+        return f"collides with a {self.element.by_type.type.value}"
+
+    def _touched(self, stage: Stage, entity: str) -> list[str]:
+        box = box_of(stage, entity)
+        return [name for name in self._others(stage) if name != entity and overlap(box, box_of(stage, name))]
+
+    def _others(self, stage: Stage) -> list[str]:
+        if self.element.entity_ref is not None:
+            names = [self.element.entity_ref.entity_ref]
+        else:
+            assert self.element.by_type is not None
+            kind = TYPES.get(self.element.by_type.type.value, model.Vehicle)
+            names = [name for name, actor in stage.actors.items() if isinstance(actor.entity, kind)]
+        return [name for name in names if name in stage.view]

@@ -1,0 +1,133 @@
+"""Conditions on distances: to a position, to another entity, and on reaching a position."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.api import (
+    Absent,
+    EntityCondition,
+    Place,
+    Stage,
+    compares,
+    distance,
+    frame_of,
+    in_words,
+    kind_of,
+    model,
+    resolve,
+)
+
+
+def measured(
+    stage: Stage,
+    entity: str,
+    target: str | Place,
+    element: model.DistanceCondition
+    | model.RelativeDistanceCondition
+    | model.TimeHeadwayCondition
+    | model.TimeToCollisionCondition,
+    *,
+    kind: str | None = None,
+) -> float:
+    """The distance as an element of the standard asks for it [m], signed; NaN where there is none."""
+    frame = frame_of(element.coordinate_system)
+    if getattr(element, "along_route", None):
+        frame = "road"
+    try:
+        return distance(
+            stage,
+            entity,
+            target,
+            frame=frame,
+            kind=kind or kind_of(element.relative_distance_type),
+            freespace=element.freespace,
+        )
+    except Absent:
+        return math.nan
+
+
+def place_of(stage: Stage, position: model.Position, entity: str) -> Place | None:
+    """The place of a position now, None where it refers to an entity that is not in the world."""
+    try:
+        return resolve(position, stage, entity)
+    except Absent:
+        return None
+
+
+class DistanceCondition(EntityCondition):
+    """Distance to a position [m]; positions relative to entities move with them."""
+
+    element: model.DistanceCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare its amount."""
+        return compares(abs(self._distance(stage, entity)), self.element.rule, self.element.value)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The distance."""
+        value = abs(self._distance(stage, entity))
+        return f"{entity}: distance {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
+
+    def describe_for(self) -> str:
+        """Rule and limit."""
+        return f"distance to {self._target()} {in_words(self.element.rule)} {self.element.value:g} m"
+
+    def _distance(self, stage: Stage, entity: str) -> float:
+        place = place_of(stage, self.element.position, entity)
+        return math.nan if place is None else measured(stage, entity, place, self.element)
+
+    def _target(self) -> str:
+        return type(self.element.position.chosen()).__name__
+
+
+class RelativeDistanceCondition(EntityCondition):
+    """Distance to another entity [m]."""
+
+    element: model.RelativeDistanceCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare its amount."""
+        value = abs(measured(stage, entity, self.element.entity_ref, self.element))
+        return compares(value, self.element.rule, self.element.value)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The distance."""
+        value = abs(measured(stage, entity, self.element.entity_ref, self.element))
+        return f"{entity}: {self._what()} {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
+
+    def describe_for(self) -> str:
+        """Rule and limit."""
+        return f"{self._what()} {in_words(self.element.rule)} {self.element.value:g} m"
+
+    def _what(self) -> str:
+        gap = " free" if self.element.freespace else ""
+        kind = kind_of(self.element.relative_distance_type).removesuffix("Distance").replace("euclidian", "straight")
+        return f"{kind}{gap} distance to {self.element.entity_ref}"
+
+
+class ReachPositionCondition(EntityCondition):
+    """Within a tolerance [m] of a position, seen from above."""
+
+    element: model.ReachPositionCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare the distance between the reference point and the position."""
+        return self._distance(stage, entity) <= self.element.tolerance
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The distance."""
+        return (
+            f"{entity}: {self._distance(stage, entity):.2f} m from the position, tolerance {self.element.tolerance:g} m"
+        )
+
+    def describe_for(self) -> str:
+        """The tolerance."""
+        return f"within {self.element.tolerance:g} m of {type(self.element.position.chosen()).__name__}"
+
+    def _distance(self, stage: Stage, entity: str) -> float:
+        place = place_of(stage, self.element.position, entity)
+        if place is None:
+            return math.inf
+        here = stage.pose(entity)
+        return math.hypot(place.pose.x - here.x, place.pose.y - here.y)

@@ -1,0 +1,60 @@
+"""StoryboardElementStateCondition: an element is in a state, or passes through a transition."""
+
+from __future__ import annotations
+
+from eidrive_scenario.api import (
+    Condition,
+    Problem,
+    ScenarioError,
+    Stage,
+    State,
+    Transition,
+    Watch,
+    model,
+    suggestion,
+)
+
+STATES = {state.value: state for state in State}
+TRANSITIONS = {transition.value: transition for transition in Transition}
+
+
+class StoryboardElementStateCondition(Condition):
+    """An element of the storyboard, by its name or by the end of its path (`Act::Event::Action`).
+
+    A transition is seen by the evaluation that follows it, and by no later one.
+    """
+
+    element: model.StoryboardElementStateCondition
+    _watch: Watch | None = None
+
+    def bind(self, stage: Stage) -> None:
+        """Find the element. Raises ScenarioError if the storyboard has none of that name and type."""
+        kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
+        self._watch = stage.progress.watch(kind, name)
+        if self._watch is None:
+            raise ScenarioError(
+                Problem(
+                    f"the storyboard has no {kind} named {name!r}",
+                    suggestion(name, stage.progress.names(kind)),
+                    self.element.source,
+                    self.element.line,
+                )
+            )
+
+    def holds(self, stage: Stage) -> bool:
+        """Look at the element's state or at what it just went through."""
+        if self._watch is None:
+            return False
+        word = self.element.state.value
+        if word in TRANSITIONS:
+            return self._watch.passed(TRANSITIONS[word])
+        return self._watch.in_state(STATES[word])
+
+    def explain(self, stage: Stage) -> str:
+        """Which element, and what of it."""
+        return self.describe()
+
+    def describe(self) -> str:
+        """Which element, and what of it."""
+        kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
+        return f"{kind} {name} in {self.element.state.value}"

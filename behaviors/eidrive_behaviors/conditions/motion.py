@@ -1,0 +1,148 @@
+"""Conditions on how an entity moves: speed, acceleration, standstill, distance travelled."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.api import EntityCondition, Stage, compares, in_words, model
+from eidrive_scenario.api import WorldView as View
+
+
+def along(vector: list[float], yaw: float, direction: model.DirectionalDimension | None) -> float:
+    """A component of a world vector in the frame of a body with this heading; its length where no axis is asked for."""
+    x, y, z = vector
+    if direction is None:
+        return math.sqrt(x * x + y * y + z * z)
+    if direction is model.DirectionalDimension.VERTICAL:
+        return z
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return x * cos + y * sin if direction is model.DirectionalDimension.LONGITUDINAL else y * cos - x * sin
+
+
+def velocity_of(view: View, entity: str) -> list[float]:
+    """Velocity of an entity in the world frame [m/s]."""
+    vector: list[float] = view.velocity[view.row(entity)].tolist()
+    return vector
+
+
+class SpeedCondition(EntityCondition):
+    """Speed [m/s], signed along the heading; with a direction the velocity's component along that axis."""
+
+    element: model.SpeedCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare the speed."""
+        return compares(self._speed(stage, entity), self.element.rule, self.element.value)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The speed."""
+        value, rule = self._speed(stage, entity), in_words(self.element.rule)
+        return f"{entity}: speed {value:.2f} m/s {rule} {self.element.value:g} m/s"
+
+    def describe_for(self) -> str:
+        """Rule and limit."""
+        return f"speed {in_words(self.element.rule)} {self.element.value:g} m/s"
+
+    def _speed(self, stage: Stage, entity: str) -> float:
+        if self.element.direction is None:
+            return stage.speed(entity)
+        return along(velocity_of(stage.view, entity), stage.pose(entity).h, self.element.direction)
+
+
+class RelativeSpeedCondition(EntityCondition):
+    """Own speed less another entity's [m/s]; with a direction along that axis of the other entity."""
+
+    element: model.RelativeSpeedCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare the difference."""
+        return compares(self._difference(stage, entity), self.element.rule, self.element.value)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The difference."""
+        value, rule = self._difference(stage, entity), in_words(self.element.rule)
+        return f"{entity}: {value:.2f} m/s faster than {self.element.entity_ref} {rule} {self.element.value:g} m/s"
+
+    def describe_for(self) -> str:
+        """Rule and limit."""
+        rule = in_words(self.element.rule)
+        return f"speed above that of {self.element.entity_ref} {rule} {self.element.value:g} m/s"
+
+    def _difference(self, stage: Stage, entity: str) -> float:
+        other = self.element.entity_ref
+        if other not in stage.view:
+            return math.nan
+        if self.element.direction is None:
+            return stage.speed(entity) - stage.speed(other)
+        mine, theirs = velocity_of(stage.view, entity), velocity_of(stage.view, other)
+        difference = [a - b for a, b in zip(mine, theirs, strict=True)]
+        return along(difference, stage.pose(other).h, self.element.direction)
+
+
+class AccelerationCondition(EntityCondition):
+    """Acceleration [m/s²]: its amount, or with a direction its component along that axis."""
+
+    element: model.AccelerationCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare the acceleration."""
+        return compares(self._acceleration(stage, entity), self.element.rule, self.element.value)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The acceleration."""
+        value, rule = self._acceleration(stage, entity), in_words(self.element.rule)
+        return f"{entity}: acceleration {value:.2f} m/s² {rule} {self.element.value:g} m/s²"
+
+    def describe_for(self) -> str:
+        """Rule and limit."""
+        return f"acceleration {in_words(self.element.rule)} {self.element.value:g} m/s²"
+
+    def _acceleration(self, stage: Stage, entity: str) -> float:
+        vector = stage.view.acceleration[stage.view.row(entity)].tolist()
+        return along(vector, stage.pose(entity).h, self.element.direction)
+
+
+class StandStillCondition(EntityCondition):
+    """Has stood still for longer than a duration [s]."""
+
+    element: model.StandStillCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare how long it stands."""
+        return lasted(stage, stage.actors[entity].standing_since, self.element.duration)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """How long it stands."""
+        return f"{entity}: {since(stage, stage.actors[entity].standing_since, 'standing', 'moving')}"
+
+    def describe_for(self) -> str:
+        """The duration."""
+        return f"stands still for {self.element.duration:g} s"
+
+
+class TraveledDistanceCondition(EntityCondition):
+    """Has covered a distance since it entered the world [m]."""
+
+    element: model.TraveledDistanceCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare the distance covered."""
+        return stage.actors[entity].traveled >= self.element.value - 1e-6
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The distance covered."""
+        return f"{entity}: travelled {stage.actors[entity].traveled:.2f} m ≥ {self.element.value:g} m"
+
+    def describe_for(self) -> str:
+        """The limit."""
+        return f"travelled ≥ {self.element.value:g} m"
+
+
+def lasted(stage: Stage, start: float | None, duration: float) -> bool:
+    """True where something that began at `start` has gone on for longer than `duration` [s]."""
+    return start is not None and stage.time - start > duration + 1e-6
+
+
+def since(stage: Stage, start: float | None, what: str, otherwise: str) -> str:
+    """How long something has gone on, in words."""
+    return otherwise if start is None else f"{what} for {stage.time - start:.2f} s"

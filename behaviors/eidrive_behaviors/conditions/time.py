@@ -1,0 +1,70 @@
+"""Conditions on time: of the simulation, and of the day."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from eidrive_scenario.api import Condition, Stage, compares, in_words, model
+
+
+class SimulationTimeCondition(Condition):
+    """The time since the start of the run [s]."""
+
+    element: model.SimulationTimeCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare the time of this view."""
+        return compares(stage.time, self.element.rule, self.element.value)
+
+    def explain(self, stage: Stage) -> str:
+        """The time."""
+        return f"simulation time {stage.time:.2f} s {in_words(self.element.rule)} {self.element.value:g} s"
+
+    def describe(self) -> str:
+        """Rule and limit."""
+        return f"simulation time {in_words(self.element.rule)} {self.element.value:g} s"
+
+
+class TimeOfDayCondition(Condition):
+    """The date and time of the day in the simulated world.
+
+    The clock starts with the environment's TimeOfDay and runs with the simulation where that is animated. Without an
+    environment that says so there is no time of day, and the condition does not hold.
+    """
+
+    element: model.TimeOfDayCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare the clock."""
+        now = clock(stage)
+        if now is None:
+            return False
+        return compares((now - _like(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0)
+
+    def explain(self, stage: Stage) -> str:
+        """The clock."""
+        now = clock(stage)
+        shown = "unknown" if now is None else now.isoformat()
+        return f"time of day {shown} {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
+
+    def describe(self) -> str:
+        """Rule and limit."""
+        return f"time of day {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
+
+
+def clock(stage: Stage) -> datetime | None:
+    """The date and time in the simulated world, None where no environment states it."""
+    environment = stage.environment
+    if environment is None or environment.time_of_day is None:
+        return None
+    start = environment.time_of_day.date_time
+    if not environment.time_of_day.animation:
+        return start
+    return start + timedelta(seconds=stage.time - stage.environment_since)
+
+
+def _like(moment: datetime, other: datetime) -> datetime:
+    """A moment with or without a time zone, as the other has one or not."""
+    if (moment.tzinfo is None) == (other.tzinfo is None):
+        return moment
+    return moment.replace(tzinfo=other.tzinfo)

@@ -1,0 +1,109 @@
+"""What the storyboard knows of one entity: who drives it, how it moves, and what it has done so far."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.driving.step import Goal
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.motion import Motion
+from eidrive_scenario.world.view import WorldView
+
+STANDSTILL = 1e-3
+"""An actor slower than this stands [m/s]."""
+
+Entity = model.Vehicle | model.Pedestrian | model.MiscObject
+
+
+def is_ours(controller: model.Controller) -> bool:
+    """True for a controller that says `module=eidrive` in its properties."""
+    properties = controller.properties.property if controller.properties is not None else ()
+    return any(entry.name == "module" and entry.value == "eidrive" for entry in properties)
+
+
+class Actor:
+    """One entity of the scenario.
+
+    Who drives: an eidrive controller from the start, until it is deactivated in either domain; the storyboard's
+    scripted motion in all other cases.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        entity: Entity,
+        controllers: tuple[model.Controller, ...],
+        roads: RoadNetwork | None,
+    ) -> None:
+        self.name = name
+        self.entity = entity
+        self.controllers = list(controllers)
+        self.motion = Motion(roads)
+        self.present = False
+        self.lateral = self.longitudinal = any(is_ours(controller) for controller in controllers)
+        """Whether its own controller is active in the domain."""
+        self.goal: Goal | None = None
+        self.traveled = 0.0
+        """Distance covered since it entered the world, jumps left out [m]."""
+        self.standing_since: float | None = None
+        self.off_road_since: float | None = None
+        self.end_of_road_since: float | None = None
+        self._last: tuple[float, float] | None = None
+        self._found: LaneLocation | None = None
+        self._found_at = -1
+
+    @property
+    def driven(self) -> bool:
+        """True where its own controller drives it."""
+        return self.lateral and self.longitudinal and any(is_ours(controller) for controller in self.controllers)
+
+    @property
+    def drives(self) -> bool:
+        """True for an entity with wheels and an engine: its Performance binds scripted speeds too."""
+        return isinstance(self.entity, model.Vehicle)
+
+    def limits(self) -> tuple[float, float, float]:
+        """Largest speed [m/s], acceleration and deceleration [m/s²]; infinite where the entity states none."""
+        if isinstance(self.entity, model.Vehicle):
+            performance = self.entity.performance
+            return performance.max_speed, performance.max_acceleration, performance.max_deceleration
+        return math.inf, math.inf, math.inf
+
+    def observe(self, view: WorldView, row: int) -> None:
+        """Keep the histories up to date with a new view."""
+        x, y = float(view.position[row, 0]), float(view.position[row, 1])
+        speed = float(view.speed[row])
+        if self._last is not None and not self.motion.jumped:
+            self.traveled += math.hypot(x - self._last[0], y - self._last[1])
+        self._last = (x, y)
+        self.motion.jumped = False
+        if abs(speed) >= STANDSTILL:
+            self.standing_since = None
+        elif self.standing_since is None:
+            self.standing_since = view.time
+        if not self.motion.end_of_road:
+            self.end_of_road_since = None
+        elif self.end_of_road_since is None:
+            self.end_of_road_since = view.time
+        if self.driven:
+            self.motion.pose = pose_of(view, row)
+            self.motion.speed = speed
+
+    def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
+        """Its place on the road: the lane below it, None where no road is near. Looked up once per tick."""
+        if self._found_at != tick:
+            pose = self.motion.pose
+            self._found = roads.locate_at(pose.x, pose.y, self.motion.location or self._found)
+            self._found_at = tick
+        return self._found
+
+    def forget_location(self) -> None:
+        """It has just been moved: look its place up anew."""
+        self._found_at = -2
+
+
+def pose_of(view: WorldView, row: int) -> Pose:
+    """The pose of one row of a view."""
+    x, y, z = view.position[row].tolist()
+    return Pose(x, y, z, float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row]))

@@ -1,0 +1,76 @@
+"""The seam of actions: an ActionBehaviour does one action of the standard for one actor."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import Flag, auto
+from typing import ClassVar
+
+import py_trees
+from py_trees.common import Status
+
+from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.storyboard.actor import Actor
+from eidrive_scenario.storyboard.stage import Stage
+
+
+class Domain(Flag):
+    """What of an actor an action controls. Of two actions on one domain the younger ends the older."""
+
+    NONE = 0
+    LONGITUDINAL = auto()
+    LATERAL = auto()
+    LIGHTING = auto()
+    ANIMATION = auto()
+
+
+class ActionBehaviour(py_trees.behaviour.Behaviour):
+    """One action for one actor (none for global actions).
+
+    Configured in the constructor, which raises ScenarioError for what cannot be done; reset in `initialise`, which
+    runs when the action starts; one decision for the step of `stage.dt` seconds in `update`, which answers SUCCESS in
+    the step in which the action reaches its end. In Init the step is 0 s long.
+    """
+
+    domains: ClassVar[Domain] = Domain.NONE
+
+    def __init__(
+        self,
+        action: model.Element,
+        stage: Stage,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(type(action).__name__ if actor is None else f"{type(action).__name__} {actor}")
+        self.action = action
+        self.stage = stage
+        self.actor_name = actor
+        self.parent_element = parent
+        """The element around the action, where attributes of older or shared types stand (EntityAction)."""
+
+    @property
+    def controls(self) -> Domain:
+        """The domains of this action as it is configured."""
+        return self.domains
+
+    @property
+    def actor(self) -> Actor:
+        """The actor that the action is about."""
+        if self.actor_name is None:
+            raise self.problem("has no actor", "put it into a ManeuverGroup with Actors")
+        return self.stage.actors[self.actor_name]
+
+    @abstractmethod
+    def update(self) -> Status:
+        """Decide on the step that begins now."""
+
+    def describe(self) -> str:
+        """The action in words."""
+        return type(self.action).__name__
+
+    def problem(self, message: str, remedy: str = "") -> ScenarioError:
+        """An error at the place of this action in the file."""
+        where = self.action
+        return ScenarioError(Problem(f"{type(where).__name__} {message}", remedy, where.source, where.line))

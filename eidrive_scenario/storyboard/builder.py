@@ -1,0 +1,249 @@
+"""Makes the tree from the scenario: elements, triggers, and through the registries actions and conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from eidrive_scenario.errors import Problem, RegistryError, ScenarioError, suggestion
+from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.registry import Registry
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.condition import Condition, EntityCondition
+from eidrive_scenario.storyboard.elements import (
+    ActElement,
+    ActionElement,
+    EventElement,
+    InitBlock,
+    ManeuverElement,
+    ManeuverGroupElement,
+    StoryboardElement,
+    StoryNode,
+)
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+
+WRAPPERS = (
+    model.Action,
+    model.PrivateAction,
+    model.GlobalAction,
+    model.UserDefinedAction,
+    model.LongitudinalAction,
+    model.LateralAction,
+    model.RoutingAction,
+    model.ControllerAction,
+    model.EntityAction,
+    model.ParameterAction,
+    model.VariableAction,
+    model.InfrastructureAction,
+    model.TrafficSignalAction,
+    model.TrafficAction,
+    model.AppearanceAction,
+    model.TrailerAction,
+)
+"""Types that only wrap the actions below them."""
+
+CRITERION = "criteria_"
+"""Conditions of this name in the storyboard's stop trigger are criteria, as ScenarioRunner has them, and stop nothing."""
+
+Place = tuple[str, ...]
+
+
+class Builder:
+    """Builds one storyboard. What is wrong with the scenario is gathered, and raised in one go by `build`."""
+
+    def __init__(self, scenario: Scenario, stage: Stage, actions: Registry, conditions: Registry) -> None:
+        self._scenario = scenario
+        self._stage = stage
+        self._actions = actions
+        self._conditions = conditions
+        self._problems: list[Problem] = []
+        self._made: list[Condition] = []
+        selections = scenario.document.entities.entity_selection if scenario.document.entities is not None else ()
+        self._selections: Mapping[str, model.EntitySelection] = {entry.name: entry for entry in selections}
+
+    def build(self) -> tuple[InitBlock, StoryboardElement]:
+        """The actions of Init and the tree. Raises ScenarioError with all that cannot be executed."""
+        storyboard = self._scenario.storyboard
+        init = InitBlock(self._stage, self._init(storyboard.init.actions))
+        stories = [self._story(story) for story in storyboard.story]
+        stop = self._wait("stop", _without_criteria(storyboard.stop_trigger))
+        root = StoryboardElement(self._stage, ("storyboard",), stories, stop=stop)
+        for condition in self._made:
+            try:
+                condition.bind(self._stage)
+            except ScenarioError as error:
+                self._problems += error.problems
+        if self._problems:
+            raise ScenarioError(sorted(dict.fromkeys(self._problems), key=lambda p: (p.source, p.line or 0)))
+        return init, root
+
+    def _init(self, actions: model.InitActions) -> list[ActionBehaviour]:
+        behaviours: list[ActionBehaviour] = []
+        for wrapper in (*actions.global_action, *actions.user_defined_action):
+            behaviours += self._behaviours(wrapper, None)
+        for private in actions.private:
+            for actor in self._entities(private.entity_ref):
+                for action in private.private_action:
+                    behaviours += self._behaviours(action, actor)
+        return behaviours
+
+    def _story(self, story: model.Story) -> StoryNode:
+        path = (story.name,)
+        return StoryNode(self._stage, path, [self._act(act, path) for act in story.act])
+
+    def _act(self, act: model.Act, above: Place) -> ActElement:
+        path = (*above, act.name)
+        return ActElement(
+            self._stage,
+            path,
+            [self._group(group, path) for group in act.maneuver_group],
+            start=self._wait("start", act.start_trigger),
+            stop=self._wait("stop", act.stop_trigger),
+        )
+
+    def _group(self, group: model.ManeuverGroup, above: Place) -> ManeuverGroupElement:
+        path = (*above, group.name)
+        actors = [name for ref in group.actors.entity_ref for name in self._entities(ref.entity_ref)]
+        maneuvers = list(group.maneuver)
+        for reference in group.catalog_reference:
+            try:
+                maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver))
+            except ScenarioError as error:
+                self._problems += error.problems
+        children = [
+            self._maneuver(maneuver, path, actors, group.actors.select_triggering_entities) for maneuver in maneuvers
+        ]
+        return ManeuverGroupElement(self._stage, path, children, limit=group.maximum_execution_count)
+
+    def _maneuver(
+        self, maneuver: model.Maneuver, above: Place, actors: Sequence[str], by_trigger: bool
+    ) -> ManeuverElement:
+        path = (*above, maneuver.name)
+        events = [self._event(event, path, actors, by_trigger) for event in maneuver.event]
+        for event in events:
+            event.rivals = tuple(other for other in events if other is not event)
+        return ManeuverElement(self._stage, path, events)
+
+    def _event(self, event: model.Event, above: Place, actors: Sequence[str], by_trigger: bool) -> EventElement:
+        path = (*above, event.name)
+        limit = 1 if event.maximum_execution_count is None else event.maximum_execution_count
+        return EventElement(
+            self._stage,
+            path,
+            [self._action(action, path, actors, by_trigger) for action in event.action],
+            priority=event.priority.value,
+            start=self._wait("start", event.start_trigger),
+            limit=limit,
+        )
+
+    def _action(self, action: model.Action, above: Place, actors: Sequence[str], by_trigger: bool) -> ActionElement:
+        private = action.private_action is not None
+        return ActionElement(
+            self._stage,
+            (*above, action.name),
+            lambda actor: self._behaviours(action, actor),
+            actors if private else (None,),
+            by_trigger=by_trigger and private,
+        )
+
+    def _behaviours(self, wrapper: model.Element, actor: str | None) -> list[ActionBehaviour]:
+        behaviours = []
+        for leaf, parent in _leaves(wrapper, wrapper):
+            name = type(leaf).__name__
+            if name not in self._actions:
+                self._problems.append(
+                    Problem(
+                        f"{name} is not executed yet",
+                        f"take it out, or install a package that registers it; {suggestion(name, self._actions)}",
+                        leaf.source,
+                        leaf.line,
+                    )
+                )
+                continue
+            try:
+                made = self._actions.load(name)(leaf, self._stage, actor=actor, parent=parent)
+            except ScenarioError as error:
+                self._problems += error.problems
+                continue
+            if not isinstance(made, ActionBehaviour):
+                raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
+            behaviours.append(made)
+        return behaviours
+
+    def _wait(self, name: str, trigger: model.Trigger | None) -> WaitFor | None:
+        if trigger is None or not trigger.condition_group:
+            return None
+        groups = []
+        for group in trigger.condition_group:
+            monitors = [monitor for entry in group.condition if (monitor := self._monitor(entry)) is not None]
+            groups.append(ConditionGroup(tuple(monitors)))
+        return WaitFor(name, Trigger(groups), self._stage)
+
+    def _monitor(self, entry: model.Condition) -> ConditionMonitor | None:
+        by_entity = entry.by_entity_condition
+        chosen = entry.chosen() if by_entity is None else by_entity.entity_condition
+        leaf = chosen.chosen()
+        name = type(leaf).__name__
+        if name not in self._conditions:
+            self._problems.append(
+                Problem(
+                    f"{name} is not evaluated yet",
+                    f"use another condition, or install a package that registers it; {suggestion(name, self._conditions)}",
+                    leaf.source,
+                    leaf.line,
+                )
+            )
+            return None
+        kind = self._conditions.load(name)
+        try:
+            if by_entity is None:
+                condition: Condition = kind(leaf)
+            else:
+                triggering = by_entity.triggering_entities
+                names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
+                condition = kind(leaf, names, triggering.triggering_entities_rule.value)
+        except ScenarioError as error:
+            self._problems += error.problems
+            return None
+        if not isinstance(condition, Condition) or (
+            by_entity is not None and not isinstance(condition, EntityCondition)
+        ):
+            raise RegistryError(f"conditions {name!r} ({self._conditions.value(name)}) is no Condition of this kind")
+        self._made.append(condition)
+        return ConditionMonitor(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
+
+    def _entities(self, name: str) -> list[str]:
+        """The entity of this name, or the members of the selection of this name."""
+        selection = self._selections.get(name)
+        if selection is None or name in self._scenario.entities:
+            return [name]
+        members = [one for ref in selection.members.entity_ref for one in self._entities(ref.entity_ref)]
+        for entry in selection.members.by_type:
+            members += [n for n, entity in self._scenario.entities.items() if _is_a(entity, entry.object_type.value)]
+        return list(dict.fromkeys(members))
+
+
+def _is_a(entity: model.Element, kind: str) -> bool:
+    return {"Vehicle": "vehicle", "Pedestrian": "pedestrian", "MiscObject": "miscellaneous"}[
+        type(entity).__name__
+    ] == kind
+
+
+def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[model.Element, model.Element]]:
+    """The actions below wrappers, each with the element around it. Before 1.3 a ControllerAction may hold several."""
+    if not isinstance(element, WRAPPERS):
+        yield element, parent
+        return
+    for below in element.children():
+        yield from _leaves(below, element)
+
+
+def _without_criteria(trigger: model.Trigger | None) -> model.Trigger | None:
+    if trigger is None:
+        return None
+    groups = []
+    for group in trigger.condition_group:
+        kept = tuple(entry for entry in group.condition if not entry.name.startswith(CRITERION))
+        if kept:
+            groups.append(model.ConditionGroup(condition=kept, line=group.line, source=group.source))
+    return model.Trigger(condition_group=tuple(groups), line=trigger.line, source=trigger.source)

@@ -1,0 +1,111 @@
+"""The seam of conditions: a Condition is a predicate over the stage, true or false at one instant."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.storyboard.stage import Stage
+
+TOLERANCE = 1e-6
+"""Two numbers nearer than this are equal to a Rule."""
+
+WORDS = {
+    "greaterThan": ">",
+    "greaterOrEqual": "≥",
+    "lessThan": "<",
+    "lessOrEqual": "≤",
+    "equalTo": "=",
+    "notEqualTo": "≠",
+}
+
+
+def compares(value: float, rule: model.Rule, limit: float) -> bool:
+    """`value` against `limit` by a Rule of the standard; NaN compares to nothing."""
+    if value != value:
+        return False
+    match rule.value:
+        case "greaterThan":
+            return value > limit + TOLERANCE
+        case "greaterOrEqual":
+            return value >= limit - TOLERANCE
+        case "lessThan":
+            return value < limit - TOLERANCE
+        case "lessOrEqual":
+            return value <= limit + TOLERANCE
+        case "equalTo":
+            return value == limit or abs(value - limit) <= TOLERANCE
+        case "notEqualTo":
+            return not (value == limit or abs(value - limit) <= TOLERANCE)
+    raise ValueError(f"unknown rule {rule!r}")
+
+
+def in_words(rule: model.Rule) -> str:
+    """A Rule as the sign that one would write."""
+    return WORDS[rule.value]
+
+
+class Condition(ABC):
+    """A predicate over the stage. Edges and delays are the Trigger's, not its own."""
+
+    def __init__(self, element: model.Element) -> None:
+        self.element = element
+
+    def bind(self, stage: Stage) -> None:
+        """Look up what the element refers to, once, before the first tick. Raises ScenarioError."""
+
+    @abstractmethod
+    def holds(self, stage: Stage) -> bool:
+        """True where the condition holds now."""
+
+    @abstractmethod
+    def explain(self, stage: Stage) -> str:
+        """The condition in words, with the values of now."""
+
+    def describe(self) -> str:
+        """The condition in words, without values."""
+        return type(self.element).__name__
+
+
+class EntityCondition(Condition):
+    """A condition on each of several triggering entities, joined by `any` or `all`.
+
+    An entity that is not in the world fulfils nothing.
+    """
+
+    def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
+        super().__init__(element)
+        self.entities = tuple(entities)
+        self.rule = rule
+        self.fulfilled: tuple[str, ...] = ()
+        """The entities that fulfilled it when it was last asked."""
+
+    def holds(self, stage: Stage) -> bool:
+        """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
+        self.fulfilled = tuple(name for name in self.entities if name in stage.view and self.holds_for(stage, name))
+        return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
+
+    def explain(self, stage: Stage) -> str:
+        """What is true of those that fulfil it, or of all."""
+        names = self.fulfilled or self.entities
+        return ", ".join(
+            self.explain_for(stage, name) if name in stage.view else f"{name} is not in the world" for name in names
+        )
+
+    def describe(self) -> str:
+        """Whom it is about, and what."""
+        joined = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
+        return f"{joined}: {self.describe_for()}"
+
+    @abstractmethod
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """True where the condition holds for this entity, which is in the world."""
+
+    @abstractmethod
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The condition in words for this entity, with the values of now."""
+
+    def describe_for(self) -> str:
+        """The condition in words, without values."""
+        return type(self.element).__name__

@@ -1,0 +1,143 @@
+"""Distances between entities, and from entities to positions, as conditions and actions of the standard measure them."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.geometry import footprint_distance
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import LaneLocation, Pose
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.stage import Stage
+
+Box = tuple[float, float, float, float, float, float, float]
+"""x y z of the centre, length, width, height [m], yaw [rad]"""
+
+
+def box_of(stage: Stage, name: str) -> Box:
+    """The bounding box of an actor where it stands now."""
+    pose = stage.pose(name)
+    bounds = stage.actors[name].entity.bounding_box
+    centre, size = bounds.center, bounds.dimensions
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    return (
+        pose.x + centre.x * cos - centre.y * sin,
+        pose.y + centre.x * sin + centre.y * cos,
+        pose.z + centre.z,
+        size.length,
+        size.width,
+        size.height,
+        pose.h,
+    )
+
+
+def kind_of(kind: model.RelativeDistanceType | None) -> str:
+    """longitudinal, lateral or euclidianDistance, which is what a missing word means."""
+    if kind is None or kind is model.RelativeDistanceType.CARTESIAN_DISTANCE:
+        return "euclidianDistance"
+    return kind.value
+
+
+def frame_of(system: model.CoordinateSystem | None) -> str:
+    """entity (also where none is said), lane, road, trajectory or world."""
+    return "entity" if system is None else system.value
+
+
+def distance(stage: Stage, a: str, b: str | Place, *, frame: str, kind: str, freespace: bool) -> float:
+    """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
+
+    Longitudinal distances are positive ahead, lateral ones to the left, both as `a` looks; free space is at least 0 in
+    amount, and 0 where the two overlap along that axis.
+    """
+    if kind == "euclidianDistance":
+        return _straight(stage, a, b, freespace)
+    along, across = _offsets(stage, a, b, frame)
+    value = along if kind == "longitudinal" else across
+    if not freespace or math.isnan(value):
+        return value
+    return _between(stage, a, b, frame, kind, value)
+
+
+def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
+    if not freespace:
+        here, there = stage.pose(a), _pose(stage, b)
+        return math.hypot(there.x - here.x, there.y - here.y)
+    if isinstance(b, str):
+        return footprint_distance(box_of(stage, a), box_of(stage, b))
+    point: Box = (b.pose.x, b.pose.y, b.pose.z, 0.0, 0.0, 0.0, 0.0)
+    return footprint_distance(box_of(stage, a), point)
+
+
+def _offsets(stage: Stage, a: str, b: str | Place, frame: str) -> tuple[float, float]:
+    here, there = stage.pose(a), _pose(stage, b)
+    if frame in ("lane", "road") and stage.roads is not None:
+        start, end = stage.location(a), _location(stage, b)
+        if start is None or end is None:
+            return math.nan, math.nan
+        found = stage.roads.distance(start, end)
+        if found is None:
+            return math.nan, math.nan
+        lane = stage.roads.pose(start)
+        sign = 1.0 if math.cos(here.h - lane.h) >= 0.0 else -1.0
+        return found[0] * sign, found[1] * sign
+    if frame == "world":
+        return there.x - here.x, there.y - here.y
+    dx, dy = there.x - here.x, there.y - here.y
+    cos, sin = math.cos(here.h), math.sin(here.h)
+    return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value: float) -> float:
+    """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
+    axis = _axis(stage, a, frame)
+    mine = _reach(stage, a, axis, kind)
+    if isinstance(b, str):
+        theirs = _reach(stage, b, axis if frame in ("entity", "world") else _axis(stage, b, frame, like=axis), kind)
+    else:
+        theirs = (0.0, 0.0)
+    if value + theirs[0] > mine[1]:
+        return value + theirs[0] - mine[1]
+    if value + theirs[1] < mine[0]:
+        return value + theirs[1] - mine[0]
+    return 0.0
+
+
+def _axis(stage: Stage, name: str, frame: str, like: float | None = None) -> float:
+    """Heading of the longitudinal axis at an actor; turned round where it would point against `like`."""
+    if frame == "world":
+        return 0.0
+    heading = stage.pose(name).h
+    if frame in ("lane", "road") and stage.roads is not None:
+        here = stage.location(name)
+        if here is not None:
+            lane = stage.roads.pose(here).h
+            heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
+    if like is not None and math.cos(heading - like) < 0.0:
+        heading += math.pi
+    return heading
+
+
+def _reach(stage: Stage, name: str, axis: float, kind: str) -> tuple[float, float]:
+    """How far the box of an actor reaches from its reference point along an axis: least and most [m]."""
+    bounds = stage.actors[name].entity.bounding_box
+    turn = stage.pose(name).h - axis
+    cos, sin = math.cos(turn), math.sin(turn)
+    x, y = bounds.center.x, bounds.center.y
+    length, width = 0.5 * bounds.dimensions.length, 0.5 * bounds.dimensions.width
+    if kind == "longitudinal":
+        centre, half = x * cos - y * sin, abs(length * cos) + abs(width * sin)
+    else:
+        centre, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
+    return centre - half, centre + half
+
+
+def _pose(stage: Stage, target: str | Place) -> Pose:
+    return stage.pose(target) if isinstance(target, str) else target.pose
+
+
+def _location(stage: Stage, target: str | Place) -> LaneLocation | None:
+    if isinstance(target, str):
+        return stage.location(target)
+    if target.location is None and stage.roads is not None:
+        return stage.roads.locate_at(target.pose.x, target.pose.y)
+    return target.location

@@ -1,0 +1,193 @@
+"""Scripted motion: where an actor without an engine of its own goes, along its lane or freely.
+
+Speeds are applied as in a semi-implicit step: the speed at the end of a step covers the step's distance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.world.actor import Placement
+
+TINY = 1e-6
+ACROSS = math.cos(math.radians(50.0))
+"""An actor that points further away from its lane than 50° crosses the road instead of following the lane."""
+
+
+class Place(NamedTuple):
+    """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
+
+    pose: Pose
+    location: LaneLocation | None = None
+
+
+class Steering(NamedTuple):
+    """The lateral motion of one step: the offset from the centre of its lane at the end of the step [m].
+
+    offset   left of the lane's driving direction positive
+    heading  angle to the lane's direction after the step [rad]; None follows from the motion
+    slows    True: the way sideways is part of the distance that the speed covers
+    """
+
+    offset: float
+    heading: float | None = None
+    slows: bool = True
+
+
+class Motion:
+    """The state of one scripted actor: pose, speed along its heading, and its place on the road.
+
+    heading  angle to the driving direction of the lane [rad]; beyond ±90° the actor drives against it
+    """
+
+    def __init__(self, roads: RoadNetwork | None) -> None:
+        self.roads = roads
+        self.pose = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self.location: LaneLocation | None = None
+        self.heading = 0.0
+        self.speed = 0.0
+        self.route: Route | None = None
+        self.end_of_road = False
+        self._steering: Steering | None = None
+        self._next_pose: Pose | None = None
+        self._landing = False
+        self._shift = 0.0
+        self._teleport = False
+        self.jumped = False
+        """True from a teleport until the view that shows it."""
+
+    def put(self, place: Place) -> None:
+        """Place it there, at once; its speed stays."""
+        self.pose = place.pose
+        self._adopt(place.location)
+        self.end_of_road = False
+        self._teleport = self.jumped = True
+
+    def steer(self, steering: Steering) -> None:
+        """Lateral motion of the step that begins now."""
+        self._steering = steering
+
+    def go_to(self, pose: Pose, *, land: bool = False) -> None:
+        """The pose at the end of the step that begins now, wherever it is (a trajectory).
+
+        With `land` the actor looks for its lane there, to follow it from then on.
+        """
+        self._next_pose = pose
+        self._landing = land
+
+    def shift(self, distance: float) -> None:
+        """Move by a distance along the lane in this step, beside what the speed covers [m]."""
+        self._shift += distance
+
+    def relate_to_lane(self, lane: int) -> LaneLocation | None:
+        """Express the place on the road by another lane of the same road; the answer has its offset."""
+        here = self.location
+        if here is not None and self.roads is not None and here.lane != lane:
+            here = here._replace(lane=lane, offset=here.t - self.roads.location(here.road, lane, here.s).t)
+            self.location = here
+        return here
+
+    def take_over(self, pose: Pose, speed: float) -> None:
+        """Go on from where another one brought the actor."""
+        self.pose, self.speed = pose, speed
+        self.land()
+
+    def land(self) -> None:
+        """Find the lane again after free motion."""
+        hint = self.location
+        place = self.roads.locate_at(self.pose.x, self.pose.y, hint) if self.roads is not None else None
+        self._adopt(place)
+
+    @property
+    def direction(self) -> int:
+        """+1 if it points along the driving direction of its lane, else -1."""
+        return 1 if math.cos(self.heading) >= 0.0 else -1
+
+    def step(self, dt: float) -> Placement:
+        """Move for dt seconds by what was asked since the last step; where it then is."""
+        steering, self._steering = self._steering, None
+        target, self._next_pose = self._next_pose, None
+        distance, self._shift = self.speed * dt + self._shift, 0.0
+        if target is not None:
+            self.pose = target
+            self.location = None
+            if self._landing:
+                self.land()
+        elif self.location is not None and abs(math.cos(self.heading)) >= ACROSS:
+            self._along_lane(distance, steering)
+        else:
+            self._freely(distance)
+        x, y, z, h, p, r = self.pose
+        teleport, self._teleport = self._teleport, False
+        return Placement(x, y, z, h, p, r, self.speed, teleport)
+
+    def placement(self) -> Placement:
+        """Where it is now."""
+        x, y, z, h, p, r = self.pose
+        return Placement(x, y, z, h, p, r, self.speed, True)
+
+    def _along_lane(self, distance: float, steering: Steering | None) -> None:
+        assert self.roads is not None and self.location is not None
+        here, left = self.location, 0.0
+        way = self.roads.driving_direction(here.road, here.lane)
+        if steering is not None:
+            left = steering.offset - here.offset * way
+            here = here._replace(offset=steering.offset * way, t=here.t + left * way)
+            if steering.slows:
+                distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
+        if distance != 0.0:
+            there = self.roads.advance(here, distance * self.direction, route=self.route)
+            if there is None:
+                there = self._last_place(here, distance * self.direction * way)
+                self.speed = 0.0
+                self.end_of_road = True
+            here = there
+        if steering is not None:
+            self.heading = wrap_angle((0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance))
+        self.location = here
+        self.pose = self.pose_on(here, self.heading)
+
+    def _turn(self, steering: Steering, left: float, distance: float) -> float:
+        if steering.heading is not None:
+            return steering.heading
+        if distance == 0.0 or left == 0.0:
+            return 0.0
+        return math.atan(left * self.direction / distance)
+
+    def pose_on(self, here: LaneLocation, heading: float) -> Pose:
+        """The pose at a place of the road with an angle to the driving direction there."""
+        assert self.roads is not None
+        pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
+        turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
+        return pose.turned(turn)
+
+    def _last_place(self, here: LaneLocation, along: float) -> LaneLocation:
+        assert self.roads is not None
+        return here._replace(s=self.roads.roads[here.road].length if along > 0.0 else 0.0)
+
+    def _freely(self, distance: float) -> None:
+        x, y, z, h, p, r = self.pose
+        x, y = x + distance * math.cos(h), y + distance * math.sin(h)
+        if self.roads is not None and distance != 0.0:
+            self.location = self.roads.locate_at(x, y, self.location)
+            if self.location is not None:
+                ground = self.roads.lane_pose_at(*self.location[:4])
+                z, p, r = ground.z, *ground.turned(wrap_angle(h - ground.h))[4:]
+                self.heading = self._heading_at(self.location, h)
+        self.pose = Pose(x, y, z, h, p, r)
+
+    def _adopt(self, location: LaneLocation | None) -> None:
+        self.location = location
+        if location is not None:
+            self.heading = self._heading_at(location, self.pose.h)
+
+    def _heading_at(self, location: LaneLocation, yaw: float) -> float:
+        assert self.roads is not None
+        lane = self.roads.lane_pose_at(*location[:4]).h
+        turn = wrap_angle(
+            yaw - lane if self.roads.driving_direction(location.road, location.lane) > 0 else yaw - lane - math.pi
+        )
+        return 0.0 if abs(turn) < TINY else turn

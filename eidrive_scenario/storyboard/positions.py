@@ -1,0 +1,260 @@
+"""Positions of the standard, in all their frames, as places in the world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.route import route_of
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.trajectory import lay_out
+
+
+def resolve(position: model.Position, stage: Stage, actor: str | None = None) -> Place:
+    """The place that a position means now. `actor` is the entity that goes there; its route counts for some positions.
+
+    Raises ScenarioError if the road network does not have it, Absent if it refers to an entity that is not in the
+    world.
+    """
+    frame = position.chosen()
+    return FRAMES[type(frame)](frame, stage, actor)
+
+
+def references(position: model.Position) -> tuple[str, ...]:
+    """The entities that a position refers to."""
+    return tuple(name for below in position.walk() if (name := getattr(below, "entity_ref", None)) is not None)
+
+
+def _world(frame: model.WorldPosition, stage: Stage, actor: str | None) -> Place:
+    h, p, r = frame.h or 0.0, frame.p or 0.0, frame.r or 0.0
+    return _on_ground(stage, Pose(frame.x, frame.y, frame.z or 0.0, h, p, r), z_given=frame.z is not None)
+
+
+def _relative_world(frame: model.RelativeWorldPosition, stage: Stage, actor: str | None) -> Place:
+    origin = stage.pose(frame.entity_ref)
+    x, y, z = origin.x + frame.dx, origin.y + frame.dy, origin.z + (frame.dz or 0.0)
+    h, p, r = _angles(frame.orientation, origin)
+    return _on_ground(stage, Pose(x, y, z, h, p, r), z_given=bool(frame.dz))
+
+
+def _relative_object(frame: model.RelativeObjectPosition, stage: Stage, actor: str | None) -> Place:
+    origin = stage.pose(frame.entity_ref)
+    cos, sin = math.cos(origin.h), math.sin(origin.h)
+    x = origin.x + frame.dx * cos - frame.dy * sin
+    y = origin.y + frame.dx * sin + frame.dy * cos
+    h, p, r = _angles(frame.orientation, origin)
+    return _on_ground(stage, Pose(x, y, origin.z + (frame.dz or 0.0), h, p, r), z_given=bool(frame.dz))
+
+
+def _road(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
+    roads = _roads(frame, stage)
+    _check_road(frame, roads, frame.road_id, frame.s)
+    return _in_road(roads, frame.road_id, frame.s, frame.t, frame.orientation)
+
+
+def _relative_road(frame: model.RelativeRoadPosition, stage: Stage, actor: str | None) -> Place:
+    roads, origin = _roads(frame, stage), _origin(frame, stage)
+    here = along_reference(roads, origin, frame.ds)
+    if here is None:
+        raise _missing(frame, f"leads {frame.ds:g} m from {frame.entity_ref}, beyond the end of the road")
+    return _in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
+
+
+def _lane(frame: model.LanePosition, stage: Stage, actor: str | None) -> Place:
+    roads = _roads(frame, stage)
+    _check_road(frame, roads, frame.road_id, frame.s)
+    lane = _lane_id(frame, frame.lane_id)
+    known = roads.lane_ids(frame.road_id, frame.s)
+    if lane not in known and lane != 0:
+        shown = ", ".join(str(number) for number in known)
+        raise _missing(
+            frame, f"names lane {lane} of road {frame.road_id!r} at s = {frame.s:g}", f"its lanes there: {shown}"
+        )
+    return _in_lane(roads, frame.road_id, lane, frame.s, frame.offset or 0.0, frame.orientation)
+
+
+def _relative_lane(frame: model.RelativeLanePosition, stage: Stage, actor: str | None) -> Place:
+    roads, origin = _roads(frame, stage), _origin(frame, stage)
+    ahead = facing(stage, frame.entity_ref, origin)
+    if frame.ds_lane is not None:
+        there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead)
+    else:
+        there = along_reference(
+            roads, origin, (frame.ds or 0.0) * ahead * roads.driving_direction(origin.road, origin.lane)
+        )
+    if there is None:
+        raise _missing(frame, f"lies beyond the end of the road of {frame.entity_ref}")
+    sign = ahead * roads.driving_direction(there.road, there.lane)
+    lane = count_lanes(there.lane, frame.d_lane * sign)
+    if lane not in roads.lane_ids(there.road, there.s):
+        raise _missing(frame, f"names lane {lane} of road {there.road!r}, which it does not have at s = {there.s:.1f}")
+    return _in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
+
+
+def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place:
+    roads = _roads(frame, stage)
+    within = frame.in_route_position.chosen()
+    route = frame.route_ref.route or stage.catalog_entry(frame.route_ref.catalog_reference, model.Route)
+    path = route_of(route, roads, lambda position: resolve(position, stage, actor))
+    if isinstance(within, model.PositionOfCurrentEntity):
+        here = _origin(within, stage)
+        return _in_lane(roads, here.road, here.lane, here.s, here.offset, frame.orientation)
+    if not isinstance(within, model.PositionInRoadCoordinates | model.PositionInLaneCoordinates):
+        raise _missing(frame, f"says {type(within).__name__}, which is not known here")
+    here = path.location_at(within.path_s)
+    if not -1e-3 <= within.path_s <= path.length + 1e-3:
+        raise _missing(frame, f"leads {within.path_s:g} m along a route of {path.length:.1f} m")
+    if isinstance(within, model.PositionInRoadCoordinates):
+        return _in_road(roads, here.road, here.s, within.t, frame.orientation, here.lane)
+    lane = _lane_id(frame, within.lane_id)
+    return _in_lane(roads, here.road, lane, here.s, within.lane_offset or 0.0, frame.orientation)
+
+
+def _trajectory(frame: model.TrajectoryPosition, stage: Stage, actor: str | None) -> Place:
+    trajectory = frame.trajectory_ref.trajectory
+    if trajectory is None:
+        trajectory = stage.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory)
+    at = lay_out(trajectory, lambda position: resolve(position, stage, actor).pose).at(frame.s)
+    offset = frame.t or 0.0
+    x, y = at.x - offset * math.sin(at.h), at.y + offset * math.cos(at.h)
+    h, p, r = _angles(frame.orientation, at)
+    return _on_ground(stage, Pose(x, y, at.z, h, p, r), z_given=True)
+
+
+def _geo(frame: model.GeoPosition, stage: Stage, actor: str | None) -> Place:
+    raise _missing(frame, "is not understood yet", "give the place as a WorldPosition or LanePosition")
+
+
+FRAMES: dict[type[model.Element], Callable[[Any, Stage, str | None], Place]] = {
+    model.WorldPosition: _world,
+    model.RelativeWorldPosition: _relative_world,
+    model.RelativeObjectPosition: _relative_object,
+    model.RoadPosition: _road,
+    model.RelativeRoadPosition: _relative_road,
+    model.LanePosition: _lane,
+    model.RelativeLanePosition: _relative_lane,
+    model.RoutePosition: _route,
+    model.TrajectoryPosition: _trajectory,
+    model.GeoPosition: _geo,
+}
+
+
+def count_lanes(lane: int, steps: int) -> int:
+    """The lane `steps` to the left (towards larger ids) of a lane; lane 0 is no lane and does not count."""
+    target = lane + steps
+    if steps and (target == 0 or (target > 0) != (lane > 0)):
+        target += 1 if steps > 0 else -1
+    return target
+
+
+def along_reference(roads: RoadNetwork, here: LaneLocation, ds: float) -> LaneLocation | None:
+    """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset."""
+    road = roads.roads[here.road]
+    s = here.s + ds
+    if 0.0 <= s <= road.length:
+        return here._replace(s=s)
+    rest = s - road.length if s > road.length else s
+    edge = here._replace(s=road.length if s > road.length else 0.0)
+    return roads.advance(edge, rest * roads.driving_direction(here.road, here.lane))
+
+
+def facing(stage: Stage, name: str, here: LaneLocation) -> int:
+    """+1 where an actor points along the driving direction of its lane, -1 where against it."""
+    if stage.roads is None:
+        return 1
+    lane = stage.roads.lane_pose_at(here.road, here.lane, here.s, here.offset).h
+    along = math.cos(stage.pose(name).h - lane) * stage.roads.driving_direction(here.road, here.lane)
+    return 1 if along >= 0.0 else -1
+
+
+def _in_lane(
+    roads: RoadNetwork, road: str, lane: int, s: float, offset: float, orientation: model.Orientation | None
+) -> Place:
+    here = roads.location(road, lane, s, offset)
+    return Place(_oriented(orientation, roads.pose(here)), here)
+
+
+def _in_road(
+    roads: RoadNetwork, road: str, s: float, t: float, orientation: model.Orientation | None, lane: int | None = None
+) -> Place:
+    here = roads.road_location(road, s, t)
+    if lane is not None:
+        here = roads.location(road, lane, s, t - roads.location(road, lane, s).t)
+    surface = roads.road_pose_at(road, s, t)
+    base = surface if roads.driving_direction(road, here.lane) > 0 else surface.turned(math.pi)
+    return Place(_oriented(orientation, base), here)
+
+
+def _oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
+    h, p, r = _angles(orientation, base)
+    level = base.turned(wrap_angle(h - base.h))
+    if orientation is None:
+        p, r = level.p, level.r
+    elif orientation.type is model.ReferenceContext.RELATIVE:
+        p, r = level.p + (orientation.p or 0.0), level.r + (orientation.r or 0.0)
+    else:
+        p, r = level.p if orientation.p is None else p, level.r if orientation.r is None else r
+    return Pose(base.x, base.y, base.z, h, p, r)
+
+
+def _angles(orientation: model.Orientation | None, base: Pose) -> tuple[float, float, float]:
+    """Heading, pitch and roll; relative ones are added to the base's, missing ones are 0."""
+    if orientation is None:
+        return base.h, base.p, base.r
+    h, p, r = orientation.h or 0.0, orientation.p or 0.0, orientation.r or 0.0
+    if orientation.type is model.ReferenceContext.RELATIVE:
+        return wrap_angle(base.h + h), base.p + p, base.r + r
+    return h, p, r
+
+
+def _on_ground(stage: Stage, pose: Pose, *, z_given: bool) -> Place:
+    """The place of a pose in the world: on the road below it where there is one."""
+    if stage.roads is None:
+        return Place(pose)
+    here = stage.roads.locate_at(pose.x, pose.y)
+    if here is None:
+        return Place(pose)
+    if not z_given:
+        ground = stage.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
+        level = ground.turned(wrap_angle(pose.h - ground.h))
+        pose = Pose(pose.x, pose.y, ground.z, pose.h, pose.p or level.p, pose.r or level.r)
+    return Place(pose, here)
+
+
+def _origin(frame: Any, stage: Stage) -> LaneLocation:
+    here = stage.location(frame.entity_ref)
+    if here is None:
+        raise _missing(frame, f"starts from {frame.entity_ref}, which is not on a road")
+    return here
+
+
+def _roads(frame: model.Element, stage: Stage) -> RoadNetwork:
+    if stage.roads is None:
+        raise _missing(frame, "needs a road network", "name one in RoadNetwork/LogicFile, or use a WorldPosition")
+    return stage.roads
+
+
+def _check_road(frame: model.Element, roads: RoadNetwork, road: str, s: float) -> None:
+    if road not in roads.roads:
+        shown = ", ".join(sorted(roads.roads)[:12])
+        raise _missing(frame, f"names road {road!r}, which the road network does not have", f"it has {shown}")
+    length = roads.roads[road].length
+    if not -1e-3 <= s <= length + 1e-3:
+        raise _missing(frame, f"says s = {s:g} on road {road!r}", f"that road is {length:.2f} m long")
+
+
+def _lane_id(frame: model.Element, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise _missing(frame, f"says laneId {text!r}", "give a whole number") from None
+
+
+def _missing(frame: model.Element, message: str, remedy: str = "") -> ScenarioError:
+    return ScenarioError(Problem(f"{type(frame).__name__} {message}", remedy, frame.source, frame.line))

@@ -1,0 +1,89 @@
+"""Where every storyboard element stands, and what happened to it: the memory of StoryboardElementStateConditions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+
+NOT_BEGUN = State.STANDBY
+"""What an element counts as while those above it do not run."""
+
+
+@dataclass
+class ElementRecord:
+    """One element: its place in the tree, its state, and the ticks of its transitions."""
+
+    kind: str
+    path: tuple[str, ...]
+    state: State | None = None
+    transitions: list[tuple[int, Transition]] = field(default_factory=list)
+
+
+class Progress:
+    """States of all elements, and the changes of the current tick."""
+
+    def __init__(self) -> None:
+        self.records: list[ElementRecord] = []
+        self.changes: list[StateChange] = []
+        self.tick = -1
+        self.time = 0.0
+
+    def enrol(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
+        """Keep track of one more element."""
+        record = ElementRecord(kind, path)
+        self.records.append(record)
+        return record
+
+    def begin(self, tick: int, time: float) -> None:
+        """A new tick: the changes of the last one are over."""
+        self.tick, self.time = tick, time
+        self.changes = []
+
+    def change(self, record: ElementRecord, transition: Transition | None, after: State, why: str = "") -> None:
+        """An element goes to another state (or, skipped, stays where it is)."""
+        before = record.state or NOT_BEGUN
+        if transition is None and record.state is after:
+            return
+        record.state = after
+        if transition is not None:
+            record.transitions.append((self.tick, transition))
+        self.changes.append(
+            StateChange(self.time, record.path[-1], "/".join(record.path), record.kind, before, transition, after, why)
+        )
+
+    def find(self, kind: str, reference: str) -> list[ElementRecord]:
+        """The elements of one kind whose path ends with `reference`; its parts stand apart by `::`."""
+        wanted = tuple(reference.split("::"))
+        return [r for r in self.records if r.kind == kind and r.path[-len(wanted) :] == wanted]
+
+    def watch(self, kind: str, reference: str) -> Watch | None:
+        """A watch on the elements that a reference means, None if there is none."""
+        found = self.find(kind, reference)
+        return Watch(self, found) if found else None
+
+    def names(self, kind: str) -> list[str]:
+        """The names of all elements of one kind."""
+        return [record.path[-1] for record in self.records if record.kind == kind]
+
+
+class Watch:
+    """One observer's eye on elements: each transition is shown to it once, and not long after it happened."""
+
+    def __init__(self, progress: Progress, records: list[ElementRecord]) -> None:
+        self._progress = progress
+        self._records = records
+        self._seen = [0] * len(records)
+
+    def in_state(self, state: State) -> bool:
+        """True where one of the elements is in that state."""
+        return any(record.state is state for record in self._records)
+
+    def passed(self, transition: Transition) -> bool:
+        """True where one of them went through that transition in this tick or, unseen so far, in the one before."""
+        found = False
+        for index, record in enumerate(self._records):
+            fresh = record.transitions[self._seen[index] :]
+            self._seen[index] = len(record.transitions)
+            found = found or any(kind is transition and tick >= self._progress.tick - 1 for tick, kind in fresh)
+        return found

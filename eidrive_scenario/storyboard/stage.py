@@ -1,0 +1,163 @@
+"""The stage: all that an action or a condition may see, and the commands to which actions write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol, TypeVar
+
+from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.actor import Actor
+from eidrive_scenario.storyboard.commands import Commands, Override
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.progress import Progress
+from eidrive_scenario.world.view import WorldView
+
+E = TypeVar("E", bound=model.Element)
+
+
+class Absent(LookupError):
+    """An entity is asked for its place, and is not in the world."""
+
+
+class Occupant(Protocol):
+    """Whoever holds a domain of an actor: it can be told that a younger action took it."""
+
+    def displace(self, behaviour: Holder, why: str) -> None:
+        """Let go of the domain."""
+
+
+class Holder(Protocol):
+    """A behaviour that holds domains."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+
+class Stage:
+    """What actions and conditions see of the run at one instant.
+
+    view        the truth at this tick; before the first view (Init) it holds nobody
+    dt          length of the step that begins now [s]; 0 in Init
+    parameters, variables  by name, as text
+    signals     states of traffic signals, by id
+    commands    to write to
+    """
+
+    def __init__(
+        self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int, nobody: WorldView
+    ) -> None:
+        self.scenario = scenario
+        self.roads = roads
+        self.step = dt
+        """The step of the run [s]."""
+        self.dt = 0.0
+        self.seed = seed
+        self.view = nobody
+        self.progress = Progress()
+        self.parameters: dict[str, str] = dict(scenario.parameters)
+        self.variables: dict[str, str] = dict(scenario.variables)
+        self.signals: dict[str, str] = {}
+        self.overrides: dict[str, dict[str, Override]] = {}
+        self.environment: model.Environment | None = None
+        self.environment_since = 0.0
+        self.user_values: Callable[[str], str | None] = lambda _: None
+        """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
+        self.commands = Commands()
+        self.actors: dict[str, Actor] = {
+            name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
+            for name, entity in scenario.entities.items()
+        }
+        self._holders: list[tuple[str, object, Occupant, Holder]] = []
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.view.time
+
+    def begin(self, view: WorldView, dt: float) -> None:
+        """A new tick: the view changes, the commands start empty, histories go on."""
+        self.view = view
+        self.dt = dt
+        self.commands = Commands()
+        self.progress.begin(view.tick, view.time)
+        rows: Mapping[str, int] = view.rows
+        for name, actor in self.actors.items():
+            row = rows.get(name)
+            if row is not None:
+                actor.observe(view, row)
+
+    def pose(self, name: str) -> Pose:
+        """Where an actor is now. Raises Absent if it is not in the world."""
+        actor = self.actors[name]
+        if not actor.present:
+            raise Absent(name)
+        return actor.motion.pose
+
+    def location(self, name: str) -> LaneLocation | None:
+        """Its place on the road: the lane below it, None where no road is near. Raises Absent."""
+        actor = self.actors[name]
+        if not actor.present:
+            raise Absent(name)
+        if self.roads is None:
+            return None
+        return actor.location(self.roads, self.view.tick)
+
+    def speed(self, name: str) -> float:
+        """Speed along the heading in this view [m/s]; of what was just placed, the speed that it was given."""
+        row = self.view.rows.get(name)
+        return float(self.view.speed[row]) if row is not None else self.actors[name].motion.speed
+
+    def enter(self, name: str, place: Place) -> None:
+        """Put an actor at a place; it enters the world if it was not there."""
+        actor = self.actors[name]
+        actor.motion.put(place)
+        actor.forget_location()
+        if not actor.present:
+            actor.present = True
+            self.commands.removals.discard(name)
+            self.commands.additions[name] = actor.motion.placement()
+
+    def leave(self, name: str) -> None:
+        """Take an actor out of the world; what it was doing ends."""
+        actor = self.actors[name]
+        if actor.present:
+            actor.present = False
+            self.commands.additions.pop(name, None)
+            self.commands.removals.add(name)
+        for held, _, occupant, holder in list(self._holders):
+            if held == name:
+                occupant.displace(holder, f"{name} left the world")
+                self.release(holder)
+
+    def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E]) -> E:
+        """The entry that a catalog reference means, with its parameters. Raises ScenarioError if it is no `kind`."""
+        if reference is None:
+            raise ScenarioError(Problem(f"a {kind.__name__} is missing", "give it in place or by a CatalogReference"))
+        entry = self.scenario.resolved(reference)
+        if not isinstance(entry, kind):
+            raise ScenarioError(
+                Problem(
+                    f"{reference.catalog_name}/{reference.entry_name} is a {type(entry).__name__}",
+                    f"a {kind.__name__} belongs here",
+                    reference.source,
+                    reference.line,
+                )
+            )
+        return entry
+
+    def occupy(self, actor: str | None, domains: object, occupant: Occupant, holder: Holder) -> None:
+        """A behaviour begins to control domains of an actor; older ones on these domains end."""
+        if actor is None or not domains:
+            return
+        for held, other_domains, other, behaviour in list(self._holders):
+            if held == actor and other_domains & domains:  # type: ignore[operator]
+                self._holders = [entry for entry in self._holders if entry[3] is not behaviour]
+                other.displace(behaviour, f"{holder.name} took over")
+        self._holders.append((actor, domains, occupant, holder))
+
+    def release(self, holder: Holder) -> None:
+        """A behaviour controls nothing any more."""
+        self._holders = [entry for entry in self._holders if entry[3] is not holder]

@@ -1,0 +1,103 @@
+"""The storyboard of one run: ticks the tree, moves what is scripted, and says what the world shall do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.registry import Registry, registry
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.builder import Builder
+from eidrive_scenario.storyboard.commands import Commands
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.world.view import WorldView
+
+STOPPED = "stop trigger"
+COMPLETE = "storyboard complete"
+
+
+class Storyboard:
+    """The standard's storyboard over one scenario.
+
+    Raises ScenarioError, with all findings at once, for what the scenario asks and nobody can execute.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        roads: RoadNetwork | None,
+        *,
+        dt: float,
+        seed: int = 0,
+        actions: Registry | None = None,
+        conditions: Registry | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.dt = dt
+        self.stage = Stage(scenario, roads, dt=dt, seed=seed, nobody=_empty_view())
+        builder = Builder(scenario, self.stage, actions or registry("actions"), conditions or registry("conditions"))
+        self.init, self.root = builder.build()
+        self.ended: str | None = None
+        """Why the run is over, as far as the storyboard has a say; None while it goes on."""
+
+    @property
+    def changes(self) -> tuple[StateChange, ...]:
+        """What changed its state in the last tick."""
+        return tuple(self.stage.progress.changes)
+
+    def initial(self) -> Commands:
+        """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
+        self.init.start()
+        return self._finished(self.stage.commands)
+
+    def tick(self, view: WorldView) -> Commands:
+        """Judge the triggers by this view, let the actions decide, and move what is scripted over to the next one."""
+        self.stage.begin(view, self.dt)
+        if self.root.state is None:
+            self.root.stand_by()
+            self.root.begin()
+        self.root.judge()
+        if self.root.state is State.RUNNING:
+            self.init.tick_once()
+            self.root.tick_once()
+        if self.root.state is State.COMPLETE and self.ended is None:
+            self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
+        commands = self.stage.commands
+        for name, actor in self.stage.actors.items():
+            if not actor.present:
+                continue
+            if not actor.driven:
+                commands.placements[name] = actor.motion.step(self.dt)
+            elif actor.motion.jumped:
+                commands.placements[name] = actor.motion.placement()
+        return self._finished(commands)
+
+    def _finished(self, commands: Commands) -> Commands:
+        stage = self.stage
+        driven = [name for name, actor in stage.actors.items() if actor.present and actor.driven]
+        commands.driven = frozenset(driven)
+        commands.goals = {name: goal for name in driven if (goal := stage.actors[name].goal) is not None}
+        commands.overrides = {name: dict(held) for name, held in stage.overrides.items() if held}
+        return commands
+
+
+def _empty_view() -> WorldView:
+    none = np.empty(0)
+    points = np.empty((0, 3))
+    return WorldView(
+        time=0.0,
+        tick=-1,
+        names=(),
+        categories=(),
+        position=points,
+        yaw=none,
+        pitch=none,
+        roll=none,
+        velocity=points,
+        acceleration=points,
+        yaw_rate=none,
+        speed=none,
+        size=points,
+        offset=points,
+    )

@@ -1,0 +1,228 @@
+"""Trajectories laid out in the world: any shape of the standard as a curve by arc length, with times where it has them."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import Pose
+
+SPACING = 0.1
+"""Distance between the points at which curved shapes are laid out [m]."""
+
+Resolve = Callable[[model.Position], Pose]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A trajectory as points with headings, by arc length.
+
+    s         arc length of each point [m];  poses  of each point
+    times     at which each point is passed [s], None for a trajectory without times
+    straight  True where the points are corners: between two of them the heading is that of the line, unless given
+    given     True where the file gives headings
+    """
+
+    s: tuple[float, ...]
+    poses: tuple[Pose, ...]
+    times: tuple[float, ...] | None
+    closed: bool = False
+    given: bool = False
+
+    @property
+    def length(self) -> float:
+        """Arc length of the whole [m]."""
+        return self.s[-1]
+
+    @property
+    def start_time(self) -> float:
+        """Time of the first point [s]; 0 without times."""
+        return self.times[0] if self.times is not None else 0.0
+
+    @property
+    def end_time(self) -> float:
+        """Time of the last point [s]; 0 without times."""
+        return self.times[-1] if self.times is not None else 0.0
+
+    def at(self, s: float) -> Pose:
+        """The pose at arc length s; beyond the ends that of the end, on a closed one further round."""
+        if self.closed and self.length > 0.0:
+            s %= self.length
+        index, share = self._between(self.s, s)
+        return self._blend(index, share)
+
+    def at_time(self, time: float) -> float:
+        """Arc length at a time: between two points at constant speed [m]."""
+        if self.times is None:
+            return 0.0
+        index, share = self._between(self.times, time)
+        return self.s[index] + share * (self.s[index + 1] - self.s[index])
+
+    def _blend(self, index: int, share: float) -> Pose:
+        a, b = self.poses[index], self.poses[index + 1]
+        turn = wrap_angle(b.h - a.h)
+        return Pose(
+            a.x + share * (b.x - a.x),
+            a.y + share * (b.y - a.y),
+            a.z + share * (b.z - a.z),
+            a.h + share * turn,
+            a.p + share * wrap_angle(b.p - a.p),
+            a.r + share * wrap_angle(b.r - a.r),
+        )
+
+    @staticmethod
+    def _between(grid: Sequence[float], value: float) -> tuple[int, float]:
+        index = min(max(bisect_right(grid, value) - 1, 0), len(grid) - 2)
+        span = grid[index + 1] - grid[index]
+        return index, min(1.0, max(0.0, (value - grid[index]) / span)) if span > 0.0 else 1.0
+
+
+def lay_out(trajectory: model.Trajectory, resolve: Resolve) -> Layout:
+    """A trajectory in the world. `resolve` gives the pose that a position means now."""
+    shape = trajectory.shape.chosen()
+    if isinstance(shape, model.Polyline):
+        return _polyline(shape, trajectory.closed, resolve)
+    if isinstance(shape, model.Clothoid):
+        return _clothoid(shape, trajectory.closed, resolve)
+    if isinstance(shape, model.ClothoidSpline):
+        return _clothoid_spline(shape, trajectory.closed, resolve)
+    assert isinstance(shape, model.Nurbs)
+    return _nurbs(shape, trajectory.closed, resolve)
+
+
+def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
+    corners = [resolve(vertex.position) for vertex in shape.vertex]
+    times = [vertex.time for vertex in shape.vertex]
+    if closed and math.hypot(corners[0].x - corners[-1].x, corners[0].y - corners[-1].y) > 1e-3:
+        corners.append(corners[0])
+        times.append(None)
+    given = any(has_heading(vertex.position) for vertex in shape.vertex)
+    s, poses, clock = [0.0], [], []
+    for index, corner in enumerate(corners[:-1]):
+        after = corners[index + 1]
+        span = math.hypot(after.x - corner.x, after.y - corner.y)
+        if given:
+            poses.append(corner)
+        else:
+            # two points per line, so that the heading changes at the corner and not along the line
+            line = math.atan2(after.y - corner.y, after.x - corner.x) if span > 0.0 else corner.h
+            poses += [corner._replace(h=line), after._replace(h=line)]
+        s += [s[-1] + span] if given else [s[-1] + span, s[-1] + span]
+    if given:
+        poses.append(corners[-1])
+        clock = times
+    else:
+        s = s[:-1]
+        clock = [times[0], *[time for time in times[1:-1] for _ in range(2)], times[-1]]
+    return Layout(tuple(s), tuple(poses), _times(clock), closed, given)
+
+
+def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
+    start = resolve(shape.position)
+    change = shape.curvature_prime if shape.curvature_prime is not None else shape.curvature_dot or 0.0
+    s, poses = _spiral(start, shape.curvature, shape.curvature + change * shape.length, shape.length)
+    times = None
+    if shape.start_time is not None and shape.stop_time is not None:
+        times = _even(s, shape.start_time, shape.stop_time)
+    return Layout(tuple(s), tuple(poses), times, closed)
+
+
+def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve) -> Layout:
+    s, poses, clock = [0.0], [], []
+    here: Pose | None = None
+    segments = shape.clothoid_spline_segment
+    for index, segment in enumerate(segments):
+        if segment.position_start is not None:
+            here = resolve(segment.position_start)
+        if here is None:
+            here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        here = here._replace(h=here.h + (segment.h_offset or 0.0))
+        along, line = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
+        following = segments[index + 1].time_start if index + 1 < len(segments) else shape.time_end
+        if segment.time_start is not None and following is not None:
+            clock += _even(along, segment.time_start, following)
+        base = s[-1]
+        s += [base + distance for distance in along]
+        poses += line
+        here = line[-1]
+    return Layout(tuple(s[1:]), tuple(poses), tuple(clock) if len(clock) == len(poses) else None, closed)
+
+
+def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:
+    """Points of a curve whose curvature goes linearly from `first` to `last`; midpoint rule on short steps."""
+    count = max(1, math.ceil(length / SPACING))
+    step = length / count
+    s, poses, x, y = [0.0], [start], start.x, start.y
+    for number in range(count):
+        middle = (number + 0.5) * step
+        h = start.h + first * middle + 0.5 * (last - first) / length * middle * middle
+        x, y = x + step * math.cos(h), y + step * math.sin(h)
+        end = (number + 1) * step
+        h = start.h + first * end + 0.5 * (last - first) / length * end * end
+        s.append(end)
+        poses.append(start._replace(x=x, y=y, h=h))
+    return s, poses
+
+
+def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
+    """Points of a rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4)."""
+    knots = [knot.value for knot in shape.knot]
+    control = [(resolve(p.position), p.weight if p.weight is not None else 1.0, p.time) for p in shape.control_point]
+    degree = shape.order - 1
+    low, high = knots[degree], knots[len(control)]
+    rough = sum(math.hypot(b[0].x - a[0].x, b[0].y - a[0].y) for a, b in zip(control[:-1], control[1:], strict=True))
+    count = max(2, math.ceil(rough / SPACING))
+    s, points, clock = [0.0], [], []
+    for number in range(count + 1):
+        u = low + (high - low) * number / count
+        weights = _basis(u, degree, knots, len(control))
+        total = sum(share * entry[1] for share, entry in zip(weights, control, strict=True))
+        rational = [share * entry[1] / total for share, entry in zip(weights, control, strict=True)]
+        x, y, z = (sum(r * entry[0][axis] for r, entry in zip(rational, control, strict=True)) for axis in range(3))
+        if points:
+            s.append(s[-1] + math.hypot(x - points[-1][0], y - points[-1][1]))
+        points.append((x, y, z))
+        if all(entry[2] is not None for entry in control):
+            clock.append(sum(r * (entry[2] or 0.0) for r, entry in zip(rational, control, strict=True)))
+    poses = []
+    for number, (x, y, z) in enumerate(points):
+        a, b = points[max(0, number - 1)], points[min(count, number + 1)]
+        poses.append(Pose(x, y, z, math.atan2(b[1] - a[1], b[0] - a[0]), 0.0, 0.0))
+    return Layout(tuple(s), tuple(poses), tuple(clock) if clock else None, closed)
+
+
+def _basis(u: float, degree: int, knots: Sequence[float], count: int) -> list[float]:
+    span = count - 1 if u >= knots[count] else min(max(bisect_right(knots, u) - 1, degree), count - 1)
+    values = [0.0] * (len(knots) - 1)
+    values[span] = 1.0
+    for order in range(1, degree + 1):
+        for index in range(len(knots) - order - 1):
+            left = knots[index + order] - knots[index]
+            right = knots[index + order + 1] - knots[index + 1]
+            before = (u - knots[index]) / left * values[index] if left > 0.0 else 0.0
+            after = (knots[index + order + 1] - u) / right * values[index + 1] if right > 0.0 else 0.0
+            values[index] = before + after
+    return values[:count]
+
+
+def has_heading(position: model.Position) -> bool:
+    """True where a position says which way to point."""
+    frame = position.chosen()
+    if isinstance(frame, model.WorldPosition):
+        return frame.h is not None
+    orientation = getattr(frame, "orientation", None)
+    return orientation is not None and orientation.h is not None
+
+
+def _even(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
+    length = s[-1] if s[-1] > 0.0 else 1.0
+    return tuple(first + (last - first) * distance / length for distance in s)
+
+
+def _times(clock: Sequence[float | None]) -> tuple[float, ...] | None:
+    known = [time for time in clock if time is not None]
+    return tuple(known) if len(known) == len(clock) and known[-1] > known[0] else None

@@ -1,0 +1,133 @@
+"""Triggers: groups of conditions joined by OR, the conditions of a group by AND; edges and delays."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import py_trees
+from py_trees.common import Status
+
+from eidrive_scenario.storyboard.condition import Condition
+from eidrive_scenario.storyboard.stage import Stage
+
+TINY = 1e-6
+
+
+class ConditionMonitor:
+    """A condition with its edge and delay.
+
+    An edge needs a value before it: the first evaluation yields none. With a delay, the answer at t is the edge's
+    result at t - delay; before the first evaluation it is false.
+    """
+
+    def __init__(self, condition: Condition, *, name: str = "", edge: str = "none", delay: float = 0.0) -> None:
+        self.condition = condition
+        self.name = name
+        self.edge = edge
+        self.delay = delay
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all evaluations."""
+        self._last: bool | None = None
+        self._recorded = False
+        self._history: deque[tuple[float, bool, str]] = deque()
+        self._delayed = (False, "")
+
+    def evaluate(self, stage: Stage) -> bool:
+        """Ask the condition once and answer with edge and delay. Called at most once per tick."""
+        result = self._edge(self.condition.holds(stage))
+        if self.delay <= 0.0:
+            return result
+        if result != self._recorded:
+            self._recorded = result
+            self._history.append((stage.time, result, self.condition.explain(stage) if result else ""))
+        while self._history and self._history[0][0] <= stage.time - self.delay + TINY:
+            _, value, text = self._history.popleft()
+            self._delayed = (value, text)
+        return self._delayed[0]
+
+    def _edge(self, value: bool) -> bool:
+        before, self._last = self._last, value
+        if self.edge == "none":
+            return value
+        if before is None or before == value:
+            return False
+        return self.edge == "risingOrFalling" or (self.edge == "rising") == value
+
+    def why(self, stage: Stage) -> str:
+        """What made it true, in words, with the values of that instant; to be asked where it just was true."""
+        if self.delay <= 0.0:
+            return self.condition.explain(stage)
+        return f"{self._delayed[1]}, {self.delay:g} s ago"
+
+    def describe(self) -> str:
+        """The condition in words."""
+        edge = {"none": "", "rising": " becomes true", "falling": " becomes false", "risingOrFalling": " changes"}
+        late = f", {self.delay:g} s later" if self.delay > 0.0 else ""
+        return f"{self.condition.describe()}{edge[self.edge]}{late}"
+
+
+@dataclass(frozen=True)
+class ConditionGroup:
+    """An AND over conditions at one instant."""
+
+    monitors: tuple[ConditionMonitor, ...]
+
+    def evaluate(self, stage: Stage) -> bool:
+        """True where all are; each is asked every time, as edges and delays live on what they saw before."""
+        results = [monitor.evaluate(stage) for monitor in self.monitors]
+        return bool(results) and all(results)
+
+
+class Trigger:
+    """An OR over condition groups."""
+
+    def __init__(self, groups: Sequence[ConditionGroup]) -> None:
+        self.groups = tuple(groups)
+        self.why = ""
+        self.triggering: tuple[str, ...] = ()
+        """The entities that fulfilled the conditions of the group that fired."""
+
+    def __bool__(self) -> bool:
+        return bool(self.groups)
+
+    def evaluate(self, stage: Stage) -> bool:
+        """True where it fires; `why` then says what did it. Called at most once per tick."""
+        fired = [group for group in self.groups if group.evaluate(stage)]
+        if not fired:
+            return False
+        monitors = fired[0].monitors
+        self.why = " and ".join(monitor.why(stage) for monitor in monitors)
+        names = [name for monitor in monitors for name in getattr(monitor.condition, "fulfilled", ())]
+        self.triggering = tuple(dict.fromkeys(names))
+        return True
+
+    def reset(self) -> None:
+        """Forget all evaluations, as before the first."""
+        for group in self.groups:
+            for monitor in group.monitors:
+                monitor.reset()
+
+    def describe(self) -> str:
+        """The trigger in words."""
+        return " or ".join(" and ".join(m.describe() for m in group.monitors) for group in self.groups)
+
+
+class WaitFor(py_trees.behaviour.Behaviour):
+    """The leaf at which a trigger meets the tree: runs until it fires."""
+
+    def __init__(self, name: str, trigger: Trigger, stage: Stage) -> None:
+        super().__init__(name)
+        self.trigger = trigger
+        self.stage = stage
+
+    def initialise(self) -> None:
+        """Forget what was seen in an earlier life."""
+        self.trigger.reset()
+
+    def update(self) -> Status:
+        """Ask the trigger."""
+        return Status.SUCCESS if self.trigger.evaluate(self.stage) else Status.RUNNING
