@@ -14,9 +14,12 @@ from eidrive_scenario.roads.model import (
 )
 from eidrive_scenario.roads.movement import Branch, Choose
 from eidrive_scenario.roads.network import RoadNetwork
+from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
 from eidrive_scenario.roads.route import Route
+from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
 
 __all__ = [
+    "KINDS",
     "Branch",
     "Choose",
     "Junction",
@@ -25,6 +28,7 @@ __all__ = [
     "LaneLocation",
     "LaneLocations",
     "LaneSection",
+    "PlacedObject",
     "Pose",
     "Poses",
     "PositionError",
@@ -36,4 +40,8 @@ __all__ = [
     "Signal",
     "SignalController",
     "SignalPlace",
+    "SurfaceMesh",
+    "outlines",
+    "placed_objects",
+    "surface_meshes",
 ]

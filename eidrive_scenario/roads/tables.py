@@ -78,7 +78,7 @@ class RoadTables:
                     Problem(f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane")
                 )
             row[n] = self.first_lane[section[n]] + near[0]
-        return row
+        return np.asarray(row, dtype=np.int64)
 
     def check(self, road: Integers, s: Array) -> None:
         """Raises PositionError for the first place beyond the ends of its road."""

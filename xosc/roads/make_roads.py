@@ -22,7 +22,7 @@ SIDEWALK = 2.0
 KERB = 0.12
 CLOTHOID = math.radians(25.0)
 """Part of a quarter turn that each of the two clothoids takes."""
-CORNER_MARGIN = 1.0
+CORNER_MARGIN = 2.6
 """Width between a right turn's lane and the kerb in the middle of the turn."""
 SPEED_LIMIT = "50"
 PROJECTION = "+proj=tmerc +lat_0=49 +lon_0=8 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"

@@ -1,0 +1,111 @@
+"""Road marks as strips of paint along lane edges, and painted areas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.roads.location import Array
+from eidrive_scenario.roads.model import Lane, LaneSection, Road, RoadMark
+from eidrive_scenario.roads.network import RoadNetwork
+from eidrive_scenario.roads.objects import outlines
+
+DASH, GAP = 3.0, 6.0
+"""Broken lines in built-up areas (German RMS: 3 m of paint, 6 m of gap)."""
+APART = 0.24
+"""Distance between the lines of a double line, centre to centre [m]."""
+STRIPE = 0.5
+"""Width of a crosswalk's stripes and of the gaps between them [m]."""
+PAINTED = ("solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken", "botts dots")
+CURVED = 0.01
+"""Curvature above which a dash is bent [1/m]."""
+
+
+class Strip(NamedTuple):
+    """Paint along a road: `s` and `t` (K, P) of K pieces with P points each, `width` [m]."""
+
+    kind: str
+    s: Array
+    t: Array
+    width: float
+
+
+def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip]:
+    """The marks of a lane section; `cuts` are the s at which solid lines may bend."""
+    for lane in section.lanes.values():
+        if road.junction_id is not None and lane.type == "none" and lane.id:
+            continue
+        marks = lane.road_marks
+        for mark, following in zip(marks, (*marks[1:], None), strict=True):
+            start = section.s + max(mark.s_offset, 0.0)
+            end = section.end if following is None else min(section.s + following.s_offset, section.end)
+            if mark.type in PAINTED and end - start > 1e-3:
+                yield from _mark_strips(road, section, lane, mark, start, end, cuts)
+
+
+def _mark_strips(
+    road: Road, section: LaneSection, lane: Lane, mark: RoadMark, start: float, end: float, cuts: Array
+) -> Iterator[Strip]:
+    kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
+    for offset, width, dash, gap, phase in _lines(lane, mark):
+        if dash > 0.0 and gap > 0.0:
+            starts = np.arange(start + phase, end, dash + gap)
+            if not starts.size:
+                continue
+            bent = any(abs(road.reference.at(float(s)).curvature) > CURVED for s in (start, 0.5 * (start + end), end))
+            share = np.linspace(0.0, 1.0, 4 if bent else 2)
+            s = starts[:, None] + (np.minimum(starts + dash, end) - starts)[:, None] * share
+        else:
+            s = np.array([start, *(cut for cut in cuts if start < cut < end), end])[None, :]
+        yield Strip(kind, s, _edge(road, section, lane, s) + offset, width)
+
+
+def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float, float]]:
+    """The lines of a mark: offset from the lane's edge in t, width, length of dash and gap (0 for solid), first s."""
+    lines = [
+        (line.t_offset, line.width, line.length, line.space, line.s_offset)
+        for line in mark.lines
+        if line.length > 0.0 or line.space > 0.0
+    ]
+    if lines:
+        return lines
+    words = mark.type.split()
+    if mark.type == "botts dots":
+        return [(0.0, 0.1, 0.1, 1.2, 0.0)]
+    # Two lines are named from the inside out, those of lane 0 from left to right.
+    outwards = lane.side if lane.id else -1
+    offsets = [0.0] if len(words) == 1 else [-0.5 * APART * outwards, 0.5 * APART * outwards]
+    pattern = {"solid": (0.0, 0.0), "broken": (DASH, GAP)}
+    return [(offset, mark.width, *pattern[word], 0.0) for offset, word in zip(offsets, words, strict=True)]
+
+
+def _edge(road: Road, section: LaneSection, lane: Lane, s: Array) -> Array:
+    """t of a lane's outer edge."""
+    flat = [road.lane_offset.value(v) + lane.side * lane.outer.value(v - section.s) for v in s.ravel().tolist()]
+    return np.array(flat).reshape(s.shape)
+
+
+def object_strips(network: RoadNetwork) -> Iterator[tuple[str, Array]]:
+    """Painted areas among the objects, as convex polygons (M, 3): crosswalks in stripes, stop lines whole."""
+    for item in network.objects:
+        if item.type == "crosswalk":
+            for outline in outlines(network, item):
+                yield from _stripes(outline)
+        elif item.type == "roadMark":
+            for outline in outlines(network, item):
+                yield "marking_white", outline
+
+
+def _stripes(outline: Array) -> Iterator[tuple[str, Array]]:
+    corners = outline[:-1] if len(outline) > 4 and np.allclose(outline[0], outline[-1]) else outline
+    if len(corners) != 4:
+        yield "marking_white", corners
+        return
+    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    a, b, c, d = np.roll(corners, -int(np.argmax(sides)), axis=0)
+    count = max(round(float(sides.max()) / (2.0 * STRIPE)), 1)
+    for i in range(count):
+        low, high = (i + 0.25) / count, (i + 0.75) / count
+        yield "marking_white", np.array([a + low * (b - a), a + high * (b - a), d + high * (c - d), d + low * (c - d)])

@@ -1,0 +1,95 @@
+"""Objects of the road network in the world: where they stand, how large they are, what ground they cover."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.roads.location import Array, Pose
+from eidrive_scenario.roads.model import Corner, RoadObject
+from eidrive_scenario.roads.network import RoadNetwork
+
+LONGEST_PART = 5.0
+"""An object that repeats without gaps (a barrier) is cut into parts of this length [m]."""
+
+
+class PlacedObject(NamedTuple):
+    """One object in the world: pose of its foot, length, width and height [m], 0 where the map does not say."""
+
+    object: RoadObject
+    pose: Pose
+    length: float
+    width: float
+    height: float
+
+
+def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
+    """All objects, repeated ones once for each repetition."""
+    for item in network.objects:
+        if item.repeats:
+            yield from _repeated(network, item)
+        else:
+            width = 2.0 * item.radius if item.radius else item.width
+            length = 2.0 * item.radius if item.radius else item.length
+            yield PlacedObject(item, _pose(network, item, item.s, item.t, item.z_offset), length, width, item.height)
+
+
+def outlines(network: RoadNetwork, item: RoadObject) -> list[Array]:
+    """The ground that an object covers, as polygons (M, 3) in the world; its length and width where it has none."""
+    if item.outlines:
+        return [_corners(network, item, outline) for outline in item.outlines if len(outline) >= 3]
+    if item.length <= 0.0 or item.width <= 0.0:
+        return []
+    half_length, half_width = 0.5 * item.length, 0.5 * item.width
+    rectangle = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return [
+        _corners(network, item, tuple(Corner(False, half_length * a, half_width * b, 0.0, 0.0) for a, b in rectangle))
+    ]
+
+
+def _corners(network: RoadNetwork, item: RoadObject, outline: tuple[Corner, ...]) -> Array:
+    pose = _pose(network, item, item.s, item.t, item.z_offset)
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    rows = []
+    for corner in outline:
+        if corner.on_road:
+            s = min(max(corner.x, 0.0), network.roads[item.road].length)
+            place = network.road_pose_at(item.road, s, corner.y)
+            rows.append((place.x, place.y, place.z + corner.z))
+        else:
+            rows.append(
+                (
+                    pose.x + cos * corner.x - sin * corner.y,
+                    pose.y + sin * corner.x + cos * corner.y,
+                    pose.z + corner.z,
+                )
+            )
+    return np.array(rows)
+
+
+def _pose(network: RoadNetwork, item: RoadObject, s: float, t: float, z_offset: float) -> Pose:
+    length = network.roads[item.road].length
+    pose = network.road_pose_at(item.road, min(max(s, 0.0), length), t)
+    turn = item.heading + (math.pi if item.orientation == "-" else 0.0)
+    return pose._replace(z=pose.z + z_offset).turned(turn)
+
+
+def _repeated(network: RoadNetwork, item: RoadObject) -> Iterator[PlacedObject]:
+    for repeat in item.repeats:
+        gapless = repeat.distance <= 0.0
+        step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
+        count = max(math.ceil(repeat.length / step), 1) if gapless else math.floor(repeat.length / step) + 1
+        if step <= 0.0:
+            continue
+        part = repeat.length / count if gapless else step
+        for i in range(count):
+            ds = (i + 0.5) * part if gapless else i * part
+            share = ds / repeat.length if repeat.length > 0.0 else 0.0
+            t, width, height, z = (
+                a + (b - a) * share for a, b in (repeat.t, repeat.width, repeat.height, repeat.z_offset)
+            )
+            pose = _pose(network, item, repeat.s + ds, t, z)
+            yield PlacedObject(item, pose, part if gapless else item.length, width or item.width, height or item.height)

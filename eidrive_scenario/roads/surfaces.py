@@ -1,0 +1,241 @@
+"""What a road looks like: surface triangles lane by lane, kerbs, and markings, as arrays for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+
+from eidrive_scenario.roads.location import Array, Integers
+from eidrive_scenario.roads.markings import Strip, lane_strips, object_strips
+from eidrive_scenario.roads.model import Lane, LaneSection, Road
+from eidrive_scenario.roads.network import RoadNetwork
+
+KINDS = {
+    "driving": (0.22, 0.22, 0.24),
+    "junction": (0.22, 0.22, 0.24),
+    "shoulder": (0.30, 0.30, 0.31),
+    "parking": (0.27, 0.27, 0.29),
+    "sidewalk": (0.55, 0.54, 0.52),
+    "curb": (0.68, 0.67, 0.65),
+    "median": (0.33, 0.42, 0.24),
+    "verge": (0.33, 0.42, 0.24),
+    "biking": (0.42, 0.24, 0.20),
+    "marking_white": (0.92, 0.92, 0.90),
+    "marking_yellow": (0.92, 0.75, 0.16),
+}
+"""The kinds of surface, each with a colour to draw it in: red, green, blue in [0, 1]."""
+
+_BY_LANE_TYPE = {
+    "sidewalk": "sidewalk",
+    "walking": "sidewalk",
+    "shoulder": "shoulder",
+    "stop": "shoulder",
+    "border": "curb",
+    "curb": "curb",
+    "parking": "parking",
+    "median": "median",
+    "restricted": "median",
+    "biking": "biking",
+    "none": "verge",
+}
+FLATNESS = 0.01
+"""How far a cross section may lie from the straight surface that replaces it [m]."""
+LONGEST = 25.0
+"""Greatest distance between two cross sections [m]."""
+FILL_RADIUS = 9.0
+"""Triangles of a smaller circumradius fill junctions: the holes between lanes, not the bays at the corners [m]."""
+FILL_DEPTH = 0.02
+MARKING_HEIGHT = 0.02
+"""Markings lie above the surface, the filling of junctions below, so that neither flickers in a picture [m]."""
+
+
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """Triangles of one kind: vertices (V, 3) in the world [m], faces (F, 3) counter-clockwise from above.
+
+    kind  one of KINDS
+    """
+
+    kind: str
+    vertices: Array
+    faces: Integers
+
+    @property
+    def colour(self) -> tuple[float, float, float]:
+        """Red, green, blue in [0, 1]."""
+        return KINDS[self.kind]
+
+
+class _Part(NamedTuple):
+    kind: str
+    vertices: Array
+    faces: Integers
+
+
+def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMesh]:
+    """All road surfaces and markings, one mesh per kind.
+
+    `spacing` is the distance between the cross sections that are looked at [m]; those that lie within a centimetre of
+    a straight surface are left out.
+    """
+    parts: list[_Part] = []
+    edges: dict[str, list[Array]] = {}
+    for road in network.roads.values():
+        for section in road.sections:
+            s = cross_sections(network, road, section, spacing)
+            parts.extend(_lane_parts(network, road, section, s, edges))
+            parts.extend(_strip_part(network, road, strip) for strip in lane_strips(road, section, s))
+    parts.extend(_fillings(edges))
+    for kind, polygon in object_strips(network):
+        lifted = np.add(polygon, (0.0, 0.0, MARKING_HEIGHT))
+        faces = np.array([(0, i, i + 1) for i in range(1, len(polygon) - 1)], dtype=np.int64)
+        parts.append(_Part(kind, lifted, _upwards(lifted, faces)))
+    return [
+        mesh for kind in KINDS if (mesh := _merged(kind, (part for part in parts if part.kind == kind))) is not None
+    ]
+
+
+def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spacing: float) -> Array:
+    """The s at which a section is cut for drawing: both ends and whatever its curves need in between."""
+    count = max(int(np.ceil(section.length / spacing)), 1) + 1
+    s = section.s + np.linspace(0.0, max(section.length - 1e-9, 0.0), count)
+    left, right = (
+        max((lane.outer.value(0.0) for lane in section.lanes.values() if lane.side == k), default=0.0) for k in (1, -1)
+    )
+    outline = [network.road_pose(road.id, s, t) for t in (left + 1.0, -right - 1.0)]
+    widths = [[lane.width.value(float(at) - section.s) for at in s] for lane in section.lanes.values()]
+    offset = [road.lane_offset.value(float(at)) for at in s]
+    shape = np.column_stack([*(axis for pose in outline for axis in pose[:3]), *widths, offset])
+    kept = np.zeros(count, dtype=bool)
+    kept[[0, -1]] = True
+    _keep(shape, s, kept, 0, count - 1)
+    found: Array = s[kept]
+    return found
+
+
+def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int) -> None:
+    """Mark the rows that a polyline through `shape` needs (Douglas and Peucker 1973)."""
+    if last - first < 2:
+        return
+    part = ((s[first + 1 : last] - s[first]) / (s[last] - s[first]))[:, None]
+    gap = np.abs(shape[first + 1 : last] - shape[first] - part * (shape[last] - shape[first])).max(axis=1)
+    worst = first + 1 + int(np.argmax(gap))
+    if gap.max() <= FLATNESS:
+        if s[last] - s[first] <= LONGEST:
+            return
+        worst = (first + last) // 2
+    kept[worst] = True
+    _keep(shape, s, kept, first, worst)
+    _keep(shape, s, kept, worst, last)
+
+
+def _lane_parts(
+    network: RoadNetwork, road: Road, section: LaneSection, s: Array, edges: dict[str, list[Array]]
+) -> Iterable[_Part]:
+    offset = np.array([road.lane_offset.value(float(at)) for at in s])
+    for lane in section.lanes.values():
+        ds = [float(at) - section.s for at in s]
+        width = np.array([lane.width.value(d) for d in ds])
+        if lane.id == 0 or width.max() < 1e-3:
+            continue
+        kind = _kind(road, lane)
+        if kind is None:
+            continue
+        inner = offset + lane.side * np.array([lane.inner.value(d) for d in ds])
+        outer = offset + lane.side * np.array([lane.outer.value(d) for d in ds])
+        low, high = _points(network, road, s, inner), _points(network, road, s, outer)
+        if kind == "junction" and road.junction_id is not None:
+            edges.setdefault(road.junction_id, []).extend((low, high))
+        lift_inner, lift_outer = _lift(lane, ds)
+        raised = low + np.outer(lift_inner, (0.0, 0.0, 1.0))
+        faces = _ribbon(len(s))
+        yield _part(kind, raised, high + np.outer(lift_outer, (0.0, 0.0, 1.0)), faces)
+        if np.any(lift_inner > 1e-3):
+            yield _part("curb", low, raised, faces, keep_order=lane.side > 0)
+
+
+def _kind(road: Road, lane: Lane) -> str | None:
+    if lane.drivable:
+        return "driving" if road.junction_id is None else "junction"
+    if road.junction_id is not None and lane.type == "none":
+        return None
+    return _BY_LANE_TYPE.get(lane.type, "verge")
+
+
+def _lift(lane: Lane, ds: list[float]) -> tuple[Array, Array]:
+    inner, outer = np.zeros(len(ds)), np.zeros(len(ds))
+    for height in lane.heights:
+        after = np.array(ds) >= height.s_offset - 1e-9
+        inner[after], outer[after] = height.inner, height.outer
+    return inner, outer
+
+
+def _points(network: RoadNetwork, road: Road, s: Array, t: Array) -> Array:
+    pose = network.road_pose(road.id, s, t)
+    return np.column_stack([pose.x, pose.y, pose.z])
+
+
+def _ribbon(count: int) -> Integers:
+    """Triangles between two rows of `count` points, the second row numbered after the first."""
+    i = np.arange(count - 1)
+    return np.concatenate([np.column_stack([i, i + 1, i + count]), np.column_stack([i + 1, i + count + 1, i + count])])
+
+
+def _part(kind: str, first: Array, second: Array, faces: Integers, keep_order: bool | None = None) -> _Part:
+    vertices = np.concatenate([first, second])
+    if keep_order is None:
+        return _Part(kind, vertices, _upwards(vertices, faces))
+    return _Part(kind, vertices, faces if keep_order else faces[:, ::-1])
+
+
+def _strip_part(network: RoadNetwork, road: Road, strip: Strip) -> _Part:
+    count = strip.s.shape[1]
+    flat = strip.s.ravel()
+    low = _points(network, road, flat, (strip.t - 0.5 * strip.width).ravel())
+    high = _points(network, road, flat, (strip.t + 0.5 * strip.width).ravel())
+    vertices = np.concatenate([low, high])
+    vertices[:, 2] += MARKING_HEIGHT
+    i = (np.arange(strip.s.shape[0])[:, None] * count + np.arange(count - 1)).ravel()
+    above = i + flat.size
+    faces = np.concatenate([np.column_stack([i, i + 1, above]), np.column_stack([i + 1, above + 1, above])])
+    return _Part(strip.kind, vertices, faces)
+
+
+def _fillings(edges: dict[str, list[Array]]) -> Iterable[_Part]:
+    """The ground of junctions between and under their connecting lanes."""
+    for lines in edges.values():
+        points = np.concatenate(lines)
+        try:
+            faces: Integers = Delaunay(points[:, :2]).simplices.astype(np.int64)
+        except QhullError:
+            continue
+        a, b, c = (points[faces[:, k], :2] for k in range(3))
+        sides = [np.hypot(*(p - q).T) for p, q in ((a, b), (b, c), (c, a))]
+        double_area = np.abs((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1]))
+        radius = sides[0] * sides[1] * sides[2] / np.maximum(2.0 * double_area, 1e-9)
+        faces = faces[radius <= FILL_RADIUS]
+        if faces.size:
+            yield _Part("junction", points - (0.0, 0.0, FILL_DEPTH), _upwards(points, faces))
+
+
+def _upwards(vertices: Array, faces: Integers) -> Integers:
+    """The faces, each in the order that is counter-clockwise from above."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    up = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+    return np.where((up < 0.0)[:, None], faces[:, ::-1], faces)
+
+
+def _merged(kind: str, parts: Iterable[_Part]) -> SurfaceMesh | None:
+    vertices, faces, count = [], [], 0
+    for part in parts:
+        vertices.append(part.vertices)
+        faces.append(part.faces + count)
+        count += len(part.vertices)
+    if not vertices:
+        return None
+    return SurfaceMesh(kind, np.concatenate(vertices), np.concatenate(faces))
