@@ -1,0 +1,254 @@
+"""Stations that see, say and hear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.driving.agent import Agent, build_agent, build_rig
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
+from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.profile import build_channel, load_profile
+from eidrive_scenario.world.actor import ActorSpec
+
+DT = 0.05
+RSU = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+Place = tuple[float, float]
+
+
+def readings(time: float, at: Place, *objects: Place, speed: float = 0.0, due: bool = True) -> Readings:
+    """A station at a place, heading east, that has cars at these places in sight."""
+    count = len(objects)
+    boxes = np.array([(x, y, 0.745, 4.892, 1.837, 1.49, 0.0) for x, y in objects]).reshape(count, 7)
+    truth = TruthReading(
+        tuple(f"Car{index}" for index in range(count)), ("car",) * count, boxes, np.zeros((count, 2)), np.ones(count)
+    )
+    ego = EgoState(time, np.array([*at, 0.0]), 0.0, 0.0, 0.0, speed, 0.0, 0.0)
+    return Readings(time, ego, truth if due else None)
+
+
+def agent(spec: ActorSpec, *, own_perception: bool = False, **settings: object) -> Agent:
+    parsed = AgentSettings.model_validate(settings)
+    return build_agent(parsed, spec, None, seed=0, dt=DT, own_perception=own_perception)
+
+
+class Conversation:
+    """Ego and RSU on a channel, in the order of a run: deliver, act, send."""
+
+    def __init__(self, car: ActorSpec, channel: str | None, seed: int = 0, **ego: object) -> None:
+        profile = load_profile(channel) if channel is not None else None
+        self.channel: Channel | None = build_channel(profile, seed)
+        own = self.channel is not None and self.channel.own_perception
+        self.agents = {"Ego": agent(car, own_perception=own, **ego), "RSU": agent(RSU)}
+        self.tick = 0
+
+    def step(self, seen: Mapping[str, tuple[Place, ...]], ego_at: Place = (0.0, 0.0)) -> dict[str, AgentStep]:
+        now = self.tick * DT
+        places = {"Ego": ego_at, "RSU": (30.0, -6.0)}
+        steps = {
+            name: agent.act(
+                readings(now, places[name], *seen.get(name, ())),
+                self.channel.deliver(name, now) if self.channel is not None else (),
+                now,
+                None,
+            )
+            for name, agent in self.agents.items()
+        }
+        if self.channel is not None:
+            for name, step in steps.items():
+                receivers = [other for other in self.agents if other != name or self.channel.own_perception]
+                for message in step.outbox:
+                    self.channel.send(message, receivers, now)
+        self.tick += 1
+        return steps
+
+
+HIDDEN, OPEN = (30.0, 20.0), (15.0, 0.0)
+
+
+def known(step: AgentStep) -> list[Place]:
+    return sorted((round(x, 6), round(y, 6)) for x, y in step.fused.boxes[:, :2].tolist())
+
+
+def test_what_the_other_sees_is_known_one_tick_later_on_an_ideal_channel(car: ActorSpec) -> None:
+    talk = Conversation(car, "{model: composed}")
+    assert known(talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]) == [OPEN]
+    assert known(talk.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN, HIDDEN]
+    assert known(talk.step({"Ego": (OPEN,), "RSU": ()})["Ego"]) == [OPEN], "an empty report is news too"
+
+
+def test_no_delay_and_no_loss_equal_shared_memory_of_the_tick_before(car: ActorSpec) -> None:
+    rng = np.random.default_rng(1)
+    talk = Conversation(car, "{loss: {kind: bernoulli, probability: 0.0}}")
+    before: tuple[Place, ...] = ()
+    for _ in range(60):
+        own = tuple((float(x), 0.0) for x in range(10, 10 + 10 * rng.integers(0, 3), 10))
+        other = tuple((float(x), 25.0) for x in range(10, 10 + 10 * rng.integers(0, 4), 10))
+        step = talk.step({"Ego": own, "RSU": other})["Ego"]
+        assert known(step) == sorted((*own, *before))
+        before = other
+
+
+def test_total_loss_equals_no_cooperation_exactly(car: ActorSpec) -> None:
+    lossy = Conversation(car, "{loss: {kind: bernoulli, probability: 1.0}}")
+    alone = Conversation(car, None)
+    for tick in range(30):
+        seen = {"Ego": (OPEN,) if tick % 3 else (), "RSU": (HIDDEN,)}
+        first, second = lossy.step(seen)["Ego"], alone.step(seen)["Ego"]
+        np.testing.assert_array_equal(first.fused.boxes, second.fused.boxes)
+        assert first.control == second.control
+        assert first.inbox == second.inbox == ()
+
+
+def test_latency_delays_the_others_not_the_own_eyes(car: ActorSpec) -> None:
+    talk = Conversation(car, "{delay: {kind: constant, seconds: 0.3}}")
+    for tick in range(12):
+        step = talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
+        assert known(step) == ([OPEN] if tick < 6 else [OPEN, HIDDEN])
+
+
+def test_own_perception_through_the_channel_is_delayed_like_the_others(car: ActorSpec) -> None:
+    talk = Conversation(car, "{delay: {kind: constant, seconds: 0.3}, own_perception: true}")
+    for tick in range(12):
+        step = talk.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]
+        assert len(step.detections) == 1
+        assert known(step) == ([] if tick < 6 else [OPEN, HIDDEN])
+
+
+def test_a_report_is_forgotten_when_it_is_a_second_old(car: ActorSpec) -> None:
+    talk = Conversation(car, "{model: composed}")
+    talk.step({"RSU": (HIDDEN,)})
+    del talk.agents["RSU"]
+    ages = [talk.tick * DT for _ in range(30) if known(talk.step({})["Ego"])]
+    assert max(ages) == pytest.approx(1.05), "the tick counter is one on: last known at an age of 1.00 s"
+    short = Conversation(car, "{model: composed}", report_timeout=0.2)
+    short.step({"RSU": (HIDDEN,)})
+    del short.agents["RSU"]
+    assert [bool(known(short.step({})["Ego"])) for _ in range(6)] == [True] * 4 + [False] * 2
+
+
+def test_a_late_message_does_not_replace_a_newer_one(car: ActorSpec) -> None:
+    ego, rsu = agent(car), agent(RSU)
+    first, second = (
+        rsu.act(readings(tick * DT, (30.0, -6.0), (30.0, 20.0 + tick)), (), tick * DT, None) for tick in (0, 1)
+    )
+    channel = build_channel(load_profile("{model: composed}"), 0)
+    assert channel is not None
+    channel.send(second.outbox[0], ["Ego"], 0.1)
+    step = ego.act(readings(0.2, (0.0, 0.0)), channel.deliver("Ego", 0.2), 0.2, None)
+    assert known(step) == [(30.0, 21.0)]
+    channel.send(first.outbox[0], ["Ego"], 0.2)
+    step = ego.act(readings(0.25, (0.0, 0.0)), channel.deliver("Ego", 0.25), 0.25, None)
+    assert len(step.inbox) == 1
+    assert known(step) == [(30.0, 21.0)]
+
+
+def test_only_those_it_cooperates_with_count(car: ActorSpec) -> None:
+    for names, expected in ((["RSU"], [HIDDEN]), (["Spectator"], []), ([], []), (None, [HIDDEN])):
+        talk = Conversation(car, "{model: composed}", cooperates_with=names)
+        talk.step({"RSU": (HIDDEN,)})
+        step = talk.step({"RSU": (HIDDEN,)})["Ego"]
+        assert known(step) == expected
+        assert len(step.inbox) == 1
+
+
+def test_a_station_says_what_it_saw_itself_and_nothing_it_heard(car: ActorSpec) -> None:
+    """Otherwise a box would come back to its first reporter and count twice."""
+    talk = Conversation(car, "{model: composed}")
+    for _ in range(5):
+        steps = talk.step({"RSU": (HIDDEN,)})
+    assert known(steps["Ego"]) == [HIDDEN]
+    assert len(steps["Ego"].outbox[0].detections) == 0
+    assert steps["Ego"].outbox[0].size == 121 + 35
+    assert steps["RSU"].outbox[0].size == 121 + 70
+    assert steps["RSU"].outbox[0].number == 4
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.3, 0.6])
+def test_the_ego_does_not_stand_in_its_own_way(car: ActorSpec, latency: float) -> None:
+    """The RSU sees the ego at 15 m/s; even 9 m behind where it is by now, that box is not an obstacle."""
+    talk = Conversation(car, f"{{delay: {{kind: constant, seconds: {latency}}}}}")
+    for tick in range(30):
+        x = 15.0 * tick * DT
+        centre = (x + car.offset[0], car.offset[1])
+        step = talk.step({"RSU": (centre, HIDDEN)}, ego_at=(x, 0.0))["Ego"]
+        assert known(step) in ([], [HIDDEN])
+    assert known(step) == [HIDDEN]
+
+
+def test_a_car_close_beside_or_behind_is_not_taken_for_the_ego(car: ActorSpec) -> None:
+    """Half a metre of air between the bodies: centres 2.3 m apart across, 5.4 m along."""
+    x = car.offset[0]
+    for place in ((x, 2.337), (x, -2.337), (x - 5.392, 0.0), (x + 5.392, 0.0)):
+        talk = Conversation(car, "{model: composed}")
+        talk.step({"RSU": (place,)})
+        assert len(known(talk.step({"RSU": (place,)})["Ego"])) == 1
+
+
+def test_between_two_readings_the_last_one_holds_and_then_grows_old(car: ActorSpec) -> None:
+    ego = agent(car, report_timeout=0.1)
+    counts = [
+        len(ego.act(readings(tick * DT, (0.0, 0.0), OPEN, due=tick == 0), (), tick * DT, None).fused)
+        for tick in range(5)
+    ]
+    assert counts == [1, 1, 1, 0, 0]
+
+
+def test_message_rate(car: ActorSpec) -> None:
+    ego = agent(car, message_rate=10)
+    said = [ego.act(readings(tick * DT, (0.0, 0.0)), (), tick * DT, None).outbox for tick in range(10)]
+    assert [len(outbox) for outbox in said] == [1, 0] * 5
+    assert [outbox[0].number for outbox in said if outbox] == [0, 1, 2, 3, 4]
+
+
+def test_what_drives_and_what_does_not(car: ActorSpec) -> None:
+    here = readings(0.0, (0.0, 0.0))
+    mast = agent(RSU).act(here, (), 0.0, None)
+    assert mast.plan is None
+    assert mast.control is None
+    parked = agent(car, planner="none").act(here, (), 0.0, None)
+    assert parked.plan is None
+    assert parked.control is not None
+    assert parked.control.brake == 1.0
+    moving = agent(car, target_speed=8.0).act(here, (), 0.0, None)
+    assert moving.plan is not None
+    assert moving.control is not None
+    assert moving.control.throttle == pytest.approx(3.5 / 5.0)
+    with pytest.raises(SettingError, match="has no wheels"):
+        agent(RSU, planner="route")
+
+
+def test_a_heard_object_in_the_area_brakes_exactly_as_asked(car: ActorSpec) -> None:
+    talk = Conversation(
+        car,
+        "{model: composed}",
+        planner="conflict_area",
+        target_speed=8.0,
+        conflict_area=[29, 31, 18, 22],
+        conflict_brake=4.5,
+    )
+    first = talk.step({"RSU": (HIDDEN,)})["Ego"]
+    second = talk.step({"RSU": (HIDDEN,)})["Ego"]
+    assert first.control is not None
+    assert second.control is not None
+    assert first.control.brake == 0.0
+    assert second.control.brake == pytest.approx(4.5 / car.max_deceleration)
+    assert second.control.throttle == 0.0
+
+
+def test_the_rig_has_what_the_detector_needs(car: ActorSpec) -> None:
+    assert build_rig(AgentSettings(), car).due(0.0).keys() == {"truth"}
+    with pytest.raises(SettingError, match="needs a sensor of kind truth"):
+        build_rig(AgentSettings.model_validate({"sensors": "camera"}), car)
+
+
+def test_state_of_the_sender(car: ActorSpec) -> None:
+    state = agent(car).act(readings(1.0, (3.0, 4.0), speed=7.0), (), 1.0, None).outbox[0].state
+    assert (state.time, state.x, state.y, state.yaw, state.speed) == (1.0, 3.0, 4.0, 0.0, 7.0)
+    assert math.isfinite(state.z)

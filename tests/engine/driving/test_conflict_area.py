@@ -1,0 +1,102 @@
+"""The conflict rule, instant by instant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.conflict_area import ConflictAreaPlanner, inside
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.registry import registry
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.world.actor import ActorSpec
+
+EGO = EgoState(0.0, np.zeros(3), 0.0, 0.0, 0.0, 8.0, 0.0, 0.0)
+SEEN_IN, SEEN_OUT = (30.0, 7.0), (30.0, 12.0)
+
+
+def planner(car: ActorSpec, **settings: object) -> ConflictAreaPlanner:
+    data = {"conflict_area": [29, 32, 4.5, 10.5], "target_speed": 8.0, **settings}
+    return ConflictAreaPlanner(AgentSettings.model_validate(data), car, None, dt=0.05, seed=0)
+
+
+def objects(time: float, *places: tuple[float, float], kind: str = "car") -> Detections:
+    count = len(places)
+    boxes = np.array([(x, y, 0.7, 4.9, 1.8, 1.5, 0.0) for x, y in places]).reshape(count, 7)
+    nothing = np.full((count, 2), np.nan)
+    return Detections(time, boxes, np.ones(count), (kind,) * count, nothing, np.full((count, 2, 2), np.nan))
+
+
+def braking_ticks(rule: ConflictAreaPlanner, sightings: set[int], ticks: int = 80) -> list[int]:
+    found = []
+    for tick in range(ticks):
+        now = tick * 0.05
+        known = objects(now, SEEN_OUT, SEEN_IN if tick in sightings else SEEN_OUT)
+        if rule.plan(EGO, known, None, now).braking is not None:
+            found.append(tick)
+    return found
+
+
+def test_it_brakes_from_the_sighting_until_1_05_seconds_after_the_last(car: ActorSpec) -> None:
+    """Seen at 0.50 s only: 0.50 to 1.50 s, 21 ticks of 0.05 s, as the paper's 35 of 0.03 s."""
+    assert braking_ticks(planner(car), {10}) == list(range(10, 31))
+
+
+def test_each_sighting_begins_the_time_anew(car: ActorSpec) -> None:
+    assert braking_ticks(planner(car), {10, 11, 12, 28}) == list(range(10, 49))
+    assert braking_ticks(planner(car), {10, 40}) == [*range(10, 31), *range(40, 61)]
+
+
+def test_never_without_a_sighting_and_at_once_in_the_first_tick(car: ActorSpec) -> None:
+    assert braking_ticks(planner(car), set()) == []
+    assert braking_ticks(planner(car), {0}) == list(range(21))
+
+
+@pytest.mark.parametrize(("hold", "last"), [(0.0, 10), (0.05, 10), (0.1, 11), (0.3, 15), (2.0, 49)])
+def test_hold(car: ActorSpec, hold: float, last: int) -> None:
+    assert braking_ticks(planner(car, conflict_hold=hold), {10}) == list(range(10, last + 1))
+
+
+def test_the_plan_goes_on_and_says_why_it_brakes(car: ActorSpec) -> None:
+    rule = planner(car, conflict_brake=4.0)
+    free = rule.plan(EGO, objects(0.0, SEEN_OUT), None, 0.0)
+    braked = rule.plan(EGO, objects(0.05, SEEN_OUT, SEEN_IN, kind="truck"), None, 0.05)
+    held = rule.plan(EGO, objects(0.1), None, 0.1)
+    assert free.braking is None
+    assert braked.braking == held.braking == 4.0
+    assert braked.reason == "truck in the conflict area"
+    assert held.reason == "an object was in the conflict area"
+    np.testing.assert_array_equal(braked.points, free.points)
+    np.testing.assert_array_equal(braked.speeds, free.speeds)
+
+
+def test_the_centre_counts_not_the_outline(car: ActorSpec) -> None:
+    """A car whose centre is 0.1 m outside reaches 2.3 m into the area, and is not in it."""
+    assert planner(car).plan(EGO, objects(0.0, (28.9, 7.0)), None, 0.0).braking is None
+    assert planner(car).plan(EGO, objects(0.0, (29.1, 7.0)), None, 0.0).braking == 5.0
+
+
+def test_any_of_several_areas_and_any_shape(car: ActorSpec) -> None:
+    rule = planner(car, conflict_area=[[29, 32, 4.5, 10.5], [[0, 0], [10, 0], [0, 10]]])
+    assert rule.plan(EGO, objects(0.0, (4.0, 4.0)), None, 0.0).braking is not None
+    rule = planner(car, conflict_area=[[0, 0], [10, 0], [0, 10]])
+    assert rule.plan(EGO, objects(0.0, (6.0, 6.0)), None, 0.0).braking is None
+
+
+def test_inside_a_polygon_that_is_not_convex() -> None:
+    arrow = ((0.0, 0.0), (4.0, 4.0), (0.0, 2.0), (-4.0, 4.0))
+    assert inside(0.0, 1.0, arrow)
+    assert inside(3.0, 3.2, arrow)
+    assert not inside(0.0, 3.0, arrow)
+    assert not inside(5.0, 1.0, arrow)
+
+
+def test_without_an_area_there_is_no_such_planner(car: ActorSpec) -> None:
+    with pytest.raises(SettingError, match="has no area"):
+        ConflictAreaPlanner(AgentSettings(), car, None, dt=0.05, seed=0)
+
+
+def test_it_comes_through_its_entry_point() -> None:
+    assert registry("planners").load("conflict_area") is ConflictAreaPlanner
