@@ -65,7 +65,8 @@ class Collision(Criterion):
         elif self._missing:
             reason = never_appeared(self._missing)
         else:
-            reason = f"{self._of} touched {'none of ' + ', '.join(self._others) if self._others else 'nothing'}"
+            touched = f"did not touch {' or '.join(self._others)}" if self._others else "touched nothing"
+            reason = f"{self._of} {touched}"
         return Verdict(
             name=self.name,
             passed=first is None and not self._missing,

@@ -44,6 +44,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
 
 def tree(scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library.")]) -> None:
     """Print a scenario's storyboard as a tree, triggers in words."""
+    from eidrive_scenario.cli.storyboard_tree import storyboard_tree
+    from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
     from eidrive_scenario.roads import RoadNetwork
@@ -51,7 +53,7 @@ def tree(scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name 
 
     loaded = load_scenario(resolve_scenario(scenario))
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
-    typer.echo(Storyboard(loaded, roads, dt=0.05, seed=0).as_text())
+    console().print(storyboard_tree(Storyboard(loaded, roads, dt=0.05, seed=0)))
 
 
 def view(

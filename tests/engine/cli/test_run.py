@@ -101,10 +101,10 @@ def test_wrong_input(eidrive: Eidrive, passing_by: Path, arguments: list[str], m
 
 def test_wrong_file(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken.xosc"
-    broken.write_text(passing_by.read_text(encoding="utf-8").replace("of: Ego, to", "off: Ego, to"), encoding="utf-8")
+    broken.write_text(passing_by.read_text(encoding="utf-8").replace("of: Ego, to", "ofe: Ego, to"), encoding="utf-8")
     result = eidrive("run", broken)
     assert result.exit_code == 2, result.output
-    assert f"{broken}:47: unknown setting 'off'; did you mean 'of'?" in result.stderr
+    assert f"{broken}:47: unknown setting 'ofe'; did you mean 'of'?" in result.stderr
 
 
 def test_the_same_seed_gives_the_same_trace_in_another_process(eidrive: Eidrive, passing_by: Path) -> None:

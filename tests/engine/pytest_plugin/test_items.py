@@ -26,7 +26,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 
 def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
-    result = project.runpytest_inprocess("xosc", "-p", "no:cacheprovider")
+    result = project.runpytest_subprocess("xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1, failed=2)
     result.stdout.fnmatch_lines(
         [
@@ -69,7 +69,7 @@ def test_junit_of_all_seeds_over_two_workers(project: pytest.Pytester) -> None:
 
 
 def test_out_keeps_every_run(project: pytest.Pytester) -> None:
-    result = project.runpytest_inprocess(
+    result = project.runpytest_subprocess(
         "xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-seeds", "2", "-p", "no:cacheprovider"
     )
     result.assert_outcomes(passed=2)
@@ -81,7 +81,7 @@ def test_out_keeps_every_run(project: pytest.Pytester) -> None:
 
 def test_the_trace_does_not_depend_on_the_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
-        project.runpytest_inprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
+        project.runpytest_subprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
         found = {}
         for case in ElementTree.parse(project.path / "junit.xml").iter("testcase"):
             (trace,) = (entry.get("value") for entry in case.iter("property") if entry.get("name") == "trace_hash")

@@ -1,0 +1,56 @@
+"""A storyboard as a tree for human eyes: elements with their limits, triggers and actions in words."""
+
+from __future__ import annotations
+
+from rich.text import Text
+from rich.tree import Tree
+
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.elements import ActionElement, EventElement, ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.storyboard import Storyboard
+
+_KINDS = {"maneuverGroup": "maneuver group"}
+
+
+def storyboard_tree(storyboard: Storyboard) -> Tree:
+    """The tree that a run would tick, with the actions of Init first."""
+    root = Tree(Text(storyboard.scenario.name, style="bold"), guide_style="dim")
+    init = root.add(_heading("init", "", ""))
+    for behaviour in storyboard.init.children:
+        init.add(_action(behaviour))
+    _add(root, storyboard.root)
+    return root
+
+
+def _add(branch: Tree, element: StoryElement) -> None:
+    name = "" if element.kind == "storyboard" else element.name
+    here = branch.add(_heading(_KINDS.get(element.kind, element.kind), name, _remarks(element)))
+    for word, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
+        if leaf is not None:
+            here.add(Text.assemble((f"{word} when ", "cyan"), leaf.trigger.describe() or "criteria say so"))
+    if isinstance(element, ActionElement):
+        for behaviour in element.children:
+            here.add(_action(behaviour))
+    for child in element.elements:
+        _add(here, child)
+
+
+def _remarks(element: StoryElement) -> str:
+    remarks = []
+    if isinstance(element, EventElement):
+        remarks.append(element.priority)
+    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
+        remarks.append(f"up to {element.limit} times")
+    return ", ".join(remarks)
+
+
+def _heading(kind: str, name: str, remarks: str) -> Text:
+    parts = [(kind, "green"), (f" {name}" if name else "", "bold"), (f" ({remarks})" if remarks else "", "dim")]
+    return Text.assemble(*parts)
+
+
+def _action(behaviour: object) -> Text:
+    if not isinstance(behaviour, ActionBehaviour):
+        return Text(str(behaviour))
+    actor = f"{behaviour.actor_name}: " if behaviour.actor_name else ""
+    return Text(f"{actor}{behaviour.describe()}")
