@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-
 from eidrive_criteria.collision import Collision, CollisionSettings
+
 from eidrive_scenario.api import Contact, judge
 
 

@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 import pytest
-
 from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
+
 from eidrive_scenario.api import Verdict, judge
 
 

@@ -3,10 +3,10 @@
 from typing import Any
 
 import pytest
-
 from eidrive_criteria.driven_distance import DrivenDistance, DrivenDistanceSettings
 from eidrive_criteria.max_speed import MaxSpeed, MaxSpeedSettings
 from eidrive_criteria.reach_position import ReachPosition, ReachPositionSettings
+
 from eidrive_scenario.api import Criterion, judge
 
 

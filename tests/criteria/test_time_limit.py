@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-
 from eidrive_criteria.time_limit import TimeLimit, TimeLimitSettings
+
 from eidrive_scenario.api import judge
 
 

@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 import pytest
-
 from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings, time_to_contact
+
 from eidrive_scenario.api import judge
 
 
