@@ -1,4 +1,4 @@
-"""The surface that extensions import: actions, conditions, criteria, detectors, channels, fusion. The engine never does."""
+"""The surface that extensions import: actions, conditions, criteria, detectors, channels. The engine never does."""
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan

@@ -48,14 +48,14 @@ def parse_criteria(
     entries = [data] if isinstance(data, dict) else data
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
         raise SettingError(Problem(f"{text.strip()!r} declares no criterion", f"write {_EXAMPLE}", source, line))
-    lines = _key_lines(text, line)
     names = set(taken)
     criteria = []
     problems: list[Problem] = []
-    for kind, settings in ((str(kind), settings) for entry in entries for kind, settings in entry.items()):
+    for kind, settings, lines in _items(entries, text, line):
+        here = lines.get("", line)
         try:
-            criterion = _build(kind, settings, source, lines.get((kind,), line), lines)
-            _check_subjects(criterion, entities, source, lines.get((kind,), line))
+            criterion = _build(kind, settings, source, here, lines)
+            _check_subjects(criterion, entities, source, here)
         except SettingError as error:
             problems.extend(error.problems)
             continue
@@ -67,17 +67,32 @@ def parse_criteria(
     return criteria
 
 
-def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[tuple[str, ...], int]) -> Criterion:
+def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
+    """Each criterion's kind and settings, with the lines of its settings and under the empty name its own."""
+    first = 1 if line is None else line
+    root: Any = yaml.compose(text, Loader=yaml.SafeLoader)
+    nodes = root.value if isinstance(root, yaml.SequenceNode) else [root]
+    for entry, node in zip(entries, nodes, strict=True):
+        lines = {}
+        for key, value in node.value:
+            keys = [key for key, _ in value.value] if isinstance(value, yaml.MappingNode) else []
+            places = {"": first + key.start_mark.line, **{str(k.value): first + k.start_mark.line for k in keys}}
+            lines[str(key.value)] = places
+        for kind, settings in entry.items():
+            yield str(kind), settings, lines.get(str(kind), {})
+
+
+def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> Criterion:
     known = registry("criteria")
     if kind not in known:
         raise SettingError(Problem(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
     criterion_type = known.load(kind)
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
-        remedy = f"write {kind}: {{…}} with the settings {', '.join(criterion_type.settings_type.model_fields)}"
+        fields = criterion_type.settings_type.model_fields.items()
+        remedy = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         raise SettingError(Problem(f"{kind} is given {settings!r}", remedy, source, line))
-    own_lines = {path[1]: number for path, number in lines.items() if len(path) == 2 and path[0] == kind}
-    parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=own_lines)
+    parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
     criterion: Criterion = criterion_type(parsed)
     return criterion
 
@@ -104,23 +119,6 @@ def _free_name(name: str, taken: Collection[str]) -> str:
         number += 1
         free = f"{name}_{number}"
     return free
-
-
-def _key_lines(text: str, line: int | None) -> dict[tuple[str, ...], int]:
-    """The line of each key of the first two levels; lists of mappings count as one mapping."""
-    found: dict[tuple[str, ...], int] = {}
-
-    def visit(node: yaml.Node | None, path: tuple[str, ...]) -> None:
-        if isinstance(node, yaml.SequenceNode) and not path:
-            for item in node.value:
-                visit(item, path)
-        elif isinstance(node, yaml.MappingNode) and len(path) < 2:
-            for key, value in node.value:
-                found[(*path, str(key.value))] = (line or 1) + key.start_mark.line
-                visit(value, (*path, str(key.value)))
-
-    visit(yaml.compose(text, Loader=yaml.SafeLoader), ())
-    return found
 
 
 class Command(Protocol):

@@ -50,6 +50,16 @@ def test_every_mistake_is_named_where_it_stands() -> None:
     ]
 
 
+def test_in_a_list_each_has_its_own_lines() -> None:
+    text = "[collision: {off_: A},\n collision: {of: B},\n collision: {\n of: C, with: 3}]"
+    assert [problem.split(": ")[0] for problem in problems(text)] == [
+        "a.xosc:10",
+        "a.xosc:10",
+        "a.xosc:13",
+        "a.xosc:13",
+    ]
+
+
 def test_an_actor_that_the_scenario_does_not_have() -> None:
     assert problems("min_distance: {of: Ego, to: Incomming}", entities=["Ego", "Incoming"]) == [
         "a.xosc:10: min_distance looks at 'Incomming', which is no entity of this scenario; did you mean 'Incoming'?"
