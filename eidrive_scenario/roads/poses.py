@@ -20,20 +20,56 @@ def road_pose_at(road: Road, s: float, t: float) -> Pose:
     if not -BEYOND <= s <= road.length + BEYOND:
         raise off_road(road, s)
     x, y, h, _, _ = road.reference.at(s)
-    return _lifted(road, s, t, x, y, h, h)
+    z, slope = road.elevation.value_and_slope(s)
+    pitch = -math.atan(slope) if slope else 0.0
+    if road.superelevation.is_zero:
+        return Pose(x - t * math.sin(h), y + t * math.cos(h), z, h, pitch, 0.0)
+    roll = road.superelevation.value(s)
+    across = t * math.cos(roll)
+    return Pose(x - across * math.sin(h), y + across * math.cos(h), z + t * math.sin(roll), h, pitch, roll)
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-    """The pose at a lane's centre line plus `offset`; its heading is the lane's, in the direction of growing s.
+    """The pose at a lane's centre line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
 
-    Raises PositionError.
+    A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raises PositionError.
     """
     section, lane = lane_at(road, lane_id, s)
-    t, slope = lane_t(road, section, lane, s)
+    t, sideways = lane_t(road, section, lane, s)
     t += offset
     x, y, h, curvature, speed = road.reference.at(s)
-    direction = h + math.atan2(slope, speed * (1.0 - curvature * t)) if slope else h
-    return _lifted(road, s, t, x, y, h, direction)
+    z, climb = road.elevation.value_and_slope(s)
+    roll, across = 0.0, t
+    if not road.superelevation.is_zero:
+        roll, twist = road.superelevation.value_and_slope(s)
+        cos, sin = math.cos(roll), math.sin(roll)
+        across, z = t * cos, z + t * sin
+        climb += sideways * sin + t * cos * twist
+        sideways = sideways * cos - t * sin * twist
+    along = speed * (1.0 - curvature * across)
+    if lane.heights:
+        z += lane_height(lane, s - section.s, offset)
+    return Pose(
+        x - across * math.sin(h),
+        y + across * math.cos(h),
+        z,
+        h + math.atan2(sideways, along) if sideways else h,
+        -math.atan2(climb, math.hypot(along, sideways)) if climb else 0.0,
+        roll,
+    )
+
+
+def lane_height(lane: Lane, ds: float, offset: float) -> float:
+    """How much a lane is lifted above the road, `offset` off its centre line, ds behind its section's start [m]."""
+    record = None
+    for height in lane.heights:
+        if height.s_offset <= ds + 1e-9:
+            record = height
+    if record is None:
+        return 0.0
+    width = lane.width.value(ds)
+    share = min(max(0.5 + lane.side * offset / width, 0.0), 1.0) if width > 0.0 else 0.5
+    return record.inner + share * (record.outer - record.inner)
 
 
 def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
@@ -107,15 +143,3 @@ def off_road(road: Road, s: float) -> PositionError:
 def unknown_road(number: str, known: list[str]) -> PositionError:
     """The error for a road that does not exist."""
     return PositionError(Problem(f"there is no road {number!r}", suggestion(number, known)))
-
-
-def _lifted(road: Road, s: float, t: float, x: float, y: float, h: float, heading: float) -> Pose:
-    z, slope = road.elevation.value_and_slope(s)
-    roll = 0.0
-    across = t
-    if not road.superelevation.is_zero:
-        roll = road.superelevation.value(s)
-        across = t * math.cos(roll)
-        z += t * math.sin(roll)
-    pitch = -math.atan(slope) if slope else 0.0
-    return Pose(x - across * math.sin(h), y + across * math.cos(h), z, heading, pitch, roll)

@@ -11,7 +11,7 @@ from eidrive_scenario.roads.curves import CurveTable
 from eidrive_scenario.roads.location import Array, Integers, Poses, PositionError
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.polynomials import PolynomialTable
-from eidrive_scenario.roads.poses import BEYOND, off_road
+from eidrive_scenario.roads.poses import BEYOND, lane_height, off_road
 
 
 class RoadTables:
@@ -30,8 +30,6 @@ class RoadTables:
         self.elevation = PolynomialTable([road.elevation for road in roads], spans)
         self.superelevation = PolynomialTable([road.superelevation for road in roads], spans)
         self.lane_offset = PolynomialTable([road.lane_offset for road in roads], spans)
-        self._flat = all(road.elevation.is_zero for road in roads)
-        self._level = all(road.superelevation.is_zero for road in roads)
         self._index_sections()
 
     def _index_sections(self) -> None:
@@ -48,6 +46,8 @@ class RoadTables:
         self.right_count = counts - self.left_count - 1
         self.first_lane = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
         lanes = [lane for group in ordered for lane in group]
+        self.lanes = lanes
+        self._lifted = np.array([bool(lane.heights) for lane in lanes])
         self.lane_section = np.repeat(np.arange(len(sections)), counts)
         self.lane_id = np.array([lane.id for lane in lanes], dtype=np.int64)
         self.lane_drivable = np.array([lane.drivable for lane in lanes])
@@ -90,16 +90,35 @@ class RoadTables:
     def road_poses(self, road: Integers, s: Array, t: Array) -> Poses:
         """Poses at road coordinates (N,); headings of the reference lines."""
         x, y, h, _, _ = self.curves.at(road, s)
-        return self._lifted(road, s, t, x, y, h, h)
+        z, slope = self.elevation.value_and_slope(road, s)
+        roll = self.superelevation.value(road, s)
+        across = t * np.cos(roll)
+        return Poses(x - across * np.sin(h), y + across * np.cos(h), z + t * np.sin(roll), h, -np.arctan(slope), roll)
 
     def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
-        """Poses at the centre lines of lanes (running numbers) plus offset; headings of the lanes, along growing s."""
+        """Poses at the centre lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
         section = self.lane_section[row]
         road = self.section_road[section]
-        t, slope = self.lane_t(row, s)
+        t, sideways = self.lane_t(row, s)
         t = t + offset
         x, y, h, curvature, speed = self.curves.at(road, s)
-        return self._lifted(road, s, t, x, y, h, h + np.arctan2(slope, speed * (1.0 - curvature * t)))
+        z, climb = self.elevation.value_and_slope(road, s)
+        roll, twist = self.superelevation.value_and_slope(road, s)
+        cos, sin = np.cos(roll), np.sin(roll)
+        across, z = t * cos, z + t * sin
+        climb = climb + sideways * sin + t * cos * twist
+        sideways = sideways * cos - t * sin * twist
+        along = speed * (1.0 - curvature * across)
+        for n in np.flatnonzero(self._lifted[row]):
+            z[n] += lane_height(self.lanes[row[n]], float(s[n] - self.section_start[section[n]]), float(offset[n]))
+        return Poses(
+            x - across * np.sin(h),
+            y + across * np.cos(h),
+            z,
+            h + np.arctan2(sideways, along),
+            -np.arctan2(climb, np.hypot(along, sideways)),
+            roll,
+        )
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
         """t of lanes' centre lines and its derivative."""
@@ -131,17 +150,6 @@ class RoadTables:
             if not open_.size:
                 break
         return row, outside
-
-    def _lifted(self, road: Integers, s: Array, t: Array, x: Array, y: Array, h: Array, heading: Array) -> Poses:
-        z, pitch, roll, across = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x), t
-        if not self._flat:
-            z, slope = self.elevation.value_and_slope(road, s)
-            pitch = -np.arctan(slope)
-        if not self._level:
-            roll = self.superelevation.value(road, s)
-            across = t * np.cos(roll)
-            z = z + t * np.sin(roll)
-        return Poses(x - across * np.sin(h), y + across * np.cos(h), z, heading, pitch, roll)
 
 
 def _inside_out(section: LaneSection) -> list[Lane]:
