@@ -119,8 +119,7 @@ class Agent:
         """
         if not len(detections):
             return detections
-        place = min(reversed(self._own_places), key=lambda place: abs(place[0] - detections.time))
-        _, x, y, yaw = place
+        x, y, yaw = self._own_place(detections.time)
         cos, sin = math.cos(yaw), math.sin(yaw)
         half_length, half_width = self.spec.size[0] / 2.0 + OWN_MARGIN, self.spec.size[1] / 2.0 + OWN_MARGIN
         others = [
@@ -129,6 +128,11 @@ class Agent:
             if abs(cos * (bx - x) + sin * (by - y)) > half_length or abs(cos * (by - y) - sin * (bx - x)) > half_width
         ]
         return detections if len(others) == len(detections) else detections.subset(others)
+
+    def _own_place(self, time: float) -> tuple[float, float, float]:
+        """Centre and heading of the own body at the last instant up to `time`, or the earliest known."""
+        place = next((held for held in reversed(self._own_places) if held[0] <= time + TIME_TOLERANCE), None)
+        return (place or self._own_places[0])[1:]
 
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:

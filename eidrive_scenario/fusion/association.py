@@ -22,7 +22,7 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
     inside = distance < gate
-    if not inside.any():
-        return []
-    rows, columns = linear_sum_assignment(np.where(inside, distance, OUTSIDE))
+    rows, columns = np.nonzero(inside)
+    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
+        rows, columns = linear_sum_assignment(np.where(inside, distance, OUTSIDE))
     return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,87 +14,105 @@ from eidrive_scenario.fusion.association import associate
 from eidrive_scenario.fusion.method import FusionMethod, Report
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 GATE = 4.0
 """Two boxes nearer than this are one object, as in EI-Drive [m]."""
-
-
-@dataclass
-class _Object:
-    """The boxes of one object, as (report, row), and the mean of their centres."""
-
-    centre: Array
-    members: list[tuple[Detections, int]] = field(default_factory=list)
-
-    def add(self, report: Detections, row: int) -> None:
-        self.members.append((report, row))
-        self.centre = self.centre + (report.boxes[row, :3] - self.centre) / len(self.members)
 
 
 class AverageFusion(FusionMethod):
     """Takes the stations in the order of their names and gives each box to the nearest object within the gate.
 
     Boxes of one station are never joined: it reports different objects. Classes are not compared, as detectors confuse
-    them. Position and size are means, the yaw is a mean on the circle, the velocity a mean of those known, the class
-    that of the most reports. The covariance is the mean of those known: an upper bound, however much the reports'
-    errors depend on each other.
+    them. Position, size and score are means, the yaw is a mean on the circle, the velocity a mean of those known, the
+    class that of the most reports. The covariance is the mean of those known: an upper bound, however much the
+    reports' errors depend on each other.
     """
 
     def __init__(self, gate: float = GATE) -> None:
         self.gate = gate
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        present = [report for report in sorted(reports, key=lambda report: report.station) if len(report.detections)]
+        ordered = sorted(reports, key=lambda report: report.station)
+        present = [report.detections for report in ordered if len(report.detections)]
+        if not present:
+            return Detections(now)
         if len(present) == 1:
-            only = present[0].detections
-            return Detections(now, only.boxes, only.scores, only.classes, only.velocity, only.covariance)
+            return replace(present[0], time=now)
+        labels = self._labels(present)
+        return _joined(present, np.array(labels, dtype=np.intp), now)
+
+    def _labels(self, reports: Sequence[Detections]) -> list[int]:
+        """The object of each box, over all boxes of all reports in order; objects are numbered as they appear."""
         objects: list[_Object] = []
-        for report in present:
-            self._enter(report.detections, objects)
-        return _joined(objects, now)
-
-    def _enter(self, detections: Detections, objects: list[_Object]) -> None:
-        """Give each box of one station to the object that it shows, or make it a new one."""
-        known = np.array([thing.centre for thing in objects]).reshape(-1, 3)
-        pairs = {column: row for row, column in associate(known, detections.boxes[:, :3], self.gate)}
-        for column in range(len(detections)):
-            row = pairs.get(column)
-            if row is None:
-                objects.append(_Object(detections.boxes[column, :3], [(detections, column)]))
-            else:
-                objects[row].add(detections, column)
-
-
-def _joined(objects: list[_Object], now: float) -> Detections:
-    count = len(objects)
-    boxes, scores = np.empty((count, 7)), np.empty(count)
-    velocity, covariance = np.empty((count, 2)), np.empty((count, 2, 2))
-    classes = []
-    for index, thing in enumerate(objects):
-        members = thing.members
-        if len(members) == 1:
-            report, row = members[0]
-            boxes[index], scores[index] = report.boxes[row], report.scores[row]
-            velocity[index], covariance[index] = report.velocity[row], report.covariance[row]
-            classes.append(report.classes[row])
-            continue
-        stacked = np.array([report.boxes[row] for report, row in members])
-        boxes[index] = stacked.mean(axis=0)
-        boxes[index, 6] = mean_angle(stacked[:, 6].tolist())
-        scores[index] = sum(float(report.scores[row]) for report, row in members) / len(members)
-        velocity[index] = _mean_of_known([report.velocity[row] for report, row in members])
-        covariance[index] = _mean_of_known([report.covariance[row] for report, row in members])
-        classes.append(Counter(report.classes[row] for report, row in members).most_common(1)[0][0])
-    return Detections(now, boxes, scores, tuple(classes), velocity, covariance)
+        labels = []
+        for report in reports:
+            centres = report.boxes[:, :3]
+            known = np.array([[thing.x, thing.y, thing.z] for thing in objects]).reshape(-1, 3)
+            pairs = {column: row for row, column in associate(known, centres, self.gate)}
+            for column, centre in enumerate(centres.tolist()):
+                label = pairs.get(column)
+                if label is None:
+                    label = len(objects)
+                    objects.append(_Object(*centre))
+                else:
+                    objects[label].add(*centre)
+                labels.append(label)
+        return labels
 
 
-def mean_angle(angles: Sequence[float]) -> float:
-    """Mean direction on the circle [rad]; the first angle where they cancel out."""
-    east, north = sum(map(math.cos, angles)), sum(map(math.sin, angles))
-    return math.atan2(north, east) if math.hypot(east, north) > 1e-9 * len(angles) else angles[0]
+@dataclass
+class _Object:
+    """The mean of the centres so far."""
+
+    x: float
+    y: float
+    z: float
+    count: int = 1
+
+    def add(self, x: float, y: float, z: float) -> None:
+        self.count += 1
+        self.x += (x - self.x) / self.count
+        self.y += (y - self.y) / self.count
+        self.z += (z - self.z) / self.count
 
 
-def _mean_of_known(values: Sequence[Array]) -> Array:
-    """The mean of the arrays without NaN; the first where there is none."""
-    known = [value for value in values if not np.isnan(value).any()]
-    return np.mean(known, axis=0) if known else values[0]
+def _joined(reports: Sequence[Detections], labels: Indices, now: float) -> Detections:
+    """Means over the boxes of each object; a box that is alone stays as it is, to the last bit."""
+    boxes = np.concatenate([report.boxes for report in reports])
+    counts = np.bincount(labels)
+    several = counts > 1
+    means = _sums(boxes, labels, len(counts)) / counts[:, None]
+    yaw = boxes[:, 6]
+    mean_yaw = np.arctan2(_sums(np.sin(yaw), labels, len(counts)), _sums(np.cos(yaw), labels, len(counts)))
+    means[several, 6] = mean_yaw[several]
+    words = [word for report in reports for word in report.classes]
+    votes: list[list[str]] = [[] for _ in counts]
+    for label, word in zip(labels.tolist(), words, strict=True):
+        votes[label].append(word)
+    return Detections(
+        now,
+        means,
+        _sums(np.concatenate([report.scores for report in reports]), labels, len(counts)) / counts,
+        tuple(Counter(names).most_common(1)[0][0] if len(names) > 1 else names[0] for names in votes),
+        _means_of_known(np.concatenate([report.velocity for report in reports]), labels, len(counts)),
+        _means_of_known(np.concatenate([report.covariance for report in reports]), labels, len(counts)),
+    )
+
+
+def _sums(values: Array, labels: Indices, count: int) -> Array:
+    """(count, ...) sums of values (K, ...) with the same label, added in order."""
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, labels, values)
+    return total
+
+
+def _means_of_known(values: Array, labels: Indices, count: int) -> Array:
+    """(count, ...) means of the values (K, ...) without NaN; NaN where all of an object's have one."""
+    flat = values.reshape(len(values), -1)
+    known = ~np.isnan(flat).any(axis=1)
+    number = np.bincount(labels[known], minlength=count)
+    total = _sums(flat[known], labels[known], count)
+    mean = np.full(total.shape, np.nan)
+    np.divide(total, number[:, None], out=mean, where=number[:, None] > 0)
+    return mean.reshape((count, *values.shape[1:]))

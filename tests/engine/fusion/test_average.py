@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.association import associate
-from eidrive_scenario.fusion.average import AverageFusion, mean_angle
+from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry
 
@@ -105,10 +105,6 @@ def test_no_reports_and_empty_ones() -> None:
     assert len(fuse()) == 0
     assert len(fuse(report("A"), report("B"))) == 0
     assert len(fuse(report("A"), report("B", (1, 1)))) == 1
-
-
-def test_opposite_directions_cancel_out_to_the_first() -> None:
-    assert mean_angle([0.3, 0.3 + math.pi]) == 0.3
 
 
 PLACES = st.lists(st.tuples(st.floats(-60, 60), st.floats(-60, 60)), max_size=5)
