@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,3 +44,25 @@ def metres(buffer: NDArray[np.float32], near: float, far: float) -> NDArray[np.f
     depth = far * near / (far - (far - near) * value)
     depth[value >= 1.0] = np.inf
     return depth.astype(np.float32)
+
+
+def sky(pose: Array, width: int, height: int, fov: float) -> NDArray[np.uint8]:
+    """(H, W, 3) the colour of a clear sky in each pixel: pale at the horizon, blue above; below it, haze."""
+    right, down, forward = pose[2, :3].tolist()
+    return _sky(right, down, forward, width, height, fov)
+
+
+@lru_cache(maxsize=16)
+def _sky(right: float, down: float, forward: float, width: int, height: int, fov: float) -> NDArray[np.uint8]:
+    """The same by the vertical parts of the camera's axes; level cameras see one sky whichever way they turn."""
+    scale = 2.0 * math.tan(fov / 2) / width
+    columns = scale * (np.arange(width) + 0.5 - width / 2)[None, :]
+    lines = scale * (np.arange(height) + 0.5 - height / 2)[:, None]
+    rise = (forward + right * columns + down * lines) / np.sqrt(1.0 + columns**2 + lines**2)
+    share = np.clip(rise / 0.5, 0.0, 1.0)[..., None] ** 0.6
+    colours: NDArray[np.uint8] = np.rint(_HORIZON + share * (_ZENITH - _HORIZON)).astype(np.uint8)
+    colours.flags.writeable = False
+    return colours
+
+
+_HORIZON, _ZENITH = np.array([214.0, 222.0, 228.0]), np.array([104.0, 150.0, 205.0])

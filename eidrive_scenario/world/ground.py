@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
 
 
 class GroundUnder:

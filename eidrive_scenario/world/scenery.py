@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_objects, surface_meshes
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, quaternion
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.ground import is_level
 
-if TYPE_CHECKING:
-    from eidrive_scenario.roads import RoadNetwork
-    from eidrive_scenario.roads.model import RoadObject
+GROUND = "ground"
+STOREY = 3.2
+"""Height of a building whose height the map does not say [m]."""
+_MOST_FACES = 20_000
+"""In one collision shape; pybullet refuses much more."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,11 @@ class Scenery:
         self._client = client
         self._names: dict[int, str] = {}
         self.level = is_level(roads)
-        if self.level:
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, RAYS, "ground")
+        self._raised = False
         if roads is not None:
-            for entry in roads.objects:
-                if entry.type == "building":
-                    building = _building(roads, entry)
+            for placed in placed_objects(roads):
+                if placed.object.type == "building":
+                    building = _building(roads, placed)
                     self.add_building(building.name, building.centre, building.size, building.yaw)
 
     def add_building(
@@ -55,6 +55,34 @@ class Scenery:
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
         self._add_static(shape, centre, yaw, RAYS | DRIVEN, name)
+
+    def raise_ground(self) -> bool:
+        """Make the ground that rays meet, where there is none yet; True if it was made now.
+
+        Vehicles do not need it, and on hilly roads it takes time, so it waits for the first ray.
+        """
+        if self._raised:
+            return False
+        self._raised = True
+        here = {"physicsClientId": self._client}
+        if self.level or self.roads is None:
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
+            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, RAYS, GROUND)
+            return True
+        for mesh in surface_meshes(self.roads, 4.0):
+            if mesh.kind.startswith("marking"):
+                continue
+            for start in range(0, len(mesh.faces), _MOST_FACES):
+                used, faces = np.unique(mesh.faces[start : start + _MOST_FACES], return_inverse=True)
+                shape = bullet.createCollisionShape(
+                    bullet.GEOM_MESH,
+                    vertices=mesh.vertices[used].tolist(),
+                    indices=faces.ravel().tolist(),
+                    flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
+                    **here,
+                )
+                self._add_static(shape, (0.0, 0.0, 0.0), 0.0, RAYS, GROUND)
+        return True
 
     def name_of(self, handle: int) -> str:
         """The name of the building with this body in pybullet."""
@@ -83,33 +111,18 @@ class Scenery:
         self._names[handle] = name
 
 
-def _building(roads: RoadNetwork, entry: RoadObject) -> Building:
+def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
     """The box around an object of the road network."""
-    pose = roads.road_pose_at(entry.road, entry.s, entry.t)
-    yaw = pose.h + entry.heading
-    name = entry.name or f"building {entry.id}"
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    corners = []
-    height, bottom = entry.height, 0.0
-    for corner in entry.outlines[0] if entry.outlines else ():
-        height = max(height, corner.height)
-        if corner.on_road:
-            at = roads.road_pose_at(entry.road, corner.x, corner.y)
-            dx, dy = at.x - pose.x, at.y - pose.y
-            corners.append((cos * dx + sin * dy, cos * dy - sin * dx))
-        else:
-            corners.append((corner.x, corner.y))
-        bottom = min(bottom, corner.z)
-    if corners:
-        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-    else:
-        length, width = (entry.length, entry.width) if entry.length else (2 * entry.radius, 2 * entry.radius)
-        low, high = np.array([-length / 2, -width / 2]), np.array([length / 2, width / 2])
-    mx, my = ((low + high) / 2).tolist()
-    length, width = (high - low).tolist()
-    centre = (
-        pose.x + cos * mx - sin * my,
-        pose.y + sin * mx + cos * my,
-        pose.z + entry.z_offset + bottom + height / 2,
-    )
-    return Building(name, centre, (length, width, height), yaw)
+    entry, pose = placed.object, placed.pose
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
+    x, y = pose.x, pose.y
+    if entry.outlines and not entry.repeats:
+        offset = np.concatenate(outlines(roads, entry))[:, :2] - (x, y)
+        corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        length, width = (high - low).tolist()
+        mx, my = ((low + high) / 2).tolist()
+        x, y = x + cos * mx - sin * my, y + sin * mx + cos * my
+        height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
+    return Building(entry.name or f"building {entry.id}", (x, y, pose.z + height / 2), (length, width, height), pose.h)

@@ -74,7 +74,8 @@ class WorldView:
         """(N, 3) centres of the bounding boxes in the world frame [m]; pitch and roll neglected."""
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T
-        return self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        centres: Array = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        return centres
 
     @cached_property
     def boxes(self) -> Array:

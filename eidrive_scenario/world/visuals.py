@@ -1,88 +1,167 @@
-"""What cameras see: meshes in pybullet, made when the first picture is asked for."""
+"""What cameras see: meshes in a pybullet client of their own, made when the first picture is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.bodies import Body, quaternion
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.camera import Array, Picture, metres, projection_matrix, view_matrix
-from eidrive_scenario.world.meshes import actor_mesh
-from eidrive_scenario.world.meshes.palette import MATERIALS, Colour, paint
-from eidrive_scenario.world.scenery import Scenery
+from eidrive_scenario.world.camera import Array, Picture, metres, projection_matrix, sky, view_matrix
+from eidrive_scenario.world.meshes import actor_mesh, shadow
+from eidrive_scenario.world.meshes.buildings import building as building_mesh
+from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
+from eidrive_scenario.world.meshes.solids import polygon
+from eidrive_scenario.world.scenery import Building, Scenery
 
 _AWAY = (0.0, 0.0, -10_000.0)
-SUN = (0.45, -0.35, 0.82)
+_SUN = (0.45, -0.35, 0.82)
+_BESIDE_ROADS = 400.0
+"""How far the ground goes on around the roads [m]."""
+_BELOW_ROADS = 0.06
+"""How far the ground lies below the roads, lest it shows through [m]."""
+_MOST_VERTICES = 3 * 20_000
+"""In one mesh; pybullet refuses much more."""
 
 
 class Visuals:
-    """Bodies without collision shape: one for each material of each actor, moved to the actors before each picture."""
+    """Bodies without a collision shape, one for each material of each actor, moved there before each picture.
+
+    pybullet would draw the collision boxes of the physics client too, hence a client that has only meshes.
+    """
 
     def __init__(self, scenery: Scenery) -> None:
         self._client: int = bullet.connect(bullet.DIRECT)
+        if self._client < 0:
+            raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
         self._scenery = scenery
         self._parts: dict[str, tuple[Body, list[int]]] = {}
-        self._row_of_handle = np.empty(0, dtype=np.int32)
+        self._shown_buildings = 0
+        self._draw_ground()
+
+    def close(self) -> None:
+        """Give the client back."""
+        bullet.disconnect(physicsClientId=self._client)
 
     def picture(
         self, shown: Mapping[int, Body], pose: Array, width: int, height: int, fov: float, near: float, far: float
     ) -> Picture:
         """The picture of a camera; `shown` are the actors that can be seen, by their rows."""
-        self._place(shown)
-        _, _, rgba, depth, handles = bullet.getCameraImage(
+        rows = self._arrange(shown)
+        _, _, colours, buffer, handles = bullet.getCameraImage(
             width,
             height,
             viewMatrix=view_matrix(pose),
             projectionMatrix=projection_matrix(width, height, fov, near, far),
-            lightDirection=SUN,
-            shadow=0,
+            lightDirection=_SUN,
             lightColor=(1.0, 1.0, 1.0),
             lightAmbientCoeff=0.62,
             lightDiffuseCoeff=0.55,
             lightSpecularCoeff=0.08,
+            shadow=0,
             renderer=bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )
-        rgb = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
         seen = np.asarray(handles, dtype=np.int32).reshape(height, width)
-        return Picture(rgb, metres(np.asarray(depth, dtype=np.float32).reshape(height, width), near, far), seen)
+        depth = metres(np.asarray(buffer, dtype=np.float32).reshape(height, width), near, far)
+        depth[seen < 0] = np.inf
+        rgb = np.ascontiguousarray(np.asarray(colours, dtype=np.uint8).reshape(height, width, 4)[..., :3])
+        rgb[seen < 0] = sky(pose, width, height, fov)[seen < 0]
+        return Picture(rgb, depth, rows[seen])
 
-    def _place(self, shown):
+    def _arrange(self, shown: Mapping[int, Body]) -> NDArray[np.int32]:
+        """Move the meshes to the actors; returns the row of each handle, -1 for what is no actor, also at index -1."""
+        for building in self._scenery.buildings[self._shown_buildings :]:
+            self._draw_building(building)
+        self._shown_buildings = len(self._scenery.buildings)
+        bodies = {body.name: body for body in shown.values()}
+        for name, (body, handles) in list(self._parts.items()):
+            if bodies.get(name) is not body:
+                self._move(handles, _AWAY, (0.0, 0.0, 0.0, 1.0))
+        for body in shown.values():
+            known = self._parts.get(body.name)
+            if known is None or known[0].spec != body.spec:
+                self._parts[body.name] = (body, self._draw_actor(body))
+            elif known[0] is not body:
+                self._parts[body.name] = (body, known[1])
+        highest = max((max(handles) for _, handles in self._parts.values()), default=0)
+        rows = np.full(max(highest, bullet.getNumBodies(physicsClientId=self._client)) + 2, -1, dtype=np.int32)
         for row, body in shown.items():
-            if body.name not in self._parts:
-                hs = []
-                for material, tri in actor_mesh(body.spec).items():
-                    colour = (
-                        (body.spec.colour or paint(body.name, body.spec.shape))
-                        if material == "paint"
-                        else MATERIALS[material]
-                    )
-                    hs.append(self._add(tri, colour))
-                self._parts[body.name] = (body, hs)
-            r = rotation_matrix(body.yaw, body.pitch, body.roll)
-            ox, oy, oz = body.spec.offset
-            at = np.array([body.x, body.y, body.z]) + r @ (ox, oy, oz - body.spec.size[2] / 2)
-            for h in self._parts[body.name][1]:
-                bullet.resetBasePositionAndOrientation(
-                    h, at.tolist(), quaternion(body.yaw, body.pitch, body.roll), physicsClientId=self._client
-                )
+            handles = self._parts[body.name][1]
+            self._move(handles, _foot(body), quaternion(body.yaw, body.pitch, body.roll))
+            rows[handles[:-1]] = row
+        return rows
 
-    def _add(self, triangles: Array, colour: Colour) -> int:
+    def _move(self, handles: Sequence[int], at: Sequence[float], turn: Sequence[float]) -> None:
+        for handle in handles:
+            bullet.resetBasePositionAndOrientation(handle, at, turn, physicsClientId=self._client)
+
+    def _draw_actor(self, body: Body) -> list[int]:
+        """The handles of an actor's materials, and last that of its shadow."""
+        spec = body.spec
+        own = spec.colour or paint(spec.name, spec.shape)
+        handles: list[int] = []
+        for material, triangles in actor_mesh(spec).items():
+            handles += self._add(triangles, own if material == "paint" else MATERIALS[material])
+        return handles + self._add(shadow(spec), MATERIALS["shadow"])
+
+    def _draw_building(self, building: Building) -> None:
+        own = building.colour or by_name(building.name, FACADES)
+        foot = (building.centre[0], building.centre[1], building.centre[2] - building.size[2] / 2)
+        for material, triangles in building_mesh(building.size).items():
+            handles = self._add(triangles, own if material == "wall" else MATERIALS[material])
+            self._move(handles, foot, quaternion(building.yaw, 0.0, 0.0))
+
+    def _draw_ground(self) -> None:
+        low, high = np.zeros(3), np.zeros(3)
+        if self._scenery.roads is not None:
+            meshes = surface_meshes(self._scenery.roads)
+            for mesh in meshes:
+                self._add(mesh.vertices[mesh.faces], mesh.colour)
+            points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
+            low, high = points.min(axis=0), points.max(axis=0)
+        (x0, y0, z), (x1, y1, _) = (low - _BESIDE_ROADS).tolist(), (high + _BESIDE_ROADS).tolist()
+        z += _BESIDE_ROADS - _BELOW_ROADS
+        ground = MATERIALS["grass" if self._scenery.roads is not None else "asphalt"]
+        self._add(polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]), ground)
+
+    def _add(self, triangles: Array, colour: Colour) -> list[int]:
+        """Bodies that show triangles (K, 3, 3), each with its own flat shade; one, unless there are very many."""
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        keep = np.linalg.norm(normals, axis=1) > 1e-12
-        triangles, normals = triangles[keep], normals[keep]
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        shape = bullet.createVisualShape(
-            bullet.GEOM_MESH,
-            vertices=triangles.reshape(-1, 3).tolist(),
-            indices=list(range(3 * len(triangles))),
-            normals=np.repeat(normals, 3, axis=0).tolist(),
-            rgbaColor=(*colour, 1.0),
-            specularColor=(0.1, 0.1, 0.1),
-            physicsClientId=self._client,
-        )
-        return bullet.createMultiBody(0, -1, shape, physicsClientId=self._client)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        solid = lengths[:, 0] > 1e-12
+        corners = triangles[solid].reshape(-1, 3)
+        normals = np.repeat(normals[solid] / lengths[solid], 3, axis=0)
+        handles = []
+        for start in range(0, len(corners), _MOST_VERTICES):
+            part = slice(start, start + _MOST_VERTICES)
+            shape = bullet.createVisualShape(
+                bullet.GEOM_MESH,
+                vertices=corners[part].tolist(),
+                indices=list(range(len(corners[part]))),
+                normals=normals[part].tolist(),
+                rgbaColor=(*colour, 1.0),
+                specularColor=(0.1, 0.1, 0.1),
+                physicsClientId=self._client,
+            )
+            handles.append(bullet.createMultiBody(0, -1, shape, useMaximalCoordinates=1, physicsClientId=self._client))
+        return handles
+
+
+def _foot(body: Body) -> tuple[float, float, float]:
+    """The centre of the bottom of an actor's box in the world."""
+    ox, oy, oz = body.spec.offset
+    oz -= body.spec.size[2] / 2
+    cy, sy, cp, sp = math.cos(body.yaw), math.sin(body.yaw), math.cos(body.pitch), math.sin(body.pitch)
+    cr, sr = math.cos(body.roll), math.sin(body.roll)
+    ahead, aside = ox * cp + oy * sp * sr + oz * sp * cr, oy * cr - oz * sr
+    return (
+        body.x + cy * ahead - sy * aside,
+        body.y + sy * ahead + cy * aside,
+        body.z - ox * sp + oy * cp * sr + oz * cp * cr,
+    )

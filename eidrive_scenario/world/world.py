@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType, TracebackType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eidrive_scenario.errors import Problem, SettingError, SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.camera import Picture
 from eidrive_scenario.world.contacts import ContactTracker, Touch, closing_speed
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
-from eidrive_scenario.world.camera import Picture
 from eidrive_scenario.world.visuals import Visuals
-
-if TYPE_CHECKING:
-    from eidrive_scenario.roads import RoadNetwork
 
 Array = NDArray[np.float64]
 
@@ -93,6 +91,9 @@ class World:
 
     def close(self) -> None:
         """Give the pybullet client back; the world cannot be used any more."""
+        if self._visuals is not None:
+            self._visuals.close()
+            self._visuals = None
         if self._client >= 0:
             bullet.disconnect(physicsClientId=self._client)
             self._client = -1
@@ -281,6 +282,8 @@ class World:
 
     def _refresh(self) -> None:
         """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
+        if self._scenery.raise_ground():
+            self._changed()
         if not self._broadphase_fresh:
             bullet.performCollisionDetection(physicsClientId=self._client)
             self._broadphase_fresh = True

@@ -11,7 +11,7 @@ from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
 from eidrive_scenario.world.meshes.figures import crate, pedestrian, roadside_unit
 from eidrive_scenario.world.meshes.frame import Frame
 from eidrive_scenario.world.meshes.heavy import bus, firetruck, truck
-from eidrive_scenario.world.meshes.solids import Array, Mesh
+from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
 from eidrive_scenario.world.meshes.vans import ambulance, van
 
 BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
@@ -37,6 +37,22 @@ def actor_mesh(spec: ActorSpec) -> Mapping[str, Array]:
     else:
         rear, front, radius = -0.3 * length, 0.3 * length, min(0.35, 0.3 * height)
     return _mesh(spec.shape, Frame(length, width, height, front, rear, radius))
+
+
+def shadow(spec: ActorSpec) -> Array:
+    """The dark patch under an actor, triangles (K, 3, 3) in the same frame: it ties the body to the ground."""
+    half_length, half_width = spec.size[0] / 2 + 0.12, spec.size[1] / 2 + 0.12
+    corner = min(0.5, half_length / 2, half_width / 2)
+    outline = [
+        (half_length, -half_width + corner), (half_length, half_width - corner), (half_length - corner, half_width),
+        (-half_length + corner, half_width), (-half_length, half_width - corner), (-half_length, -half_width + corner),
+        (-half_length + corner, -half_width), (half_length - corner, -half_width),
+    ]  # fmt: skip
+    return polygon([(x, y, _ABOVE_GROUND) for x, y in outline])
+
+
+_ABOVE_GROUND = 0.035
+"""Height of the shadow, above the markings of the road [m]."""
 
 
 @lru_cache(maxsize=256)

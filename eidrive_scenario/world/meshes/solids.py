@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Point = Sequence[float]
+Point = Sequence[float] | Array
 
 _BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 
@@ -132,7 +132,8 @@ def ball(centre: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array
 
 def moved(solid: Array, by: Point) -> Array:
     """The same solid elsewhere."""
-    return solid + np.asarray(by, dtype=float)
+    elsewhere: Array = solid + np.asarray(by, dtype=float)
+    return elsewhere
 
 
 def _fan(ring: Array) -> Array:
