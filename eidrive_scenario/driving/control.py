@@ -26,8 +26,8 @@ SOFTENING = 1.0
 """Keeps the steering calm near standstill [m/s]."""
 STANDSTILL = 0.3
 """Below this speed a vehicle that is to stop holds its brake [m/s]."""
-HOLDING = 1.0
-"""Deceleration that the held brake would give [m/s²]."""
+HOLDING = 3.0
+"""Deceleration that the held brake would give: enough for a slope of 30 % [m/s²]."""
 
 
 class Controller:

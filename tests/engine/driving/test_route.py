@@ -88,16 +88,16 @@ def roads(tmp_path_factory: pytest.TempPathFactory) -> RoadNetwork:
 
 
 def planner(car: ActorSpec, roads: RoadNetwork | None, **settings: float) -> RoutePlanner:
-    return RoutePlanner(AgentSettings(**settings), car, roads, dt=0.05, seed=0)  # type: ignore[arg-type]
+    return RoutePlanner(AgentSettings.model_validate(settings), car, roads, dt=0.05, seed=0)
 
 
-def distance_from_lane(points: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def distance_from_lane(points: np.ndarray) -> np.ndarray:
     """From the centre of the right lane, 1.75 m right of the reference line."""
     x, y = points.T
     straight = np.abs(y + 1.75)
     arc = np.abs(np.hypot(x - 100.0, y - 30.0) - 31.75)
     after = np.abs(x - 131.75)
-    return np.where(x < 100, straight, np.where(y < 30, arc, after))
+    return np.asarray(np.where(x < 100, straight, np.where(y < 30, arc, after)))
 
 
 def test_without_a_goal_it_follows_its_lane_to_the_end_of_the_road(car: ActorSpec, roads: RoadNetwork) -> None:

@@ -112,7 +112,7 @@ DISTRIBUTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("settings", "mean", "sd"), DISTRIBUTIONS, ids=[row[0]["kind"] for row in DISTRIBUTIONS])
+@pytest.mark.parametrize(("settings", "mean", "sd"), DISTRIBUTIONS, ids=[str(row[0]["kind"]) for row in DISTRIBUTIONS])
 def test_delays_have_their_mean_and_spread(settings: dict[str, object], mean: float, sd: float) -> None:
     """Moments by the midpoint rule over the quantile function."""
     delay = TypeAdapter(Delay).validate_python(settings)

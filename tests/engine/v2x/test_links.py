@@ -29,7 +29,8 @@ def talk(
     carrier: Channel, ticks: int, stations: tuple[str, ...] = STATIONS, own: bool = False
 ) -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
     """Every station says one message per tick; the order is that of a run: deliver, then send."""
-    events, heard = [], []
+    events: list[LinkEvent] = []
+    heard: list[tuple[str, float, Received]] = []
     for tick in range(ticks):
         now = tick * DT
         for receiver in stations:
