@@ -14,7 +14,12 @@ from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Problem, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.variation import drawn_parameters
-from eidrive_scenario.recording.criteria_text import exit_verdict, parse_criteria, stop_trigger_criteria
+from eidrive_scenario.recording.criteria_text import (
+    exit_verdict,
+    parse_criteria,
+    stop_trigger_criteria,
+    unbuilt_criteria,
+)
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
@@ -134,7 +139,7 @@ class Simulation:
         self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
         self._observers = tuple(observers)
         self._trace = TraceHash()
-        self._warnings: list[str] = [str(problem) for problem in scenario.warnings]
+        self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario))]
         self._exit: Verdict | None = None
         self._initial = self.storyboard.initial()
         self._apply(self._initial)
@@ -183,7 +188,7 @@ class Simulation:
         if self._exit is not None:
             return f"command: {self._exit.name}"
         for criterion in self.criteria:
-            if criterion.fatal and not criterion.verdict().passed:
+            if criterion.fatal and (verdict := criterion.verdict()).fatal and not verdict.passed:
                 return f"criterion: {criterion.name}"
         if self.storyboard.ended is not None:
             return self.storyboard.ended

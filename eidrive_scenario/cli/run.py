@@ -26,9 +26,6 @@ def run(
     param: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Value of a parameter of the scenario; repeatable.")
     ] = None,
-    weather: Annotated[
-        str | None, typer.Option(help="Weather preset, by name or file.", show_default="the file's")
-    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with seeds from --seed on.")] = 1,
     dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
@@ -50,7 +47,6 @@ def run(
         parameters=_parameters(param or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
-        weather=weather,
     )
     code = 0
     for each in range(seed, seed + repeat):

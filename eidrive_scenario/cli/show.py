@@ -16,7 +16,6 @@ class Names(StrEnum):
 
     scenarios = "scenarios"
     channels = "channels"
-    weather = "weather"
     detectors = "detectors"
     criteria = "criteria"
     actions = "actions"
@@ -32,8 +31,6 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = library.scenarios()
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
-    elif what is Names.weather:
-        lines = library.names("weather")
     else:
         known = registry(what.value)
         width = max(map(len, known), default=0)
