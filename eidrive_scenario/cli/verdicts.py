@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -12,12 +13,12 @@ from eidrive_scenario.recording import Verdict
 from eidrive_scenario.simulation import RunResult
 
 
-def console(*, err: bool = False) -> Console:
+def console() -> Console:
     """A terminal's own width; wide enough for a reason on one line where the output goes to a file."""
-    plain = Console(stderr=err, highlight=False)
+    plain = Console(highlight=False)
     if plain.is_terminal or "COLUMNS" in os.environ:
         return plain
-    return Console(stderr=err, highlight=False, width=180)
+    return Console(highlight=False, width=180)
 
 
 def show(result: RunResult) -> None:
@@ -39,7 +40,7 @@ def show(result: RunResult) -> None:
     out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
     out.print(Text(f"trace {result.trace_hash}", style="dim"))
     for warning in result.warnings:
-        console(err=True).print(Text(f"warning: {warning}", style="yellow"))
+        typer.secho(f"warning: {warning}", fg="yellow", err=True)
 
 
 def _row(verdict: Verdict) -> tuple[Text, ...]:
