@@ -1,7 +1,8 @@
 """How fast scenario 1 runs with the oracle on one core, against a bare pybullet loop, and where the time goes.
 
-The bare loop has the same bodies in the same places, and makes the same physics steps and ray casts in the same order;
-what it lacks is everything else. Both are measured alternately in this process, after a warm-up; medians are printed.
+The bare loop has the same bodies: it repeats the run's calls to pybullet that move them, step the physics and cast the
+rays, in the same order, and does nothing else; what the run reads back from pybullet it leaves out. Both are measured
+alternately in this process, after a warm-up; medians are printed.
 
     python benchmarks/bench_scenario_1.py [--runs 7] [--seed 1] [--channel ideal]
 """
@@ -20,90 +21,84 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
+
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.view import WorldView
 
 SCENARIO = "coop/scenario_1"
 PACKAGE = "eidrive_scenario"
 
 Function = tuple[str, int, str]
+Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+
+SETUP = frozenset({"setPhysicsEngineParameter", "createCollisionShape", "createMultiBody", "changeDynamics",
+                   "setCollisionFilterGroupMask", "removeBody"})  # fmt: skip
+LOOP = frozenset({"resetBasePositionAndOrientation", "resetBaseVelocity", "stepSimulation",
+                  "performCollisionDetection", "rayTestBatch"})  # fmt: skip
 
 
 @dataclass
 class Trace:
-    """What a run asked of pybullet, tick by tick: the views, and the steps and ray casts that led to the next one."""
+    """What a run asked of pybullet: (function, arguments, options), those of the set-up and those of each tick."""
 
-    views: list[WorldView] = field(default_factory=list)
-    calls: list[list[tuple[Any, Any] | None]] = field(default_factory=lambda: [[]])
+    setup: list[Call] = field(default_factory=list)
+    ticks: list[list[Call]] = field(default_factory=list)
+    actors: int = 0
+
+    def note(self, function: Callable[..., Any], given: tuple[Any, ...], options: dict[str, Any]) -> None:
+        """One call; arrays are copied, and the client is left out."""
+        calls = self.ticks[-1] if self.ticks else self.setup
+        kept = tuple(value.copy() if isinstance(value, np.ndarray) else value for value in given)
+        calls.append((function, kept, {key: value for key, value in options.items() if key != "physicsClientId"}))
 
     def observe(self, frame: Frame) -> None:
-        """The observer's half: a view ends a tick of calls."""
-        self.views.append(frame.view)
-        self.calls.append([])
+        """The observer's half: what follows belongs to the next tick."""
+        self.ticks.append([])
+        self.actors = len(frame.view.names)
 
     def close(self) -> None:
         """Nothing to release."""
 
-    @property
-    def steps(self) -> int:
-        """Physics steps of the whole run."""
-        return sum(call is None for tick in self.calls for call in tick)
-
-    @property
-    def rays(self) -> int:
-        """Rays of the whole run."""
-        return sum(len(call[0]) for tick in self.calls for call in tick if call is not None)
+    def count(self, name: str, of: Callable[[Call], int] = lambda call: 1) -> int:
+        """How many calls of that function the run made, or the sum of `of` over them."""
+        return sum(of(call) for calls in self.ticks for call in calls if call[0].__name__ == name)
 
 
 @contextmanager
 def listening(trace: Trace) -> Iterator[None]:
-    """Note each physics step (None) and each batch of rays (origins, targets) while the run goes on."""
-    step, cast = bullet.stepSimulation, bullet.rayTestBatch
+    """Note each call to one of the functions of SETUP and LOOP while the run goes on."""
 
-    def noted_step(*given: Any, **options: Any) -> Any:
-        trace.calls[-1].append(None)
-        return step(*given, **options)
+    def noted(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any, **options: Any) -> Any:
+            trace.note(function, given, options)
+            return function(*given, **options)
 
-    def noted_cast(origins: Any, targets: Any, *given: Any, **options: Any) -> Any:
-        trace.calls[-1].append((origins.copy(), targets.copy()))
-        return cast(origins, targets, *given, **options)
+        return call
 
-    bullet.stepSimulation, bullet.rayTestBatch = noted_step, noted_cast
+    originals = {name: getattr(bullet, name) for name in SETUP | LOOP}
+    for name, function in originals.items():
+        setattr(bullet, name, noted(function))
     try:
         yield
     finally:
-        bullet.stepSimulation, bullet.rayTestBatch = step, cast
+        for name, function in originals.items():
+            setattr(bullet, name, function)
 
 
-def bare_loop(trace: Trace, dt: float) -> float:
-    """Seconds for the trace in pybullet alone."""
+def bare_loop(trace: Trace) -> float:
+    """Seconds for the ticks of the trace in pybullet alone."""
     client = bullet.connect(bullet.DIRECT)
-    here = {"physicsClientId": client}
-    bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE, **here), **here)
-    bullet.setPhysicsEngineParameter(fixedTimeStep=dt * len(trace.views) / max(trace.steps, 1), **here)
-    handles: dict[str, int] = {}
+    for function, given, options in trace.setup:
+        function(*given, **options, physicsClientId=client)
     started = time.perf_counter()
-    for view, calls in zip(trace.views, trace.calls, strict=False):
-        boxes, speeds = view.boxes.tolist(), view.speed.tolist()
-        for name, (x, y, z, length, width, height, yaw), speed in zip(view.names, boxes, speeds, strict=True):
-            if name not in handles:
-                half = (length / 2, width / 2, height / 2)
-                shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, **here)
-                handles[name] = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **here)
-            elif not speed:
-                continue
-            turn = bullet.getQuaternionFromEuler((0.0, 0.0, yaw))
-            bullet.resetBasePositionAndOrientation(handles[name], (x, y, z), turn, **here)
-        for call in calls:
-            if call is None:
-                bullet.stepSimulation(**here)
-            else:
-                bullet.rayTestBatch(*call, numThreads=1, **here)
+    for calls in trace.ticks:
+        for function, given, options in calls:
+            function(*given, **options, physicsClientId=client)
     seconds = time.perf_counter() - started
-    bullet.disconnect(**here)
+    bullet.disconnect(physicsClientId=client)
     return seconds
 
 
@@ -172,22 +167,23 @@ def main() -> None:
     trace = Trace()
     with listening(trace):
         simulated = build(trace).run().simulated_s
-    bare_loop(trace, settings.dt)
+    bare_loop(trace)
     whole, loading, bare = [], [], []
     for _ in range(given.runs):
         loading.append(timed(lambda: build().close()))
         whole.append(build().run().wall_s)
-        bare.append(bare_loop(trace, settings.dt))
+        bare.append(bare_loop(trace))
+    steps, rays = trace.count("stepSimulation"), trace.count("rayTestBatch", lambda call: len(call[1][0]))
     ratios = [ours / theirs for ours, theirs in zip(whole, bare, strict=True)]
 
     print(
-        f"{SCENARIO}, oracle, channel {given.channel}, seed {given.seed}: {simulated:.2f} s in {len(trace.views)} ticks"
+        f"{SCENARIO}, oracle, channel {given.channel}, seed {given.seed}: {simulated:.2f} s in {len(trace.ticks)} ticks"
     )
-    print(f"  {len(trace.views[-1].names)} actors, {trace.steps} physics steps, {trace.rays} rays; {given.runs} runs")
+    print(f"  {trace.actors} actors, {steps} physics steps, {rays} rays; {given.runs} runs")
     print(f"  simulated s per wall s     {simulated / median(whole):8.1f}   (aim: at least 30)")
     print(f"  the same with loading      {simulated / (median(whole) + median(loading)):8.1f}")
-    print(f"  per tick                   {1e3 * median(whole) / len(trace.views):8.3f} ms")
-    print(f"  bare pybullet loop         {1e3 * median(bare) / len(trace.views):8.3f} ms per tick")
+    print(f"  per tick                   {1e3 * median(whole) / len(trace.ticks):8.3f} ms")
+    print(f"  bare pybullet loop         {1e3 * median(bare) / len(trace.ticks):8.3f} ms per tick")
     print(f"  ratio to the bare loop     {median(ratios):8.2f}   (aim: below 3)")
     profile = cProfile.Profile()
     simulation = build()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -90,7 +91,7 @@ class KeyFrames:
             ("closest", "the two are never there together"),
         ):
             title, snapshot = self._found.get(kind, (absent, None))
-            moments.append(Moment(kind, title, snapshot))
+            moments.append(Moment(kind, title, snapshot and _portable(snapshot)))
         return Story(
             self.ego,
             self.hidden,
@@ -137,6 +138,11 @@ class KeyFrames:
         row = min(bisect.bisect_left(self._times, detections.time - 1e-9), len(self._where) - 1)
         x, y = self._where[row]
         return any(math.hypot(box[0] - x, box[1] - y) <= NEAR for box in detections.boxes.tolist())
+
+
+def _portable(snapshot: Snapshot) -> Snapshot:
+    """The same with a view that holds nothing but its arrays: what a view caches does not travel between processes."""
+    return dataclasses.replace(snapshot, view=dataclasses.replace(snapshot.view))
 
 
 def _verb(names: list[str]) -> str:

@@ -128,9 +128,15 @@ def test_a_wrong_order_does_not_hold() -> None:
 def test_the_sentence_says_what_own_perception_changes() -> None:
     runs = episodes(shift_of_own=-1.0)
     text = difference(tabulate(runs, LINKS), tabulate(runs, OWN))
-    assert "scenario 1 latency -1.00 m and 0 → 0 of 5 collision-free" in text
-    assert "scenario 2 error -1.00 m and 5 → 4 of 5 collision-free" in text
-    assert "in 2 of 2 places under that rule, and in 2 of 2" in text
+    assert "scenario 1 latency 0.3 s 2.50 → 1.50 m, collision-free 0 → 0 of 5" in text
+    assert "scenario 2 error 30 % 4.33 → 3.33 m, collision-free 5 → 4 of 5" in text
+    assert "worse than no cooperation in 2 of 2 places under that rule, and in 2 of 2" in text
+
+
+def test_the_sentence_says_so_where_nothing_changes() -> None:
+    runs = episodes()
+    text = difference(tabulate(runs, LINKS), tabulate(runs, OWN))
+    assert "changes nothing (means by 0.00 m at most)" in text
 
 
 def test_the_print_fits_80_columns_and_holds_the_paper_beside(table: Table) -> None:

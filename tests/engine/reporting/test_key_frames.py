@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 from collections.abc import Callable
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -72,6 +74,16 @@ def test_closest_is_the_smallest_gap_between_bodies(street: Play) -> None:
     assert nearest > 0.0
     assert time_of(story, "closest") == story.times[story.boxes.index(nearest)]
     assert story.moment("closest").title == f"closest, {nearest:.2f} m apart"
+
+
+def test_a_story_travels_between_processes(street: Play) -> None:
+    """Also where views hold cached things that do not, such as a read-only mapping of names."""
+    frames = street(1)
+    for frame in frames:
+        frame.view.__dict__["rows"] = MappingProxyType(dict(frame.view.rows))
+    story = pickle.loads(pickle.dumps(story_of(frames)))
+    assert story.moment("closest").title == story_of(street(1)).moment("closest").title
+    assert story.moment("closest").snapshot.view.rows["Truck"] == 2
 
 
 def test_a_collision_is_shown_at_its_first_touch(street: Play) -> None:
