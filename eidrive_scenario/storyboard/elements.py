@@ -108,8 +108,12 @@ class StoryElement(Composite):
         yield self
 
     def settle(self) -> None:
-        """End if all children are complete."""
-        if self.state is State.RUNNING and all(element.state is State.COMPLETE for element in self.elements):
+        """End if all children are complete; what has no children has no end of its own, and runs until it is stopped."""
+        if (
+            self.state is State.RUNNING
+            and self.elements
+            and all(element.state is State.COMPLETE for element in self.elements)
+        ):
             self.finish()
 
     def _arm(self) -> None:
@@ -135,7 +139,7 @@ class StoryboardElement(StoryElement):
 
     def settle(self) -> None:
         """End with the last story, if nothing else would end the storyboard."""
-        if self.stop_leaf is None and self.elements:
+        if self.stop_leaf is None:
             super().settle()
 
 

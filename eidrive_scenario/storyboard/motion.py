@@ -86,6 +86,9 @@ class Motion:
         """Express the place on the road by another lane of the same road; the answer has its offset."""
         here = self.location
         if here is not None and self.roads is not None and here.lane != lane:
+            ways = [self.roads.driving_direction(here.road, number) for number in (here.lane, lane)]
+            if ways[0] != ways[1]:
+                self.heading = wrap_angle(self.heading + math.pi)
             here = here._replace(lane=lane, offset=here.t - self.roads.location(here.road, lane, here.s).t)
             self.location = here
         return here

@@ -55,12 +55,39 @@ class Layout:
         index, share = self._between(self.s, s)
         return self._blend(index, share)
 
-    def at_time(self, time: float) -> float:
-        """Arc length at a time: between two points at constant speed [m]."""
+    def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
+        """Arc length at a time [m]: between two points at constant speed, or at the acceleration that `speeds` imply."""
         if self.times is None:
             return 0.0
         index, share = self._between(self.times, time)
-        return self.s[index] + share * (self.s[index + 1] - self.s[index])
+        way = self.s[index + 1] - self.s[index]
+        if speeds is None:
+            return self.s[index] + share * way
+        span = self.times[index + 1] - self.times[index]
+        return self.s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
+
+    def time_at(self, s: float) -> float:
+        """The time at an arc length [s]; 0 without times."""
+        if self.times is None:
+            return 0.0
+        index, share = self._between(self.s, s)
+        return self.times[index] + share * (self.times[index + 1] - self.times[index])
+
+    def speeds_from(self, start: float) -> tuple[float, ...]:
+        """Speeds at the points [m/s] if they change linearly over time from `start`, and the times are to be kept.
+
+        Where the next speed would be negative the stretch is driven at its mean speed instead.
+        """
+        assert self.times is not None
+        speeds, speed = [], start
+        for index in range(len(self.s) - 1):
+            span, way = self.times[index + 1] - self.times[index], self.s[index + 1] - self.s[index]
+            mean = way / span if span > 0.0 else speed
+            if 2.0 * mean - speed < -1e-6:
+                speed = mean
+            speeds.append(speed)
+            speed = 2.0 * mean - speed
+        return (*speeds, speed)
 
     def _blend(self, index: int, share: float) -> Pose:
         a, b = self.poses[index], self.poses[index + 1]

@@ -61,7 +61,7 @@ class AcquirePositionAction(ActionBehaviour):
             follow(self, self.stage.roads.route(here, place.location))
         elif self.actor.driven:
             goal = self.actor.goal
-            self.actor.goal = Goal(None if goal is None else goal.speed, np.array([place.pose[:3]]))
+            self.actor.goal = Goal(None if goal is None else goal.speed, waypoints=np.array([place.pose[:3]]))
         return Status.SUCCESS
 
     def describe(self) -> str:

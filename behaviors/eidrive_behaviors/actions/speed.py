@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from py_trees.common import Status
 
@@ -63,7 +64,7 @@ class SpeedAction(ActionBehaviour):
         reached = transition.done and abs(speed - transition.target) < TINY
         if self.actor.driven:
             goal = self.actor.goal
-            self.actor.goal = Goal(speed, None if goal is None else goal.waypoints)
+            self.actor.goal = replace(goal or Goal(), speed=speed)
             reached = reached and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
         else:
             self.actor.motion.speed = speed

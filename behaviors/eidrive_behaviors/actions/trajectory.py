@@ -16,8 +16,9 @@ class FollowTrajectoryAction(ActionBehaviour):
     """Moves the actor along a trajectory, from its start (or `initialDistanceOffset`) to its end.
 
     Without timing the actor keeps its own speed, which other actions may set, and only the way is given. With timing
-    the vertex of time v is passed at `scale * v + offset`, counted from the start of the run or of the action. After
-    the end the actor keeps its speed and looks for its lane.
+    the vertex of time v is passed at `scale * v + offset`, counted from the start of the run or of the action; in the
+    following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
+    speed and looks for its lane.
     """
 
     action: model.FollowTrajectoryAction
@@ -45,7 +46,11 @@ class FollowTrajectoryAction(ActionBehaviour):
         if self._timing is not None and self._layout.times is None:
             raise self.problem("has a Timing, but the trajectory has no times", "give each vertex a time, or say None")
         self._s = self.action.initial_distance_offset or 0.0
+        self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
         self._started = self.stage.time
+        follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
+        swings = follow and self._timing is not None and self._trajectory.shape.polyline is not None
+        self._speeds = self._layout.speeds_from(abs(self.actor.motion.speed)) if swings else None
         self._backwards = self.actor.present and self.actor.motion.speed < 0.0
 
     def update(self) -> Status:
@@ -59,7 +64,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 done = dt > 0.0 and after > layout.length - TINY
         else:
             clock = self._clock(dt)
-            after = layout.at_time(clock)
+            after = layout.at_time(clock, self._speeds)
             done = clock >= layout.end_time - TINY
             if dt > 0.0 and not (done and clock > layout.end_time + TINY):
                 motion.speed = math.copysign((after - self._s) / dt, motion.speed if self._backwards else 1.0)
@@ -77,9 +82,9 @@ class FollowTrajectoryAction(ActionBehaviour):
     def _clock(self, dt: float) -> float:
         assert self._timing is not None
         elapsed = self.stage.time + dt
-        if self._timing.domain_absolute_relative is model.ReferenceContext.RELATIVE:
-            elapsed -= self._started
-        return (elapsed - self._timing.offset) / self._timing.scale
+        if self._timing.domain_absolute_relative is not model.ReferenceContext.RELATIVE:
+            return (elapsed - self._timing.offset) / self._timing.scale
+        return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
 
     def _rest(self, s: float, dt: float) -> float:
         """What the step has left beyond the end of the trajectory [m]."""

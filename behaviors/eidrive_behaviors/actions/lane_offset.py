@@ -1,0 +1,87 @@
+"""LaneOffsetAction: move an actor sideways within its lane."""
+
+from __future__ import annotations
+
+import math
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Domain, LaneLocation, Steering, ValueTransition, model
+
+STANDING = 1e-6
+
+
+class LaneOffsetAction(ActionBehaviour):
+    """Takes the offset from the lane's centre over to its target, as fast as `maxLateralAcc` lets it.
+
+    The shape runs over time; without `maxLateralAcc` the target holds at once. An offset relative to an entity counts
+    from that entity's lateral place, left of its heading positive. A continuous action holds the offset, and follows
+    the entity, until a younger action ends it.
+    """
+
+    domains = Domain.LATERAL
+    action: model.LaneOffsetAction
+
+    def initialise(self) -> None:
+        """Lay the transition from the present offset."""
+        motion = self.actor.motion
+        if motion.location is None:
+            motion.land()
+        if motion.location is None:
+            raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+        here, way = motion.location, self._way(motion.location)
+        start, target = here.offset * way, self._target(here) * way
+        limit, shape = self.action.lane_offset_action_dynamics.max_lateral_acc, self._shape()
+        if limit is None:
+            self._transition = ValueTransition(shape, start, target, 0.0)
+        else:
+            self._transition = ValueTransition.by_bend(shape, start, target, limit)
+
+    def update(self) -> Status:
+        """The offset at the end of the step."""
+        here = self.actor.motion.location
+        if self.actor.driven or here is None:
+            return Status.RUNNING if self.action.continuous else Status.SUCCESS
+        transition = self._transition
+        if transition.done and self.action.continuous:
+            transition.target = self._target(here) * self._way(here)
+        offset = transition.advance(self.stage.dt)
+        done = transition.done
+        standing = abs(self.actor.motion.speed) < STANDING
+        self.actor.motion.steer(Steering(offset, 0.0 if done or standing else None, slows=False))
+        return Status.SUCCESS if done and not self.action.continuous else Status.RUNNING
+
+    def _shape(self) -> model.DynamicsShape:
+        return self.action.lane_offset_action_dynamics.dynamics_shape
+
+    def _way(self, here: LaneLocation) -> int:
+        return 1 if self.stage.roads is None else self.stage.roads.driving_direction(here.road, here.lane)
+
+    def _target(self, here: LaneLocation) -> float:
+        """The offset to reach, in the direction of t [m]."""
+        target = self.action.lane_offset_target
+        if target.absolute_target_lane_offset is not None:
+            return target.absolute_target_lane_offset.value
+        assert target.relative_target_lane_offset is not None
+        name, roads = target.relative_target_lane_offset.entity_ref, self.stage.roads
+        other = self.stage.location(name)
+        if other is None or roads is None:
+            raise self.problem(f"counts from {name}, which is on no road")
+        found = roads.distance(here, other)
+        if found is None:
+            raise self.problem(f"counts from {name}, to which no road leads")
+        lane = roads.pose(other).h
+        left = target.relative_target_lane_offset.value * (1 if math.cos(lane - self.stage.pose(name).h) >= 0.0 else -1)
+        return here.offset + (found[1] + left) * self._way(here)
+
+    def describe(self) -> str:
+        """Target and shape."""
+        target = self.action.lane_offset_target
+        if target.absolute_target_lane_offset is not None:
+            where = f"{target.absolute_target_lane_offset.value:g} m"
+        else:
+            assert target.relative_target_lane_offset is not None
+            relative = target.relative_target_lane_offset
+            where = f"{relative.value:g} m beside {relative.entity_ref}"
+        held = ", kept up" if self.action.continuous else ""
+        return f"offset from the lane's centre to {where}, {self._shape().value}{held}"

@@ -1,0 +1,105 @@
+"""LongitudinalDistanceAction: keep a distance or a time gap to an entity."""
+
+from __future__ import annotations
+
+import math
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Domain, distance, frame_of, model
+
+STIFFNESS = 0.4
+"""Of the spring between actual and wanted distance, per m/s² of the largest acceleration [1/m]."""
+REACHED = 0.1
+"""So near to the wanted distance an action that is not continuous ends [m]."""
+
+
+class LongitudinalDistanceAction(ActionBehaviour):
+    """Keeps `distance` metres, or `timeGap` seconds of the other's speed, behind or ahead of an entity.
+
+    Without limits of acceleration the actor is moved to the wanted distance at once and takes the other's speed. With
+    limits it follows like a critically damped spring whose stiffness goes with the limit, within the limits of
+    speed, acceleration and its rate. The standard leaves the course of the distance open.
+    """
+
+    domains = Domain.LONGITUDINAL
+    action: model.LongitudinalDistanceAction
+
+    def initialise(self) -> None:
+        """Begin without acceleration; decide on which side of the other to be."""
+        self._acceleration = 0.0
+        self._first = True
+        displacement = self.action.displacement
+        self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
+        if displacement is model.LongitudinalDisplacement.ANY:
+            self._side = -1.0 if self._gap() < 0.0 else 1.0
+
+    def update(self) -> Status:
+        """The speed for the step."""
+        if self.action.entity_ref not in self.stage.view or self.actor.driven:
+            return Status.RUNNING if self.action.continuous else Status.SUCCESS
+        error = self._gap() - self._wanted()
+        if math.isnan(error):
+            return Status.RUNNING
+        self._move(error)
+        return Status.SUCCESS if not self.action.continuous and abs(error) < REACHED else Status.RUNNING
+
+    def _move(self, error: float) -> None:
+        limits, motion = self.action.dynamic_constraints, self.actor.motion
+        faster = _or_infinite(limits.max_acceleration if limits is not None else None)
+        slower = _or_infinite(limits.max_deceleration if limits is not None else None)
+        other = self.stage.speed(self.action.entity_ref)
+        if math.isinf(faster) and math.isinf(slower):
+            motion.shift(error)
+            motion.speed = other
+            return
+        assert limits is not None
+        wanted = self._spring(error, motion.speed - other, faster if error < 0.0 else slower)
+        wanted = min(max(wanted, -slower), faster)
+        dt = 0.0 if self._first else self.stage.dt
+        self._first = False
+        if wanted < min(self._acceleration, 0.0):
+            wanted = max(
+                wanted,
+                self._acceleration - _or_infinite(limits.max_deceleration_rate) * dt if dt else self._acceleration,
+            )
+        elif wanted > max(self._acceleration, 0.0):
+            wanted = min(
+                wanted,
+                self._acceleration + _or_infinite(limits.max_acceleration_rate) * dt if dt else self._acceleration,
+            )
+        self._acceleration = wanted
+        top = _or_infinite(limits.max_speed)
+        motion.speed = min(max(motion.speed + wanted * dt, -top), top)
+
+    @staticmethod
+    def _spring(error: float, faster_by: float, limit: float) -> float:
+        stiffness = STIFFNESS * (limit if math.isfinite(limit) else 10.0)
+        return stiffness * error - 2.0 * math.sqrt(stiffness) * faster_by
+
+    def _gap(self) -> float:
+        return distance(
+            self.stage,
+            self.actor.name,
+            self.action.entity_ref,
+            frame=frame_of(self.action.coordinate_system),
+            kind="longitudinal",
+            freespace=self.action.freespace,
+        )
+
+    def _wanted(self) -> float:
+        if self.action.time_gap is not None:
+            return self._side * self.action.time_gap * abs(self.stage.speed(self.action.entity_ref))
+        return self._side * (self.action.distance or 0.0)
+
+    def describe(self) -> str:
+        """Distance, and to whom."""
+        gap = (
+            f"{self.action.time_gap:g} s" if self.action.time_gap is not None else f"{self.action.distance or 0.0:g} m"
+        )
+        held = "keep" if self.action.continuous else "reach"
+        return f"{held} {gap} to {self.action.entity_ref}"
+
+
+def _or_infinite(value: float | None) -> float:
+    return math.inf if value is None else value

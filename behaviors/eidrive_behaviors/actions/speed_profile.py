@@ -1,0 +1,156 @@
+"""SpeedProfileAction: a series of speeds over time."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import ActionBehaviour, Domain, Goal, model
+
+TINY = 1e-6
+
+
+@dataclass(frozen=True)
+class Piece:
+    """From `time` [s] on: speed [m/s], its slope [m/s²] and the slope's slope [m/s³]."""
+
+    time: float
+    speed: float
+    slope: float
+    bend: float = 0.0
+
+    def at(self, time: float) -> float:
+        """The speed at a time."""
+        t = time - self.time
+        return self.speed + self.slope * t + 0.5 * self.bend * t * t
+
+
+class SpeedProfileAction(ActionBehaviour):
+    """Drives through the entries' speeds, each reached after its `time` or as fast as the limits allow.
+
+    In the following mode `position` speeds go in straight lines from entry to entry. In `follow` the acceleration
+    starts at zero and changes no faster than its rate limits: corners of the profile become parabolas about them. A
+    profile whose corners lie too close for that is driven in straight lines. With an entity, speeds are relative to
+    the speed that it has at the start.
+    """
+
+    domains = Domain.LONGITUDINAL
+    action: model.SpeedProfileAction
+
+    def initialise(self) -> None:
+        """Lay the profile out from the present speed."""
+        start = self.actor.motion.speed
+        corners = self._corners(start)
+        self._pieces = straight(corners)
+        limits = self.action.dynamic_constraints
+        if self.action.following_mode is model.FollowingMode.FOLLOW and limits is not None:
+            up, down = limits.max_acceleration_rate, limits.max_deceleration_rate
+            if up is not None and down is not None and up > 0.0 and down > 0.0:
+                self._pieces = rounded(corners, up, down) or self._pieces
+        self._elapsed = 0.0
+
+    def update(self) -> Status:
+        """The speed at the end of the step."""
+        self._elapsed += self.stage.dt
+        index = max(0, bisect_right([piece.time for piece in self._pieces], self._elapsed + TINY) - 1)
+        done = index == len(self._pieces) - 1
+        speed = self._pieces[-1].speed if done else self._pieces[index].at(self._elapsed)
+        if self.actor.driven:
+            goal = self.actor.goal
+            self.actor.goal = Goal(speed, None if goal is None else goal.waypoints)
+        else:
+            self.actor.motion.speed = speed
+        return Status.SUCCESS if done else Status.RUNNING
+
+    def _corners(self, start: float) -> list[tuple[float, float]]:
+        """Times [s] and speeds [m/s] of the profile's corners, the present one first."""
+        name = self.action.entity_ref
+        if name is None and self.action.entity_ref_element is not None:
+            name = self.action.entity_ref_element.entity_ref
+        base = self.stage.speed(name) if name is not None else 0.0
+        limits = self.action.dynamic_constraints
+        corners = [(0.0, start)]
+        for number, entry in enumerate(self.action.speed_profile_entry):
+            time, speed = corners[-1]
+            target = entry.speed + base
+            span = entry.time
+            if span is None:
+                limit = None
+                if limits is not None:
+                    limit = limits.max_acceleration if target > speed else limits.max_deceleration
+                if limit is None:
+                    limit = self.actor.limits()[1 if target > speed else 2]
+                span = abs(target - speed) / limit if math.isfinite(limit) and limit > 0.0 else 0.0
+            if span > TINY:
+                corners.append((time + span, target))
+            elif number > 0 or self.action.following_mode is model.FollowingMode.POSITION:
+                corners[-1] = (time, target)
+        return corners
+
+    def describe(self) -> str:
+        """Its speeds."""
+        return f"speeds {', '.join(f'{entry.speed:g}' for entry in self.action.speed_profile_entry)} m/s in turn"
+
+
+def straight(corners: list[tuple[float, float]]) -> list[Piece]:
+    """Straight lines from corner to corner, constant after the last."""
+    pieces = []
+    for (time, speed), (later, after) in zip(corners, corners[1:], strict=False):
+        pieces.append(Piece(time, speed, (after - speed) / (later - time)))
+    return [*pieces, Piece(corners[-1][0], corners[-1][1], 0.0)]
+
+
+def rounded(corners: list[tuple[float, float]], up: float, down: float) -> list[Piece] | None:
+    """The profile with parabolas at its corners, slopes changing at `up` and `down` [m/s³]; None where they overlap."""
+    if len(corners) < 2:
+        return straight(corners)
+    if len(corners) == 2:
+        return _swung(corners[0], corners[1], up, down)
+    lines = straight(corners)
+    pieces: list[Piece] = []
+    time, speed, slope = 0.0, corners[0][1], 0.0
+    for number, line in enumerate(lines):
+        bend = up if line.slope > slope else -down
+        span = (line.slope - slope) / bend
+        if number == 0:
+            start = time
+        else:
+            gap = line.slope - slope
+            meet = time if abs(gap) < TINY else time + (speed - line.at(time)) / gap
+            start = meet - 0.5 * span
+        if start < time - TINY:
+            return None
+        speed += slope * (start - time)
+        pieces.append(Piece(start, speed, slope, bend))
+        speed += slope * span + 0.5 * bend * span * span
+        time, slope = start + span, line.slope
+        pieces.append(Piece(time, speed, slope))
+    return pieces
+
+
+def _swung(first: tuple[float, float], last: tuple[float, float], up: float, down: float) -> list[Piece]:
+    """One change of speed that begins and ends without acceleration, in the given time or, if too short, the least.
+
+    With slopes that change at j1 at the start and j2 at the end and a stretch of constant slope a between, the change
+    is a (T - a/2 (1/j1 + 1/j2)).
+    """
+    change, span = last[1] - first[1], last[0] - first[0]
+    sign = math.copysign(1.0, change)
+    start, end = (up, down) if change > 0.0 else (down, up)
+    inverse = 0.5 * (1.0 / start + 1.0 / end)
+    room = span * span - 4.0 * inverse * abs(change)
+    slope = (span - math.sqrt(room)) / (2.0 * inverse) if room > 0.0 else math.sqrt(abs(change) / inverse)
+    if room <= 0.0:
+        span = slope * 2.0 * inverse
+    t1, t2 = slope / start, span - slope / end
+    v1 = first[1] + sign * 0.5 * start * t1 * t1
+    v2 = v1 + sign * slope * (t2 - t1)
+    return [
+        Piece(0.0, first[1], 0.0, sign * start),
+        Piece(t1, v1, sign * slope),
+        Piece(t2, v2, sign * slope, -sign * end),
+        Piece(span, last[1], 0.0),
+    ]

@@ -1,0 +1,157 @@
+"""SynchronizeAction: arrive when another entity arrives."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+from py_trees.common import Status
+
+from eidrive_scenario.api import Absent, ActionBehaviour, Domain, Place, model, resolve
+
+TINY = 1e-6
+ON_LINE = 0.1
+"""So near to the speed of the straight last phase the first phase is over [m/s]."""
+HARD = 8.0
+"""Deceleration where there is too little way for anything softer [m/s²]."""
+
+
+class Phase(Enum):
+    """Where the manoeuvre stands."""
+
+    SWING = "swing"
+    LAST = "last"
+    WAIT = "wait"
+    BRAKE = "brake"
+    STEADY = "steady"
+
+
+class SynchronizeAction(ActionBehaviour):
+    """Chooses the speed so that the actor is at its target when the master is at the master's target.
+
+    With a final speed v1, the way s and the master's time t there are two phases of equal and opposite acceleration a:
+    a² t²/2 + a ((v0 + v1) t - 2 s) - (v1 - v0)²/2 = 0, newly solved in each step as the master's arrival changes; in
+    the last phase the speed lies on the line that ends in v1. Where the middle speed would be negative the actor stops
+    and waits. Without a final speed the acceleration is constant. A steady state at the end shortens way and time.
+    """
+
+    domains = Domain.LONGITUDINAL
+    action: model.SynchronizeAction
+
+    def initialise(self) -> None:
+        """Begin with the first phase."""
+        self._phase = Phase.SWING
+        self._rising: bool | None = None
+        self._last = (math.inf, math.inf)
+
+    def update(self) -> Status:
+        """The speed for the step."""
+        motion, dt = self.actor.motion, self.stage.dt
+        try:
+            way = self._way(self.actor.name, self.action.target_position)
+            master_way = self._way(self.action.master_entity_ref, self.action.target_position_master)
+        except Absent:
+            return Status.RUNNING
+        mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
+        passed = way > self._last[0] or master_way > self._last[1]
+        self._last = (way, master_way)
+        speed = self.stage.speed(self.action.master_entity_ref)
+        time = max(master_way - theirs, TINY) / speed if speed > TINY else math.inf
+        final = self._final_speed()
+        if way < mine + TINY or master_way < theirs + TINY or passed or time < dt:
+            if final is not None:
+                motion.speed = final
+            return Status.SUCCESS
+        way = max(way - mine, TINY)
+        if final is None:
+            if math.isfinite(time):
+                motion.speed += 2.0 * (way / time - motion.speed) / time * dt
+        else:
+            motion.speed = self._next(way, time, final, dt)
+        return Status.RUNNING
+
+    def _next(self, way: float, time: float, final: float, dt: float) -> float:
+        speed = self.actor.motion.speed
+        steady = self._steady_way(final)
+        if steady > 0.0 and final > TINY:
+            if way - steady < TINY or time - steady / final < TINY:
+                self._phase = Phase.STEADY
+            way, time = way - steady, time - steady / final
+        if self._phase is Phase.STEADY:
+            return final
+        if math.isinf(time):
+            return max(0.0, speed - HARD * dt) if self._phase is not Phase.SWING else speed
+        if self._phase is Phase.BRAKE:
+            after = max(0.0, speed - HARD * dt)
+            if after == 0.0:
+                self._phase = Phase.SWING
+            return after
+        if self._phase is Phase.WAIT:
+            if final < TINY or time >= 2.0 * way / final:
+                return 0.0
+            self._phase = Phase.LAST
+        on_line = 2.0 * way / time - final
+        if self._phase is Phase.LAST:
+            return max(0.0, on_line)
+        if abs(speed - on_line) < ON_LINE:
+            self._phase = Phase.LAST
+            return speed
+        return self._swing(way, time, speed, final, dt)
+
+    def _swing(self, way: float, time: float, speed: float, final: float, dt: float) -> float:
+        b, change = (speed + final) * time - 2.0 * way, final - speed
+        root = math.sqrt(b * b + time * time * change * change)
+        acceleration = (-b + root if b < 0.0 else -b - root) / (time * time)
+        if self._rising is None:
+            self._rising = acceleration > 0.0
+        elif self._rising != (acceleration > 0.0):
+            self._phase = Phase.LAST
+            return speed
+        if 0.5 * (speed + final + acceleration * time) < 0.0:
+            stop = 2.0 * speed * way / (speed * speed + final * final) if speed > TINY else 0.0
+            if stop * speed > way:
+                self._phase = Phase.BRAKE
+                return max(0.0, speed - HARD * dt)
+            acceleration = -speed / stop if stop > TINY else 0.0
+            if speed + acceleration * dt <= TINY:
+                self._phase = Phase.WAIT
+                return 0.0
+        return speed + acceleration * dt
+
+    def _way(self, name: str, position: model.Position) -> float:
+        place: Place = resolve(position, self.stage, name)
+        here = self.stage.pose(name)
+        straight = math.hypot(place.pose.x - here.x, place.pose.y - here.y)
+        roads = self.stage.roads
+        start = self.stage.location(name)
+        if roads is None or start is None or place.location is None:
+            return straight
+        found = roads.distance(start, place.location)
+        return straight if found is None else abs(found[0])
+
+    def _final_speed(self) -> float | None:
+        final = self.action.final_speed
+        if final is None:
+            return None
+        if final.absolute_speed is not None:
+            return final.absolute_speed.value
+        assert final.relative_speed_to_master is not None
+        relative, master = final.relative_speed_to_master, self.stage.speed(self.action.master_entity_ref)
+        factor = relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
+        return master * relative.value if factor else master + relative.value
+
+    def _steady_way(self, final: float) -> float:
+        """The stretch at the end that is driven at the final speed [m]."""
+        speed = self.action.final_speed
+        if speed is None:
+            return 0.0
+        of = speed.absolute_speed or speed.relative_speed_to_master
+        if of is None:
+            return 0.0
+        if of.target_distance_steady_state is not None:
+            return of.target_distance_steady_state.distance
+        return of.target_time_steady_state.time * final if of.target_time_steady_state is not None else 0.0
+
+    def describe(self) -> str:
+        """With whom."""
+        return f"arrive together with {self.action.master_entity_ref}"

@@ -1,0 +1,72 @@
+"""RelativeClearanceCondition: nobody in the lanes around."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, distance, facing, model
+
+
+class RelativeClearanceCondition(EntityCondition):
+    """No (named) entity is within a stretch ahead and behind, in a range of lanes counted from the own one to the left.
+
+    The range must exist: an entity beside which there is no such lane has no clearance there. Lanes of oncoming traffic
+    count only with `oppositeLanes`.
+    """
+
+    element: model.RelativeClearanceCondition
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Look for anybody in the area."""
+        here = stage.location(entity)
+        if here is None or stage.roads is None:
+            return False
+        return self._exists(stage, entity, here) and not self._within(stage, entity, here)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """Who is in the area."""
+        here = stage.location(entity)
+        found = self._within(stage, entity, here) if here is not None else []
+        return f"{entity}: {', '.join(found)} within its clearance" if found else f"{entity}: clear around"
+
+    def describe_for(self) -> str:
+        """The stretch."""
+        return f"clear {self.element.distance_forward or 0.0:g} m ahead, {self.element.distance_backward or 0.0:g} m behind"
+
+    def _within(self, stage: Stage, entity: str, here: LaneLocation) -> list[str]:
+        names = [ref.entity_ref for ref in self.element.entity_ref] or list(stage.view.names)
+        return [
+            name for name in names if name != entity and name in stage.view and self._blocks(stage, entity, here, name)
+        ]
+
+    def _blocks(self, stage: Stage, entity: str, here: LaneLocation, name: str) -> bool:
+        there = stage.location(name)
+        if there is None:
+            return False
+        gap = distance(stage, entity, name, frame="road", kind="longitudinal", freespace=self.element.free_space)
+        ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
+        if math.isnan(gap) or not -behind <= gap <= ahead:
+            return False
+        return self._in_range(stage, entity, here, there)
+
+    def _exists(self, stage: Stage, entity: str, here: LaneLocation) -> bool:
+        assert stage.roads is not None
+        lanes = stage.roads.lane_ids(here.road, here.s, drivable=True)
+        return any(self._in_range(stage, entity, here, here._replace(lane=lane)) for lane in lanes)
+
+    def _in_range(self, stage: Stage, entity: str, here: LaneLocation, there: LaneLocation) -> bool:
+        assert stage.roads is not None
+        way = stage.roads.driving_direction(here.road, here.lane)
+        other = stage.roads.driving_direction(there.road, there.lane)
+        same = (there.lane > 0) == (here.lane > 0) if there.road == here.road else way == other
+        if not same and not self.element.opposite_lanes:
+            return False
+        steps = there.lane - here.lane
+        if (there.lane > 0) != (here.lane > 0):
+            steps -= 1 if steps > 0 else -1
+        left = steps * way * facing(stage, entity, here)
+        ranges = self.element.relative_lane_range
+        return not ranges or any(
+            (bounds.from_ is None or left >= bounds.from_) and (bounds.to is None or left <= bounds.to)
+            for bounds in ranges
+        )

@@ -1,0 +1,110 @@
+"""Conditions on parameters, variables, traffic signals and values from outside."""
+
+from __future__ import annotations
+
+from eidrive_scenario.api import Condition, Stage, compares, in_words, model
+
+WORDS = {"true": 1.0, "false": 0.0}
+
+
+def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
+    """Two texts by a rule: as numbers where both are, else as words in the order of the alphabet."""
+    if text is None:
+        return False
+    first, second = _number(text), _number(limit)
+    if first is not None and second is not None:
+        return compares(first, rule, second)
+    match rule.value:
+        case "equalTo":
+            return text == limit
+        case "notEqualTo":
+            return text != limit
+        case "greaterThan":
+            return text > limit
+        case "lessThan":
+            return text < limit
+        case "greaterOrEqual":
+            return text >= limit
+    return text <= limit
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return WORDS.get(text.strip().lower())
+
+
+class ParameterCondition(Condition):
+    """The value of a parameter, as ParameterActions may have set it."""
+
+    element: model.ParameterCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare it."""
+        return agrees(stage.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+
+    def explain(self, stage: Stage) -> str:
+        """Its value."""
+        value = stage.parameters.get(self.element.parameter_ref)
+        return f"parameter {self.element.parameter_ref} = {value} {in_words(self.element.rule)} {self.element.value}"
+
+    def describe(self) -> str:
+        """Rule and limit."""
+        return f"parameter {self.element.parameter_ref} {in_words(self.element.rule)} {self.element.value}"
+
+
+class VariableCondition(Condition):
+    """The value of a variable."""
+
+    element: model.VariableCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare it."""
+        return agrees(stage.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+
+    def explain(self, stage: Stage) -> str:
+        """Its value."""
+        value = stage.variables.get(self.element.variable_ref)
+        return f"variable {self.element.variable_ref} = {value} {in_words(self.element.rule)} {self.element.value}"
+
+    def describe(self) -> str:
+        """Rule and limit."""
+        return f"variable {self.element.variable_ref} {in_words(self.element.rule)} {self.element.value}"
+
+
+class UserDefinedValueCondition(Condition):
+    """A value that somebody outside of the scenario gives; where nobody does it does not hold."""
+
+    element: model.UserDefinedValueCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare it."""
+        return agrees(stage.user_values(self.element.name), self.element.rule, self.element.value)
+
+    def explain(self, stage: Stage) -> str:
+        """Its value."""
+        value = stage.user_values(self.element.name)
+        return f"{self.element.name} = {value} {in_words(self.element.rule)} {self.element.value}"
+
+    def describe(self) -> str:
+        """Rule and limit."""
+        return f"{self.element.name} {in_words(self.element.rule)} {self.element.value}"
+
+
+class TrafficSignalCondition(Condition):
+    """A signal shows a state."""
+
+    element: model.TrafficSignalCondition
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare its state."""
+        return stage.signals.get(self.element.name) == self.element.state
+
+    def explain(self, stage: Stage) -> str:
+        """Its state."""
+        return f"signal {self.element.name} shows {stage.signals.get(self.element.name)}"
+
+    def describe(self) -> str:
+        """The state."""
+        return f"signal {self.element.name} shows {self.element.state}"
