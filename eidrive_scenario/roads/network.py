@@ -14,7 +14,7 @@ from eidrive_scenario.roads import poses
 from eidrive_scenario.roads.distance import RoadDistances
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
 from eidrive_scenario.roads.links import LaneLinks
-from eidrive_scenario.roads.location import Array, LaneKey, LaneLocation, LaneLocations, Pose, Poses
+from eidrive_scenario.roads.location import Array, Integers, LaneKey, LaneLocation, LaneLocations, Pose, Poses
 from eidrive_scenario.roads.locator import REACH, Locator
 from eidrive_scenario.roads.model import (
     Header,
@@ -127,6 +127,13 @@ class RoadNetwork:
         px, py = np.atleast_1d(np.asarray(x, dtype=np.float64)), np.atleast_1d(np.asarray(y, dtype=np.float64))
         pz = None if z is None else np.atleast_1d(np.asarray(z, dtype=np.float64))
         return self._locator.locate(px, py, pz, reach)
+
+    def touched(self, x: Array, y: Array, z: Array | None = None) -> tuple[Integers, Array, Integers]:
+        """Every lane that lies beneath points (N,): lane rows of `tables`, s on their roads, and whose point it is.
+
+        Outside junctions that is one lane at most; in a junction, one for each connecting road beneath the point.
+        """
+        return self._locator.touched(x, y, z)
 
     def locate_at(
         self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH

@@ -1,0 +1,94 @@
+"""Who may enter a junction: first come, first served, one at a time on lanes that meet.
+
+The first car of a queue asks for its passage, all of its lanes through the junction, when it comes within its braking
+distance, provided that there is room behind the junction. It gets them once nobody holds a lane that crosses, joins or
+begins with one of them. Who holds a lane keeps it until it has left it, and against lanes that only begin together
+until it has cleared the fork.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from eidrive_scenario.traffic.lanes import Array, TrafficLanes
+
+CLEARANCE = 2.6
+"""Two lanes meet where their centre lines come closer than this: a car's width and some air [m]."""
+FORK = 9.0
+"""From here on two lanes that begin together lie apart [m]."""
+SAMPLE = 0.75
+
+
+class Crossings:
+    """Which lanes through junctions meet, and who holds them."""
+
+    def __init__(self, lanes: TrafficLanes) -> None:
+        self._lanes = lanes
+        self._meeting: dict[int, dict[int, bool]] = {}
+        self._lines: dict[int, Array] = {}
+        self._by_junction: dict[str, list[int]] = {}
+        for row, key in enumerate(lanes.keys):
+            junction = lanes.roads.roads[key.road].junction_id
+            if junction is not None and lanes.tables.lane_drivable[row]:
+                self._by_junction.setdefault(junction, []).append(row)
+        self.holders: dict[int, dict[str, float]] = {}
+        """For each lane in a junction, who holds it and how far its rear has come on it [m]."""
+
+    def junction_lanes(self, row: int) -> list[int]:
+        """All lanes of the junction in which a lane lies."""
+        junction = self._lanes.roads.roads[self._lanes.keys[row].road].junction_id
+        return [] if junction is None else self._by_junction.get(junction, [])
+
+    def meeting(self, row: int) -> dict[int, bool]:
+        """The lanes that a lane through a junction meets; True where they only begin together."""
+        known = self._meeting.get(row)
+        if known is not None:
+            return known
+        found: dict[int, bool] = {}
+        mine = self._line(row)
+        tree = cKDTree(mine)
+        for other in self.junction_lanes(row):
+            if self._lanes.road[other] == self._lanes.road[row]:
+                continue
+            line = self._line(other)
+            near = np.flatnonzero(tree.query(line)[0] < CLEARANCE)
+            if near.size:
+                together = np.hypot(*(line[0] - mine[0])) < 1.0
+                found[other] = bool(together and near.max() * SAMPLE < 2.0 * FORK)
+        self._meeting[row] = found
+        return found
+
+    def _line(self, row: int) -> Array:
+        known = self._lines.get(row)
+        if known is not None:
+            return known
+        count = max(int(self._lanes.length[row] / SAMPLE), 1) + 1
+        rows = np.full(count, row)
+        s = self._lanes.s(rows, np.linspace(0.0, self._lanes.length[row], count))
+        poses = self._lanes.tables.lane_poses(rows, s, np.zeros(count))
+        line = self._lines[row] = np.column_stack([poses.x, poses.y])
+        return line
+
+    def free(self, row: int, name: str, blocked: set[int]) -> bool:
+        """True where `name` may have a lane: nobody holds, and nothing stands on, a lane that it meets."""
+        for other, only_fork in self.meeting(row).items():
+            if other in blocked:
+                return False
+            for holder, rear in self.holders.get(other, {}).items():
+                if holder != name and not (only_fork and rear > FORK):
+                    return False
+        return True
+
+    def take(self, row: int, name: str) -> None:
+        """`name` holds a lane from now on."""
+        self.holders.setdefault(row, {})[name] = -np.inf
+
+    def release(self, name: str, row: int) -> None:
+        """`name` has left a lane."""
+        self.holders.get(row, {}).pop(name, None)
+
+    def forget(self, name: str) -> None:
+        """`name` holds nothing any more."""
+        for held in self.holders.values():
+            held.pop(name, None)
