@@ -43,7 +43,7 @@ WRAPPERS = (
 """Types that only wrap the actions below them."""
 
 CRITERION = "criteria_"
-"""Conditions of this name in the storyboard's stop trigger are criteria, as ScenarioRunner has them, and stop nothing."""
+"""Conditions with such names in the storyboard's stop trigger are criteria, as ScenarioRunner has them."""
 
 Place = tuple[str, ...]
 
@@ -188,7 +188,7 @@ class Builder:
             self._problems.append(
                 Problem(
                     f"{name} is not evaluated yet",
-                    f"use another condition, or install a package that registers it; {suggestion(name, self._conditions)}",
+                    f"use another one, or install a package that registers it; {suggestion(name, self._conditions)}",
                     leaf.source,
                     leaf.line,
                 )

@@ -52,7 +52,7 @@ class Condition(ABC):
     def __init__(self, element: model.Element) -> None:
         self.element = element
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, stage: Stage) -> None:  # noqa: B027 - most refer to nothing
         """Look up what the element refers to, once, before the first tick. Raises ScenarioError."""
 
     @abstractmethod

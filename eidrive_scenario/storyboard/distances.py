@@ -1,4 +1,4 @@
-"""Distances between entities, and from entities to positions, as conditions and actions of the standard measure them."""
+"""Distances between entities and to positions, as conditions and actions of the standard measure them."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def kind_of(kind: model.RelativeDistanceType | None) -> str:
     """longitudinal, lateral or euclidianDistance, which is what a missing word means."""
     if kind is None or kind is model.RelativeDistanceType.CARTESIAN_DISTANCE:
         return "euclidianDistance"
-    return kind.value
+    return str(kind.value)
 
 
 def frame_of(system: model.CoordinateSystem | None) -> str:
     """entity (also where none is said), lane, road, trajectory or world."""
-    return "entity" if system is None else system.value
+    return "entity" if system is None else str(system.value)
 
 
 def distance(stage: Stage, a: str, b: str | Place, *, frame: str, kind: str, freespace: bool) -> float:

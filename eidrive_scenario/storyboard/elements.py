@@ -108,7 +108,7 @@ class StoryElement(Composite):
         yield self
 
     def settle(self) -> None:
-        """End if all children are complete; what has no children has no end of its own, and runs until it is stopped."""
+        """End if all children are complete; what has none has no end of its own, and runs until it is stopped."""
         if (
             self.state is State.RUNNING
             and self.elements
@@ -295,6 +295,7 @@ class InitBlock(Composite):
     def __init__(self, stage: Stage, behaviours: Sequence[ActionBehaviour]) -> None:
         super().__init__("Init", list(behaviours))
         self.stage = stage
+        self.actions = tuple(behaviours)
         self.running: list[ActionBehaviour] = list(behaviours)
 
     def start(self) -> None:

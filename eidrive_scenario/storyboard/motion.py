@@ -133,7 +133,8 @@ class Motion:
         return Placement(x, y, z, h, p, r, self.speed, True)
 
     def _along_lane(self, distance: float, steering: Steering | None) -> None:
-        assert self.roads is not None and self.location is not None
+        assert self.roads is not None
+        assert self.location is not None
         here, left = self.location, 0.0
         way = self.roads.driving_direction(here.road, here.lane)
         if steering is not None:

@@ -1,4 +1,4 @@
-"""Trajectories laid out in the world: any shape of the standard as a curve by arc length, with times where it has them."""
+"""Trajectories in the world: any shape of the standard as a curve by arc length, with times where it has them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
@@ -56,7 +57,7 @@ class Layout:
         return self._blend(index, share)
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
-        """Arc length at a time [m]: between two points at constant speed, or at the acceleration that `speeds` imply."""
+        """Arc length at a time [m]: between two points at constant speed, or as the `speeds` at the points ask."""
         if self.times is None:
             return 0.0
         index, share = self._between(self.times, time)
@@ -159,7 +160,9 @@ def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
 
 
 def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve) -> Layout:
-    s, poses, clock = [0.0], [], []
+    s: list[float] = [0.0]
+    poses: list[Pose] = []
+    clock: list[float] = []
     here: Pose | None = None
     segments = shape.clothoid_spline_segment
     for index, segment in enumerate(segments):
@@ -201,9 +204,11 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     control = [(resolve(p.position), p.weight if p.weight is not None else 1.0, p.time) for p in shape.control_point]
     degree = shape.order - 1
     low, high = knots[degree], knots[len(control)]
-    rough = sum(math.hypot(b[0].x - a[0].x, b[0].y - a[0].y) for a, b in zip(control[:-1], control[1:], strict=True))
+    rough = sum(math.hypot(b[0].x - a[0].x, b[0].y - a[0].y) for a, b in pairwise(control))
     count = max(2, math.ceil(rough / SPACING))
-    s, points, clock = [0.0], [], []
+    s: list[float] = [0.0]
+    points: list[tuple[float, float, float]] = []
+    clock: list[float] = []
     for number in range(count + 1):
         u = low + (high - low) * number / count
         weights = _basis(u, degree, knots, len(control))

@@ -249,7 +249,8 @@ def main(names: list[str]) -> None:
         speed = found.run.cpu / max(found.run.ticks, 1) * 1e6
         sys.stdout.write(
             f"{name:62s} {'ok ' if good else '   '} rms {found.rms:8.3f} m  events {found.events:7.3f} s  "
-            f"missing {len(found.missing)}  {found.run.ended or 'goes on'} at {found.run.seconds:.2f}, {speed:.0f} us a tick\n"
+            f"missing {len(found.missing)}  {found.run.ended or 'goes on'} at {found.run.seconds:.2f}, "
+            f"{speed:.0f} us a tick\n"
         )
         if names:
             for actor, (rms, worst) in found.position.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from py_trees.common import Status
@@ -130,14 +131,14 @@ class LaneChangeAction(ActionBehaviour):
         if here.lane == self._lane and abs(here.offset - target) < NEAR:
             return Status.SUCCESS
         lane: LaneLocation | None = self._roads.location(here.road, self._lane, here.s, target)
-        points = []
+        points: list[tuple[float, float, float]] = []
         while lane is not None and 5.0 * len(points) < LOOKOUT:
             lane = self._roads.advance(lane, 5.0, route=self.actor.motion.route)
             if lane is not None:
                 points.append(self._roads.pose(lane)[:3])
         if points:
             goal = self.actor.goal
-            self.actor.goal = Goal(None if goal is None else goal.speed, np.array(points))
+            self.actor.goal = replace(goal or Goal(), path=np.array(points))
         return Status.RUNNING
 
     def describe(self) -> str:

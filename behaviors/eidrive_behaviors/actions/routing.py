@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from py_trees.common import Status
 
@@ -61,7 +63,7 @@ class AcquirePositionAction(ActionBehaviour):
             follow(self, self.stage.roads.route(here, place.location))
         elif self.actor.driven:
             goal = self.actor.goal
-            self.actor.goal = Goal(None if goal is None else goal.speed, waypoints=np.array([place.pose[:3]]))
+            self.actor.goal = replace(goal or Goal(), path=None, waypoints=np.array([place.pose[:3]]))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -74,4 +76,4 @@ def follow(behaviour: ActionBehaviour, route: Route) -> None:
     actor = behaviour.actor
     actor.motion.route = route
     if actor.driven:
-        actor.goal = Goal(None if actor.goal is None else actor.goal.speed, route.polyline(2.0))
+        actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0))

@@ -41,7 +41,7 @@ class SpeedAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Lay the transition from the present speed."""
-        top, faster, slower = self.actor.limits()
+        _, faster, slower = self.actor.limits()
         start, target = self._present(), self._target()
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
@@ -57,17 +57,24 @@ class SpeedAction(ActionBehaviour):
         transition = self._transition
         if self._relative is not None:
             transition.target = self._target()
+        if self.actor.driven:
+            return self._ask_driver()
         if transition.done and transition.extent > 0.0:
             speed = self._approach(transition.target)
         else:
             speed = transition.advance(self.stage.dt)
+        self.actor.motion.speed = speed
         reached = transition.done and abs(speed - transition.target) < TINY
-        if self.actor.driven:
-            goal = self.actor.goal
-            self.actor.goal = replace(goal or Goal(), speed=speed)
-            reached = reached and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
-        else:
-            self.actor.motion.speed = speed
+        return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
+
+    def _ask_driver(self) -> Status:
+        """The speed of the transition becomes the goal, with its slope; done when the vehicle itself is as fast."""
+        transition = self._transition
+        before = transition.value
+        speed = transition.advance(self.stage.dt)
+        slope = 0.0 if transition.done or self.stage.dt == 0.0 else (speed - before) / self.stage.dt
+        self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
+        reached = transition.done and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
     def _present(self) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from py_trees.common import Status
 
@@ -59,8 +60,8 @@ class SpeedProfileAction(ActionBehaviour):
         done = index == len(self._pieces) - 1
         speed = self._pieces[-1].speed if done else self._pieces[index].at(self._elapsed)
         if self.actor.driven:
-            goal = self.actor.goal
-            self.actor.goal = Goal(speed, None if goal is None else goal.waypoints)
+            slope = 0.0 if done else self._pieces[index].slope
+            self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
         else:
             self.actor.motion.speed = speed
         return Status.SUCCESS if done else Status.RUNNING
@@ -98,7 +99,7 @@ class SpeedProfileAction(ActionBehaviour):
 def straight(corners: list[tuple[float, float]]) -> list[Piece]:
     """Straight lines from corner to corner, constant after the last."""
     pieces = []
-    for (time, speed), (later, after) in zip(corners, corners[1:], strict=False):
+    for (time, speed), (later, after) in pairwise(corners):
         pieces.append(Piece(time, speed, (after - speed) / (later - time)))
     return [*pieces, Piece(corners[-1][0], corners[-1][1], 0.0)]
 

@@ -14,7 +14,7 @@ def angle_of(stage: Stage, entity: str, kind: model.AngleType) -> float:
 
 
 def reference_of(stage: Stage, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None) -> float:
-    """The angle from which an AngleCondition counts: the lane's or road's at the entity, 0 in the world's frame [rad]."""
+    """The angle from which an AngleCondition counts: the lane's or road's at the entity, 0 in other frames [rad]."""
     if system not in (model.CoordinateSystem.LANE, model.CoordinateSystem.ROAD) or stage.roads is None:
         return 0.0
     here = stage.location(entity)

@@ -31,7 +31,8 @@ class RelativeClearanceCondition(EntityCondition):
 
     def describe_for(self) -> str:
         """The stretch."""
-        return f"clear {self.element.distance_forward or 0.0:g} m ahead, {self.element.distance_backward or 0.0:g} m behind"
+        ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
+        return f"clear {ahead:g} m ahead, {behind:g} m behind"
 
     def _within(self, stage: Stage, entity: str, here: LaneLocation) -> list[str]:
         names = [ref.entity_ref for ref in self.element.entity_ref] or list(stage.view.names)
