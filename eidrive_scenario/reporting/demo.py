@@ -72,7 +72,7 @@ def place_of(name: str, seed: int, story: Story) -> Place:
 
 def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple[CameraPicture, ...]:
     """The street at the instant in which the ego brakes, as it and its helper see it."""
-    snapshot = story.moment("braked").snapshot or story.moment("seen").snapshot
+    snapshot = story.moment("braked").snapshot or story.moment("hidden").snapshot
     if snapshot is None:
         return ()
     view, pictures = snapshot.view, []

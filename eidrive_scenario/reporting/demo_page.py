@@ -146,14 +146,14 @@ def _chart(stories: Mapping[str, Story]) -> str:
             continue
         nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centres[row]))
         lines.append(Line(arm.title, COLOURS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
-        near = next((time for time, gap in zip(story.times, story.boxes, strict=True) if gap <= HORIZON), 0.0)
-        start, end = min(start, near), max(end, story.times[nearest] + 3.0)
-    end = min(end, max((line.x[-1] for line in lines), default=1.0))
+        near = [row for row, gap in enumerate(story.boxes) if gap <= HORIZON]
+        if near:
+            start, end = min(start, story.times[near[0]]), max(end, story.times[near[-1]])
     return line_chart(
         lines,
         x_title="time [s]",
         y_title="distance between bodies [m]",
-        x_range=(start if start < end else 0.0, end),
+        x_range=(start, end) if start < end else None,
         y_range=(0.0, HORIZON),
     )
 

@@ -21,7 +21,7 @@ class Moment:
     """One decisive instant: what happened, and the picture; None where it never came to that."""
 
     kind: str
-    """seen, heard, braked or closest"""
+    """hidden, heard, braked or closest"""
     title: str
     snapshot: Snapshot | None
 
@@ -50,8 +50,13 @@ class Story:
 
 
 class KeyFrames:
-    """An observer of a run that keeps its decisive instants: who sees the hidden car first, when the ego hears of it,
-    when it brakes, and how near the two come."""
+    """An observer of a run that keeps its decisive instants.
+
+    hidden   others see the car, and the ego does not (any more)
+    heard    the ego knows the car from others alone
+    braked   the ego brakes with a deceleration that its plan asks for
+    closest  the smallest gap between the bodies, or their first touch
+    """
 
     def __init__(self, ego: str, hidden: str) -> None:
         self.ego, self.hidden = ego, hidden
@@ -85,8 +90,8 @@ class KeyFrames:
         """What was found so far."""
         moments = []
         for kind, absent in (
-            ("seen", f"nobody ever sees {self.hidden}"),
-            ("heard", f"{self.ego} never hears of {self.hidden}"),
+            ("hidden", f"{self.hidden} is never in sight of others alone"),
+            ("heard", f"{self.ego} never knows {self.hidden} from others alone"),
             ("braked", f"{self.ego} never brakes for it"),
             ("closest", "the two are never there together"),
         ):
@@ -115,22 +120,21 @@ class KeyFrames:
             self._found["closest"] = (title, snapshot)
 
     def _notice(self, frame: Frame, snapshot: Snapshot) -> None:
-        if "seen" not in self._found:
-            watchers = [name for name, step in frame.steps.items() if self._shows(step.detections)]
-            if watchers:
-                self._found["seen"] = (f"{' and '.join(watchers)} {_verb(watchers)} {self.hidden}", snapshot)
-        step = frame.steps.get(self.ego)
-        if step is None:
-            return
-        if "heard" not in self._found:
-            senders = [
-                received.message.sender
-                for received in step.inbox
-                if received.message.sender != self.ego and self._shows(received.message.detections)
-            ]
-            if senders:
-                self._found["heard"] = (f"{self.ego} hears of it from {' and '.join(senders)}", snapshot)
-        if "braked" not in self._found and step.plan is not None and step.plan.braking is not None:
+        step = snapshot.step
+        if not self._shows(snapshot.own):
+            if "hidden" not in self._found:
+                others = [name for name, at in frame.steps.items() if name != self.ego and self._shows(at.detections)]
+                if others:
+                    title = (
+                        f"{_listed(others)} {'sees' if len(others) == 1 else 'see'} {self.hidden}, {self.ego} does not"
+                    )
+                    self._found["hidden"] = (title, snapshot)
+            if "heard" not in self._found:
+                senders = [held.message.sender for held in snapshot.heard if self._shows(held.message.detections)]
+                if senders:
+                    title = f"{self.ego} knows {self.hidden} from {_listed(senders)} alone"
+                    self._found["heard"] = (title, snapshot)
+        if "braked" not in self._found and step is not None and step.plan is not None and step.plan.braking is not None:
             self._found["braked"] = (f"{self.ego} brakes", snapshot)
 
     def _shows(self, detections: Detections) -> bool:
@@ -145,5 +149,5 @@ def _portable(snapshot: Snapshot) -> Snapshot:
     return dataclasses.replace(snapshot, view=dataclasses.replace(snapshot.view))
 
 
-def _verb(names: list[str]) -> str:
-    return "sees" if len(names) == 1 else "see"
+def _listed(names: list[str]) -> str:
+    return " and ".join(names)

@@ -6,7 +6,6 @@ on the page (`roads_symbol`, then `roads_id`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -113,11 +112,7 @@ def top_view(
         parts.extend(_boxes(received.message.detections, "received", RECEIVED, 0.55))
     parts.extend(_boxes(snapshot.own, "own", OWN, 0.25))
     parts.extend(_truth(snapshot))
-    for row, name in enumerate(view.names):
-        text = names.get(name, name)
-        x, y = view.centres[row, :2]
-        if text and window.left <= x <= window.right and window.bottom <= y <= window.top:
-            parts.append(_label(window, x, y, view.boxes[row], text))
+    parts.extend(_labels(snapshot, window, {name: names.get(name, name) for name in view.names}))
     parts.append(_clock(window, snapshot.time))
     title = escape(description or f"top view at {snapshot.time:.2f} s as {snapshot.station} knows it")
     return (
@@ -182,17 +177,45 @@ def _links(snapshot: Snapshot) -> list[str]:
     return drawn
 
 
-def _label(window: Window, x: float, y: float, box: Array, text: str) -> str:
-    """Beside the vehicle, to the right of where its body ends, or to the left where the window ends."""
-    size = _text_size(window)
-    reach = abs(math.cos(box[6])) * box[3] / 2 + abs(math.sin(box[6])) * box[4] / 2 + 0.5 * size
-    to_left = x + reach + 0.6 * size * len(text) > window.right
-    anchor, place = ("end", x - reach) if to_left else ("start", x + reach)
-    return (
-        f'<text x="{place:.2f}" y="{-y + 0.35 * size:.2f}" font-size="{size:.2f}" text-anchor="{anchor}" '
-        f'fill="{STATION}" stroke="#ffffff" stroke-width="{0.22 * size:.2f}" paint-order="stroke" '
-        f'stroke-linejoin="round">{escape(text)}</text>'
-    )
+def _labels(snapshot: Snapshot, window: Window, texts: Mapping[str, str]) -> list[str]:
+    """Each beside its vehicle: to the right, left, above or below, where it first covers neither vehicle nor label."""
+    view, size = snapshot.view, _text_size(window)
+    bodies = [(*low, *high) for low, high in ((plan.min(0), plan.max(0)) for plan in footprint(view.boxes))]
+    taken: list[tuple[float, ...]] = [tuple(map(float, body)) for body in bodies]
+    drawn = []
+    for row, name in enumerate(view.names):
+        x, y = view.centres[row, :2].tolist()
+        if not texts[name] or not (window.left <= x <= window.right and window.bottom <= y <= window.top):
+            continue
+        left, bottom, right, top = taken[row]
+        half, width, gap = 0.5 * size, 0.58 * size * len(texts[name]), 0.45 * size
+        places = (
+            ("start", right + gap, y, right + gap),
+            ("end", left - gap, y, left - gap - width),
+            ("middle", x, top + gap + half, x - width / 2),
+            ("middle", x, bottom - gap - half, x - width / 2),
+        )
+        rectangles = [(start, middle - half, start + width, middle + half) for _, _, middle, start in places]
+        free = [
+            index
+            for index, rectangle in enumerate(rectangles)
+            if window.left <= rectangle[0] and rectangle[2] <= window.right
+            if not any(_overlap(rectangle, other) for other in taken)
+        ]
+        best = free[0] if free else 0
+        taken.append(rectangles[best])
+        anchor, at, middle, _ = places[best]
+        drawn.append(
+            f'<text x="{at:.2f}" y="{-middle + 0.35 * size:.2f}" font-size="{size:.2f}" text-anchor="{anchor}" '
+            f'fill="{STATION}" stroke="#ffffff" stroke-width="{0.22 * size:.2f}" paint-order="stroke" '
+            f'stroke-linejoin="round">{escape(texts[name])}</text>'
+        )
+    return drawn
+
+
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two rectangles (left, bottom, right, top) share an area."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _clock(window: Window, time: float) -> str:

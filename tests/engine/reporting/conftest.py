@@ -93,7 +93,9 @@ def play(delay: int | None, lost: frozenset[int] = frozenset()) -> list[Frame]:
                         200,
                     ),
                 )
-        plan = Plan(np.empty((0, 2)), np.empty(0), "conflict area" if known else "route", 5.0 if known else None)
+        plan = Plan(
+            np.empty((0, 2)), np.empty(0), "conflict area" if known else "route", braking=5.0 if known else None
+        )
         steps = {
             "Ego": AgentStep(by_ego, inbox, by_ego, plan, Control(brake=0.5 if known else 0.0), ()),
             "RSU": AgentStep(by_rsu, (), by_rsu, None, None, (said[tick],)),

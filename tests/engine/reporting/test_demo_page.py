@@ -66,12 +66,14 @@ def test_every_arm_has_four_pictures_or_says_why_not(page: str) -> None:
     assert len(strips) == len(SCENARIOS) * len(RULES) * len(ARMS)
     assert all(len(strip.findall("figure")) == 4 for strip in strips)
     silent = [figure.text_content().strip() for figure in strips[0].iterfind("figure[@class='empty']")]
-    assert silent == ["Ego never hears of Incoming", "Ego never brakes for it"]
+    assert silent == ["Ego never knows Incoming from others alone", "Ego never brakes for it"]
 
 
 def test_captions_tell_time_distance_and_speed(page: str) -> None:
     captions = [caption.text_content() for caption in html.fromstring(page).iterfind(".//figcaption")]
-    assert any(re.fullmatch(r"Ego hears of it from RSUat 1\.45 s, 26\.\d m between centres, .*", c) for c in captions)
+    assert any(
+        re.fullmatch(r"Ego knows Incoming from RSU aloneat 1\.45 s, 26\.\d m between centres, .*", c) for c in captions
+    )
 
 
 def test_tables_stand_beside_the_papers_numbers(page: str) -> None:

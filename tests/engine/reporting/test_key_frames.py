@@ -11,8 +11,10 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
+from eidrive_scenario.world.view import WorldView
 
 Play = Callable[..., list[Frame]]
 
@@ -25,6 +27,19 @@ def story_of(frames: list[Frame]) -> Story:
     return observer.story()
 
 
+def detections_of(view: WorldView, *names: str) -> Detections:
+    rows = [view.row(name) for name in names]
+    count = len(rows)
+    return Detections(
+        view.time,
+        view.boxes[rows].reshape(-1, 7),
+        np.ones(count),
+        ("car",) * count,
+        np.zeros((count, 2)),
+        np.zeros((count, 2, 2)),
+    )
+
+
 def time_of(story: Story, kind: str) -> float:
     snapshot = story.moment(kind).snapshot
     assert snapshot is not None
@@ -33,8 +48,8 @@ def time_of(story: Story, kind: str) -> float:
 
 def test_the_helper_sees_the_car_at_20_m(street: Play) -> None:
     story = story_of(street(1))
-    assert time_of(story, "seen") == pytest.approx(1.40)
-    assert story.moment("seen").title == "RSU sees Incoming"
+    assert time_of(story, "hidden") == pytest.approx(1.40)
+    assert story.moment("hidden").title == "RSU sees Incoming, Ego does not"
 
 
 @pytest.mark.parametrize("delay", [1, 3, 6])
@@ -42,6 +57,21 @@ def test_the_ego_hears_of_it_as_many_ticks_later_as_the_message_takes(street: Pl
     story = story_of(street(delay))
     assert time_of(story, "heard") == pytest.approx(1.40 + 0.05 * delay)
     assert time_of(story, "braked") == time_of(story, "heard")
+
+
+def test_what_the_ego_sees_itself_is_not_hidden(street: Play) -> None:
+    """Until 1.00 s the ego sees the car too; the RSU sees it all the time."""
+    frames = []
+    for frame in street(1):
+        seen = detections_of(frame.view, "Incoming")
+        steps = {
+            "Ego": dataclasses.replace(
+                frame.steps["Ego"], detections=seen if frame.view.time < 0.99 else detections_of(frame.view)
+            ),
+            "RSU": dataclasses.replace(frame.steps["RSU"], detections=seen),
+        }
+        frames.append(dataclasses.replace(frame, steps=steps))
+    assert time_of(story_of(frames), "hidden") == pytest.approx(1.0)
 
 
 def test_lost_messages_put_it_off(street: Play) -> None:
@@ -52,12 +82,12 @@ def test_lost_messages_put_it_off(street: Play) -> None:
 def test_without_a_channel_the_ego_neither_hears_nor_brakes(street: Play) -> None:
     story = story_of(street(None))
     assert [(moment.kind, moment.snapshot is None) for moment in story.moments] == [
-        ("seen", False),
+        ("hidden", False),
         ("heard", True),
         ("braked", True),
         ("closest", False),
     ]
-    assert story.moment("heard").title == "Ego never hears of Incoming"
+    assert story.moment("heard").title == "Ego never knows Incoming from others alone"
 
 
 def test_distances_over_time_are_those_of_centres_and_bodies(street: Play) -> None:
