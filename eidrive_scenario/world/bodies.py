@@ -13,7 +13,7 @@ from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.dynamics import SingleTrack, VehicleParameters
 from eidrive_scenario.world.ground import GroundUnder
 
-RAYS, SCRIPTED, DRIVEN, STATIC = 1, 2, 4, 8
+RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
 """Groups of pybullet's collision filter; a ray belongs to the first by pybullet's default."""
 
 UNMOVED = 1e9

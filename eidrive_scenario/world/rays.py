@@ -16,8 +16,8 @@ GROUND, NOTHING = -1, -2
 """Rows of a ray that ended at the ground or a building, and of one that met nothing."""
 
 _BATCH = 16_000
-_STEP_IN = 1e-4
-"""How far a ray is moved into a body that it may pass [m]; from inside, pybullet does not see a convex body."""
+_STEP_IN = 2e-3
+"""How far a ray is moved into a body that it may pass [m]; from a millimetre inside, pybullet does not see the body."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_objects, surface_meshes
 from eidrive_scenario.world.actor import Vector3
-from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, quaternion
+from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.ground import is_level
 
@@ -54,7 +54,7 @@ class Scenery:
         self.buildings.append(Building(name, centre, size, yaw, colour))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
-        self._add_static(shape, centre, yaw, RAYS | DRIVEN, name)
+        self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
 
     def raise_ground(self) -> bool:
         """Make the ground that rays meet, where there is none yet; True if it was made now.
@@ -67,7 +67,7 @@ class Scenery:
         here = {"physicsClientId": self._client}
         if self.level or self.roads is None:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
-            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, RAYS, GROUND)
+            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
             return True
         for mesh in surface_meshes(self.roads, 4.0):
             if mesh.kind.startswith("marking"):
@@ -81,7 +81,7 @@ class Scenery:
                     flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
                     **here,
                 )
-                self._add_static(shape, (0.0, 0.0, 0.0), 0.0, RAYS, GROUND)
+                self._add_static(shape, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
         return True
 
     def name_of(self, handle: int) -> str:
@@ -101,13 +101,13 @@ class Scenery:
                 return True
         return False
 
-    def _add_static(self, shape: int, at: Vector3, yaw: float, meets: int, name: str) -> None:
+    def _add_static(self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str) -> None:
         here = {"physicsClientId": self._client}
         handle = bullet.createMultiBody(
             0.0, shape, basePosition=at, baseOrientation=quaternion(yaw, 0.0, 0.0), useMaximalCoordinates=1, **here
         )
         bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
-        bullet.setCollisionFilterGroupMask(handle, -1, STATIC, meets, **here)
+        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
         self._names[handle] = name
 
 

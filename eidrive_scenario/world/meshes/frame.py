@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from eidrive_scenario.world.meshes.solids import Mesh, cylinder
 
 
@@ -39,9 +41,9 @@ def add_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, *, axles: tup
     """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side."""
     radius = frame.wheel_radius
     for x in axles or (frame.front, frame.rear):
-        mesh.add_mirrored(
-            "trim", cylinder((x, side - tyre, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
-        )
+        arch = cylinder((x, side - tyre, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
+        arch[..., 2] = np.maximum(arch[..., 2], 0.5 * radius)
+        mesh.add_mirrored("trim", arch)
         mesh.add_mirrored("tyre", cylinder((x, side - tyre, radius), (x, side, radius), radius, sides=18))
         mesh.add_mirrored("rim", cylinder((x, side - 0.05, radius), (x, side + 0.006, radius), 0.64 * radius, sides=12))
         mesh.add_mirrored("trim", cylinder((x, side, radius), (x, side + 0.01, radius), 0.18 * radius, sides=8))

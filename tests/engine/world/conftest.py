@@ -1,0 +1,43 @@
+"""Cars for the tests of the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec
+
+CarFactory = Callable[..., ActorSpec]
+
+
+@pytest.fixture
+def car() -> CarFactory:
+    """Makes a car of 1500 kg, 2.7 m between the axles, whose box is 4.5 x 1.8 x 1.5 m around x = 1.35."""
+
+    def make(name: str = "Ego", *, shape: str = "car", **properties: object) -> ActorSpec:
+        return ActorSpec(
+            name=name,
+            shape=shape,
+            category="car",
+            size=(4.5, 1.8, 1.5),
+            offset=(1.35, 0.0, 0.75),
+            wheelbase=2.7,
+            max_steering=0.6,
+            wheel_radius=0.32,
+            mass=1500.0,
+            max_speed=50.0,
+            max_acceleration=4.0,
+            max_deceleration=8.0,
+            properties={key: str(value) for key, value in properties.items()},
+        )
+
+    return make
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    """A level world at 20 ticks per second."""
+    with World(dt=0.05) as world:
+        yield world

@@ -1,0 +1,139 @@
+"""Collisions: what is reported, and what they do to driven cars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+
+CarFactory = Callable[..., ActorSpec]
+
+
+def approach(world: World, ticks: int, speed: float, start: float) -> list:
+    """Move the scripted A along x; returns (tick, contact) of all contacts."""
+    found = []
+    for tick in range(1, ticks + 1):
+        world.step({"A": Placement(start + tick * speed * 0.05, 0.0, speed=speed)}, {})
+        found += [(tick, contact) for contact in world.view().contacts]
+    return found
+
+
+def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    world.add(car("B"), Placement(20.0, 0.5))
+    found = approach(world, 60, 10.0, 0.0)
+    # The gap of 15.5 m closes by half a metre per tick.
+    assert len(found) == 1
+    tick, contact = found[0]
+    assert tick in (31, 32)
+    assert (contact.first, contact.second) == ("A", "B")
+    assert contact.closing_speed == pytest.approx(10.0, rel=0.01)
+    assert contact.position[0] == pytest.approx(19.1, abs=0.3)
+    assert contact.position[1] == pytest.approx(0.25, abs=0.7)
+    assert contact.position[2] == pytest.approx(0.75)
+
+
+def test_passing_by_at_ten_centimetres_is_no_contact(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    world.add(car("B"), Placement(20.0, 1.9))
+    assert approach(world, 80, 10.0, 0.0) == []
+
+
+def test_a_bridge_above_is_no_contact(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    world.add(car("B"), Placement(20.0, 0.0, 5.0))
+    assert approach(world, 80, 10.0, 0.0) == []
+
+
+def test_parting_and_meeting_again_counts_twice(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0))
+    world.add(car("B"), Placement(5.0, 0.0))
+    counts = []
+    for x in (0.6, 0.7, 0.0, 0.6):
+        world.step({"A": Placement(x, 0.0)}, {})
+        counts.append(len(world.view().contacts))
+    assert counts == [1, 0, 0, 1]
+
+
+def test_many_actors_by_the_sweep(world: World, car: CarFactory) -> None:
+    for index in range(40):
+        world.add(car(f"P{index}"), Placement(8.0 * index, 0.0))
+    world.add(car("A"), Placement(8.0 * 17, -6.0))
+    seen = []
+    for tick in range(40):
+        world.step({"A": Placement(8.0 * 17, -6.0 + 0.2 * tick, speed=0.0)}, {})
+        seen += [(contact.first, contact.second) for contact in world.view().contacts]
+    assert seen == [("P17", "A")]
+
+
+def test_standing_car_is_pushed_by_a_scripted_one(world: World, car: CarFactory) -> None:
+    """Nothing stops the scripted car, so that the other leaves at its speed, and a little more by restitution."""
+    world.add(car("A"), Placement(-10.0, 0.0, speed=8.0))
+    world.add(car("B"), Placement(0.0, 0.0), driven=True)
+    contacts = []
+    fastest = 0.0
+    for tick in range(1, 40):
+        world.step({"A": Placement(-10.0 + 0.4 * tick, 0.0, speed=8.0)}, {"B": Control()})
+        view = world.view()
+        contacts += view.contacts
+        fastest = max(fastest, float(view.speed[1]))
+    assert [(contact.first, contact.second) for contact in contacts] == [("A", "B")]
+    assert contacts[0].closing_speed == pytest.approx(8.0, rel=0.02)
+    assert 8.0 <= fastest <= 8.0 * 1.2
+
+
+def test_two_driven_cars_share_the_momentum(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(-10.0, 0.0, speed=10.0), driven=True)
+    world.add(car("B"), Placement(0.0, 0.0), driven=True)
+    touched = None
+    for _ in range(30):
+        before = world.view()
+        world.step({}, {})
+        view = world.view()
+        if view.contacts:
+            touched = (before, view)
+            break
+    assert touched is not None
+    before, after = touched
+    assert after.speed.sum() == pytest.approx(before.speed.sum(), rel=0.02)
+    # Equal masses and a restitution of 0.3² leave 45 % and 55 % of the speed.
+    assert after.speed[1] == pytest.approx(0.545 * before.speed[0], rel=0.05)
+    assert after.contacts[0].closing_speed == pytest.approx(before.speed[0], rel=0.02)
+
+
+def test_a_blow_off_centre_spins_the_car(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(3.2, -12.0, yaw=math.pi / 2, speed=12.0))
+    world.add(car("B"), Placement(0.0, 0.0), driven=True)
+    for tick in range(1, 30):
+        world.step({"A": Placement(3.2, -12.0 + 0.6 * tick, yaw=math.pi / 2, speed=12.0)}, {"B": Control(brake=1.0)})
+        if abs(world.view().yaw_rate[1]) > 0.5:
+            break
+    last = tick
+    view = world.view()
+    # Hit at its front from the right: it turns to the left and is pushed to the left.
+    assert view.yaw_rate[1] > 0.5
+    assert view.velocity[1, 1] > 0.5
+    for tick in range(last + 1, last + 120):
+        world.step({"A": Placement(3.2, -12.0 + 0.6 * tick, yaw=math.pi / 2, speed=12.0)}, {"B": Control(brake=1.0)})
+    settled = world.view()
+    assert abs(settled.speed[1]) < 0.01
+    assert abs(settled.yaw_rate[1]) < 0.01
+    assert settled.position[1, 2] == 0.0
+    assert (settled.pitch[1], settled.roll[1]) == (0.0, 0.0)
+
+
+def test_a_building_stops_a_car(world: World, car: CarFactory) -> None:
+    world.add_building("Town hall", (25.0, 0.0, 5.0), (10.0, 20.0, 10.0))
+    world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0), driven=True)
+    contacts = []
+    for _ in range(60):
+        world.step({}, {"Ego": Control()})
+        contacts += world.view().contacts
+    assert [(contact.first, contact.second) for contact in contacts] == [("Ego", "Town hall")]
+    assert contacts[0].closing_speed == pytest.approx(10.0, rel=0.05)
+    # The front, 3.6 m ahead of the rear axle, does not get past the wall at 20 m.
+    assert world.view().position[0, 0] + 3.6 <= 20.05

@@ -1,0 +1,168 @@
+"""Scripted actors, the view, and the world's own bookkeeping."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.errors import SettingError, SimulationError
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.world import substeps_per_tick
+
+CarFactory = Callable[..., ActorSpec]
+
+
+def test_scripted_actors_stand_exactly_where_they_are_placed(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(1.1, 2.2, 0.3, 0.4, 0.01, -0.02, speed=7.0))
+    placement = Placement(1.3, 2.25, 0.3, 0.5, 0.02, -0.01, speed=6.5)
+    world.step({"A": placement}, {})
+    view = world.view()
+    assert view.position[0].tolist() == [1.3, 2.25, 0.3]
+    assert (view.yaw[0], view.pitch[0], view.roll[0]) == (0.5, 0.02, -0.01)
+    assert view.speed[0] == 6.5
+    assert (view.time, view.tick) == (0.05, 1)
+
+
+def test_velocity_follows_speed_and_displacement(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    first = world.view()
+    assert first.velocity[0].tolist() == [10.0, 0.0, 0.0]
+    assert first.acceleration[0].tolist() == [0.0, 0.0, 0.0]
+    world.step({"A": Placement(0.51, 0.05, speed=10.4)}, {})
+    view = world.view()
+    # Along the heading the stated speed, across it the distance over dt.
+    assert view.velocity[0] == pytest.approx((10.4, 1.0, 0.0))
+    assert view.acceleration[0] == pytest.approx((8.0, 20.0, 0.0))
+
+
+def test_yaw_rate_wraps(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, yaw=math.pi - 0.01))
+    world.step({"A": Placement(0.0, 0.0, yaw=-math.pi + 0.01)}, {})
+    assert world.view().yaw_rate[0] == pytest.approx(0.02 / 0.05)
+
+
+def test_teleport_leaves_no_trace_in_velocity(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0, speed=5.0))
+    world.step({"A": Placement(100.0, 50.0, yaw=math.pi / 2, speed=3.0, teleport=True)}, {})
+    view = world.view()
+    assert view.velocity[0] == pytest.approx((0.0, 3.0, 0.0))
+    assert view.acceleration[0].tolist() == [0.0, 0.0, 0.0]
+    assert view.yaw_rate[0] == 0.0
+
+
+def test_without_a_placement_an_actor_stands(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(1.0, 2.0, speed=5.0))
+    world.step({}, {})
+    view = world.view()
+    assert view.position[0].tolist() == [1.0, 2.0, 0.0]
+    assert view.speed[0] == 0.0
+
+
+def test_rows_follow_the_order_of_entry(world: World, car: CarFactory) -> None:
+    for name in ("C", "A", "B"):
+        world.add(car(name), Placement(10.0 * ord(name), 0.0))
+    world.remove("A")
+    world.add(car("A"), Placement(0.0, 0.0))
+    view = world.view()
+    assert view.names == ("C", "B", "A")
+    assert view.row("A") == 2
+    assert view.categories == ("car", "car", "car")
+    assert view.size.shape == view.offset.shape == (3, 3)
+
+
+def test_an_empty_world_has_an_empty_view(world: World) -> None:
+    world.step({}, {})
+    assert world.view().position.shape == (0, 3)
+    assert len(world.view().names) == 0
+
+
+def test_the_view_is_frozen(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0))
+    with pytest.raises(ValueError, match="read-only"):
+        world.view().position[0, 0] = 1.0
+
+
+def test_names_must_be_known_and_unique(world: World, car: CarFactory) -> None:
+    world.add(car("Ego"), Placement(0.0, 0.0))
+    with pytest.raises(SimulationError, match="already"):
+        world.add(car("Ego"), Placement(9.0, 0.0))
+    with pytest.raises(SimulationError, match="did you mean 'Ego'"):
+        world.step({"ego": Placement(0.0, 0.0)}, {})
+
+
+@pytest.mark.parametrize(("dt", "rate", "count"), [(0.05, 200.0, 10), (0.01, 200.0, 2), (0.03, 200.0, 6), (0.1, 60, 6)])
+def test_whole_physics_steps_per_tick(dt: float, rate: float, count: int) -> None:
+    assert substeps_per_tick(dt, rate) == count
+
+
+@pytest.mark.parametrize(("dt", "rate"), [(0.033, 200.0), (0.001, 200.0), (0.0, 200.0)])
+def test_broken_physics_steps_are_refused(dt: float, rate: float) -> None:
+    with pytest.raises(SettingError, match="whole number"):
+        World(dt=dt, physics_rate=rate)
+
+
+def test_handing_over_keeps_motion_and_row(world: World, car: CarFactory) -> None:
+    world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0))
+    world.add(car("B"), Placement(0.0, 50.0))
+    world.set_driven("Ego", True)
+    for _ in range(20):
+        world.step({}, {"Ego": Control()})
+    view = world.view()
+    assert view.names == ("Ego", "B")
+    assert 9.0 < view.speed[0] < 10.0
+    assert view.position[0, 0] == pytest.approx(9.9, abs=0.2)
+    world.set_driven("Ego", False)
+    world.step({"Ego": Placement(20.0, 0.0, speed=10.0)}, {})
+    assert world.view().position[0].tolist() == [20.0, 0.0, 0.0]
+
+
+def test_distance_is_between_the_boxes(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(0.0, 0.0))
+    world.add(car("B"), Placement(10.0, 0.0))
+    world.add(car("C"), Placement(10.0, 4.8, yaw=math.pi))
+    assert world.distance("A", "B") == pytest.approx(10.0 - 4.5)
+    assert world.distance("B", "C") == pytest.approx(4.8 - 1.8)
+
+
+def run(seed_speed: float, car: CarFactory, worlds: int) -> list[np.ndarray]:
+    """The last positions of a pushed-about scene in several worlds that take turns."""
+    opened = [World(dt=0.05) for _ in range(worlds)]
+    for world in opened:
+        world.add(car("Ego"), Placement(0.0, 0.0, speed=seed_speed), driven=True)
+        world.add(car("Other"), Placement(30.0, 0.6), driven=True)
+        world.add(car("Wall"), Placement(40.0, -3.0, yaw=0.4))
+    for tick in range(120):
+        for world in opened:
+            world.step(
+                {"Wall": Placement(40.0 - 0.02 * tick, -3.0, yaw=0.4, speed=-0.4)}, {"Ego": Control(throttle=0.4)}
+            )
+    results = [np.concatenate([world.view().position.ravel(), world.view().velocity.ravel()]) for world in opened]
+    for world in opened:
+        world.close()
+    return results
+
+
+def test_two_worlds_agree_bit_by_bit_and_do_not_disturb_each_other(car: CarFactory) -> None:
+    alone = run(15.0, car, 1)[0]
+    for result in run(15.0, car, 3):
+        assert result.tobytes() == alone.tobytes()
+    assert run(15.1, car, 1)[0].tobytes() != alone.tobytes()
+
+
+def test_looking_changes_nothing(car: CarFactory) -> None:
+    def play(look: bool) -> bytes:
+        with World(dt=0.05) as world:
+            world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)
+            world.add(car("Other"), Placement(12.0, 0.5), driven=True)
+            for _ in range(60):
+                if look:
+                    world.cast([[-10.0, 0.0, 0.5]], [[50.0, 0.0, 0.5]])
+                    world.camera(np.eye(4), 16, 12, 1.0)
+                world.step({}, {"Ego": Control(throttle=0.5, steering=0.02)})
+            return world.view().position.tobytes()
+
+    assert play(True) == play(False)

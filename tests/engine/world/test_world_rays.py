@@ -1,0 +1,78 @@
+"""Rays meet what stands first in their way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+
+CarFactory = Callable[..., ActorSpec]
+
+
+def test_the_first_box_is_hit(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(10.0, 0.0))
+    world.add(car("B"), Placement(30.0, 0.0))
+    hits = world.cast(
+        [[0, 0, 0.7], [0, 0, 0.7], [0, 0, 5.0], [0, 0, 2.0]], [[50, 0, 0.7], [0, 50, 0.7], [50, 0, 5.0], [0, 5, -2.0]]
+    )
+    assert hits.rows.tolist() == [0, -2, -2, -1]
+    # The rear of A stands 0.9 m behind its rear axle.
+    assert hits.position[0] == pytest.approx((9.1, 0.0, 0.7), abs=1e-3)
+    assert hits.fraction[0] == pytest.approx(9.1 / 50, abs=1e-4)
+    assert hits.normal[0] == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
+    assert hits.position[3] == pytest.approx((0.0, 2.5, 0.0), abs=1e-6)
+    assert hits.position[1].tolist() == [0, 50, 0.7]
+
+
+def test_ignored_actors_are_looked_through(world: World, car: CarFactory) -> None:
+    for index in range(3):
+        world.add(car(f"C{index}"), Placement(10.0 + 10.0 * index, 0.0))
+    assert world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1")).rows.tolist() == [2]
+    hits = world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1", "C2"))
+    assert (hits.rows.tolist(), hits.fraction.tolist()) == ([-2], [1.0])
+    assert world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0",)).position[0, 0] == pytest.approx(19.1, abs=1e-3)
+
+
+def test_line_of_sight_behind_a_lorry(world: World, car: CarFactory) -> None:
+    world.add(car("Lorry"), Placement(10.0, 0.0))
+    clear = world.line_of_sight((0, 0, 1.0), [[20, 0, 1.0], [20, 0, 4.0], [8.0, 0, 1.0], [20, 3, 1.0]])
+    assert clear.tolist() == [False, True, True, True]
+
+
+def test_rays_know_where_actors_are_now(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(10.0, 0.0))
+    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [0]
+    world.step({"A": Placement(10.0, 5.0)}, {})
+    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
+    world.step({"A": Placement(30.0, 0.0, teleport=True)}, {})
+    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).position[0, 0] == pytest.approx(29.1, abs=1e-3)
+    world.remove("A")
+    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
+
+
+def test_a_moving_driven_car_is_met_where_it_is(world: World, car: CarFactory) -> None:
+    world.add(car("Ego"), Placement(0.0, 0.0, speed=30.0), driven=True)
+    for _ in range(5):
+        world.step({}, {})
+        x = float(world.view().position[0, 0])
+        hits = world.cast([[100.0, 0.0, 0.7]], [[-100.0, 0.0, 0.7]])
+        assert hits.position[0, 0] == pytest.approx(x + 3.6, abs=1e-3)
+
+
+def test_buildings_block_and_are_no_actors(world: World) -> None:
+    world.add_building("House", (20.0, 0.0, 4.0), (10.0, 10.0, 8.0), yaw=0.3)
+    assert world.cast([[0, 0, 2.0]], [[40, 0, 2.0]]).rows.tolist() == [-1]
+    assert not world.line_of_sight((0, 0, 2.0), [[40, 0, 2.0]])[0]
+
+
+def test_many_rays_in_one_batch(world: World, car: CarFactory) -> None:
+    world.add(car("A"), Placement(10.0, 0.0))
+    targets = np.column_stack([np.full(20_000, 30.0), np.linspace(-10, 10, 20_000), np.full(20_000, 0.7)])
+    hits = world.cast([[0.0, 0.0, 0.7]], targets)
+    assert hits.rows.shape == (20_000,)
+    # Seen from the origin the box's rear covers |y| / 30 up to 0.9 / 9.1; its flanks lie in that shadow.
+    assert (hits.rows == 0).mean() == pytest.approx(2 * 30 * 0.9 / 9.1 / 20, abs=0.002)
