@@ -51,6 +51,7 @@ class CatalogLibrary:
             if directory is not None and isinstance(directory.path, str):
                 path = Path(directory.path.replace("\\", "/"))
                 self._places[type(location).__name__.removesuffix("CatalogLocation")] = folder / path
+        self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
 
     def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
@@ -62,10 +63,11 @@ class CatalogLibrary:
                 continue
             if names in active:
                 self._wrong(reference, f"the catalog entry {names[1]!r} refers to itself", "break the circle")
+                self._circular.add(reference)
                 continue
             if reference not in self.entries:
                 entry = self._entry(one, (*active, names))
-                if entry is not None:
+                if entry is not None and reference not in self._circular:
                     self.entries[reference] = entry
             self._check_kind(one)
 

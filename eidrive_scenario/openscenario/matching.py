@@ -37,9 +37,24 @@ class Automaton:
     steps: list[dict[str, int]] = field(default_factory=lambda: [{}])
     accepting: set[int] = field(default_factory=set)
 
-    def entrances(self, name: str) -> list[int]:
-        """The states that the name leads to, from wherever."""
-        return sorted({step[name] for step in self.steps if name in step})
+    def after(self, state: int, name: str) -> int:
+        """The state after a child of that name: by the model, or else as if it stood where it may."""
+        entrances = {step[name] for step in self.steps if name in step}
+        return self.steps[state].get(name, min((to for to in entrances if to > state), default=min(entrances)))
+
+    def skipped(self, state: int, name: str) -> tuple[str, ...] | None:
+        """The fewest children that have to stand before a child of that name; None if none would let it stand."""
+        paths: dict[int, tuple[str, ...]] = {state: ()}
+        queue = deque([state])
+        while queue:
+            at = queue.popleft()
+            if name in self.steps[at]:
+                return paths[at]
+            for through, to in self.steps[at].items():
+                if to not in paths:
+                    paths[to] = (*paths[at], through)
+                    queue.append(to)
+        return None
 
     def missing(self, state: int) -> list[tuple[str, ...]]:
         """What has to follow at least: for each further child, the names of which one has to stand there."""

@@ -50,8 +50,12 @@ def check_names(
 ) -> None:
     """Reports names given twice and references to nothing."""
     elements = list(elements)
-    known: dict[str, dict[str, Element]] = {kind: {} for kind in ("entity", "sensor", *_DECLARED_BY.values())}
+    known: dict[str, dict[str, Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
+    nameless: set[str] = set()
     for kind, name, element in _given(root, elements, entries):
+        if name is None:
+            nameless.add(kind)
+            continue
         if name in known[kind] and kind in _UNIQUE:
             findings.error(
                 f"two {_plural(kind)} are named {name!r}",
@@ -60,6 +64,7 @@ def check_names(
                 line=element.line,
             )
         known[kind].setdefault(name, element)
+    complete = {kind: names for kind, names in known.items() if kind not in nameless}
     exempt = {id(one) for element in elements if isinstance(element, Condition) for one in _criterion(element)}
     exempt |= {id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _draws_none(element)}
     storyboard = StoryboardNames(root.storyboard, entries)
@@ -68,24 +73,21 @@ def check_names(
         if isinstance(element, StoryboardElementStateCondition):
             storyboard.check_reference(element, findings)
         elif not isinstance(element, ParameterAssignment) and id(element) not in exempt:
-            _check_references(element, version, known, findings)
+            _check_references(element, version, complete, findings)
 
 
 def _given(
     root: OpenScenario, elements: Iterable[Element], entries: Mapping[CatalogReference, Element]
-) -> Iterator[tuple[str, str, Element]]:
-    """Every name with its kind and the element that gives it."""
+) -> Iterator[tuple[str, str | None, Element]]:
+    """Every name with its kind and the element that gives it; None where the reader could not make out the name."""
     for one, _ in scenario_objects(root.entities, entries):
-        if isinstance(one.name, str):
-            yield "entity", one.name, one
+        yield "entity", one.name, one
     for selection in root.entities.entity_selection if root.entities else ():
-        if isinstance(selection.name, str):
-            yield "entity", selection.name, selection
+        yield "entity", selection.name, selection
     for element in elements:
         kind = _DECLARED_BY.get(type(element))
-        name = getattr(element, "name", None)
-        if kind and isinstance(name, str):
-            yield kind, name, element
+        if kind is not None and not (isinstance(element, ObjectController) and element.name is None):
+            yield kind, getattr(element, "name", None), element
 
 
 def _criterion(condition: Condition) -> Iterator[ParameterCondition]:
@@ -105,7 +107,7 @@ def _check_references(
 ) -> None:
     for spelling, rule in rules(type(element), version).attributes.items():
         kind = rule.points_to
-        name = getattr(element, rule.field) if kind in known and kind != "sensor" else None
+        name = getattr(element, rule.field) if kind in known else None
         if isinstance(name, str) and name not in known[kind]:
             findings.error(
                 f"{spelling} of {type(element).__name__} names the {kind} {name!r}, which is not there",

@@ -12,10 +12,12 @@ from eidrive_scenario.errors import Problem, suggestion
 from eidrive_scenario.openscenario.expressions import ExpressionError
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
+    Action,
     Catalog,
     CatalogReference,
     Element,
     Enumeration,
+    ObjectController,
     ParameterDeclaration,
     ParameterDeclarations,
 )
@@ -27,7 +29,10 @@ from eidrive_scenario.openscenario.structure import check_children
 
 _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
 _IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
+_MAY_BE_EMPTY = (Action, ObjectController)
+"""An action that does nothing, an object without controller."""
 _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
+_WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,9 @@ class Reader:
         self.references: list[FoundReference] = []
         self.declared: Scope | None = None
         """The parameters that the element read declares itself."""
+        self._flaws = 0
         self._with_text: set[etree._Element] = set()
+        self._with_space: set[etree._Element] = set()
 
     def read(
         self,
@@ -67,6 +74,7 @@ class Reader:
         lent         parameters of another file, for those that it does not declare
         """
         self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
+        self._with_space = set(cast(list[etree._Element], _WITH_SPACE(node)))
         open_assignments = dict(assignments or {})
         element = self._element(node, cls, lent or Scope(), open_assignments)
         self._unknown_parameters(open_assignments, ())
@@ -90,6 +98,8 @@ class Reader:
             self._child(node, child, known, scope, values)
         if below or known.children:
             check_children(node, below, known, self.version, self._error)
+        if known.choice and not any(child.tag in known.choice or child.tag not in known.children for child in below):
+            self._chooses_nothing(node, cls, known)
         if "catalog_reference" in values:
             self._note_references(known, values["catalog_reference"])
         return make(cls, values)
@@ -114,6 +124,7 @@ class Reader:
         try:
             value = self._converted(text, rule, scope)
         except ExpressionError as error:
+            self._flaws += 1
             if error.message:
                 self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
         except ValueError as error:
@@ -140,6 +151,13 @@ class Reader:
             values[known.text_field] = "".join(cast(list[str], node.xpath("text()")))
         elif node in self._with_text:
             self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
+        elif not known.children and node in self._with_space:
+            self.findings.warn(
+                f"{node.tag} holds white space, where the schema wants nothing",
+                f"write <{node.tag} …/>",
+                source=self.source,
+                line=line_of(node),
+            )
 
     def _child(
         self, node: etree._Element, child: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]
@@ -157,6 +175,12 @@ class Reader:
         else:
             values.setdefault(rule.field, element)
 
+    def _chooses_nothing(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
+        """Up to 1.2 the schema lets an element choose nothing. That is in use where _MAY_BE_EMPTY says so."""
+        report = self.findings.warn if cls in _MAY_BE_EMPTY else self.findings.error
+        remedy = "it holds one of " + ", ".join(known.choice)
+        report(f"{node.tag} is empty", remedy, source=self.source, line=line_of(node))
+
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
         """Reads declarations one by one, so that each may use those before it."""
         known = rules(ParameterDeclarations, self.version)
@@ -168,9 +192,9 @@ class Reader:
         declared = []
         for child in below:
             if child.tag in known.children:
-                before = len(self.findings.problems)
+                before = self._flaws
                 declaration = self._element(child, ParameterDeclaration, scope, {})
-                sound = len(self.findings.problems) == before
+                sound = self._flaws == before
                 declared.append(self._declared(cast(ParameterDeclaration, declaration), scope, assignments, sound))
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
@@ -215,6 +239,7 @@ class Reader:
         self.findings.warn(f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node))
 
     def _error(self, message: str, remedy: str, node: etree._Element) -> None:
+        self._flaws += 1
         self.findings.error(message, remedy, source=self.source, line=line_of(node))
 
 

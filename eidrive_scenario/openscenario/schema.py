@@ -11,7 +11,7 @@ from eidrive_scenario.openscenario import model, scalars
 from eidrive_scenario.openscenario.matching import Automaton, Group, Leaf, automaton
 from eidrive_scenario.openscenario.model import Element, Enumeration
 from eidrive_scenario.openscenario.model.content import All, Changed, Choice, Content, Sequence
-from eidrive_scenario.openscenario.model.element import USAGE, Usage
+from eidrive_scenario.openscenario.model.element import USAGE, Usage, alternatives
 from eidrive_scenario.openscenario.model.scalars import Limits, NameOf
 from eidrive_scenario.openscenario.scalars import Scalar, Version, is_known, parsed
 
@@ -67,6 +67,9 @@ class Rules:
     other_attributes: MappingProxyType[str, Usage]
     other_children: MappingProxyType[str, Usage]
     summary: str
+    choice: tuple[str, ...]
+    """Children of which one has to be there for the element to mean anything, though this version's schema lets it be
+    empty."""
 
 
 def rules(cls: type[Element], version: Version) -> Rules:
@@ -122,6 +125,7 @@ def _read(cls: type[Element], version: Version) -> Rules:
         MappingProxyType(other_attributes),
         MappingProxyType(other_children),
         "in any order " + ", ".join(below) if isinstance(content, All) else _in_words(group),
+        _meant_choice(cls, spelling, version),
     )
 
 
@@ -190,6 +194,17 @@ def _group(content: Content, below: dict[str, ChildRule], spelling: dict[str, st
         return Group(tuple(parts), exclusive=False)
     empty = bool(content.empty_until) and version <= parsed(content.empty_until)
     return Group(tuple(parts), True, content.minimum == 0 or empty or not parts, content.maximum is None)
+
+
+def _meant_choice(cls: type[Element], spelling: dict[str, str], version: Version) -> tuple[str, ...]:
+    content = cls.content_model
+    if isinstance(content, Changed):
+        lenient = version < parsed(content.since)
+    else:
+        parts = content.parts if isinstance(content, Sequence) else (content,)
+        choices = [part for part in parts if isinstance(part, Choice)]
+        lenient = any(part.empty_until and version <= parsed(part.empty_until) for part in choices)
+    return tuple(spelling[name] for name in alternatives(cls) if name in spelling) if lenient else ()
 
 
 def _in_words(group: Group) -> str:

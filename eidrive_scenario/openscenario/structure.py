@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable
 
 from lxml import etree
@@ -18,13 +19,18 @@ Report = Callable[[str, str, etree._Element], None]
 def check_children(
     node: etree._Element, below: Iterable[etree._Element], known: Rules, version: Version, report: Report
 ) -> None:
-    """Reports every child that the rules forbid, and every one that they miss."""
-    standing = []
+    """Reports every child that the rules forbid, and every one that they miss.
+
+    A misspelt child counts as what it was likely meant to be, so that it is not reported as missing too.
+    """
+    standing: list[tuple[str, etree._Element]] = []
     for child in below:
         if child.tag in known.children:
-            standing.append(child)
-        else:
-            report(f"unknown element {child.tag} in {node.tag}", _instead(node, child.tag, known, version), child)
+            standing.append((child.tag, child))
+            continue
+        report(f"unknown element {child.tag} in {node.tag}", _instead(node, child.tag, known, version), child)
+        meant = difflib.get_close_matches(child.tag, known.children, n=1)
+        standing.extend((name, child) for name in meant)
     if known.order is None:
         _check_each_once(node, standing, known, report)
     else:
@@ -38,35 +44,38 @@ def _instead(node: etree._Element, name: str, known: Rules, version: Version) ->
     return suggestion(name, known.children) if known.children else f"{node.tag} holds no elements"
 
 
-def _check_each_once(node: etree._Element, standing: list[etree._Element], known: Rules, report: Report) -> None:
+def _check_each_once(
+    node: etree._Element, standing: list[tuple[str, etree._Element]], known: Rules, report: Report
+) -> None:
     seen: set[str] = set()
-    for child in standing:
-        if child.tag in seen:
-            report(f"{node.tag} holds {child.tag} twice", "remove one", child)
-        seen.add(child.tag)
+    for name, child in standing:
+        if name in seen and child.tag == name:
+            report(f"{node.tag} holds {name} twice", "remove one", child)
+        seen.add(name)
     for name, rule in known.children.items():
         if rule.minimum and name not in seen:
             report(f"{node.tag} lacks the element {name}", f"it holds {known.summary}", node)
 
 
 def _check_order(
-    node: etree._Element, standing: list[etree._Element], known: Rules, order: Automaton, report: Report
+    node: etree._Element, standing: list[tuple[str, etree._Element]], known: Rules, order: Automaton, report: Report
 ) -> None:
     """Follows the automaton; where it is stuck, that is reported once, and it goes on as if all had been right."""
+    present = {name for name, _ in standing}
     state, misplaced = 0, False
     seen: set[str] = set()
-    for child in standing:
-        following = order.steps[state].get(child.tag)
-        if following is None:
-            if not misplaced:
-                what = "may not stand here again" if child.tag in seen else "may not stand here"
-                report(f"{child.tag} {what}", f"{node.tag} holds {known.summary}", child)
+    for name, child in standing:
+        skipped = order.skipped(state, name)
+        if skipped and not present & set(skipped):
+            for missing in skipped:
+                report(f"{node.tag} lacks the element {missing}", f"it holds {known.summary}", node)
+        elif skipped is None or skipped:
+            if not misplaced and child.tag == name:
+                what = "may not stand here again" if name in seen else "may not stand here"
+                report(f"{name} {what}", f"{node.tag} holds {known.summary}", child)
             misplaced = True
-            following = min(order.entrances(child.tag), default=state)
-        state = following
-        seen.add(child.tag)
-    if state in order.accepting:
-        return
+        state = order.after(state, name)
+        seen.add(name)
     for names in order.missing(state):
         if not (misplaced and seen & set(names)):
             another = "another " if seen & set(names) else ""

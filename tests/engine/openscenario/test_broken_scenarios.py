@@ -1,0 +1,67 @@
+"""Every broken file of tests/data/broken is refused, with the line and the remedy that an author needs."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_scenario
+
+BROKEN = Path(__file__).parents[2] / "data" / "broken"
+
+EXPECTED = {
+    "bad_expression": [(41, "unknown function 'squareroot'")],
+    "constraint": [(5, "'Speed' is '10.0', outside its constraints; it has to be lessThan 8")],
+    "dangling_element": [(53, "storyboardElementRef names the event 'Brake', which is not there")],
+    "dangling_entity": [(28, "entityRef of Private names the entity 'Egoo', which is not there; did you mean 'Ego'?")],
+    "duplicate_name": [(24, "two entities are named 'Ego'; the other stands in line 10")],
+    "external_entity": [(2, "document type declaration")],
+    "missing_attribute": [(32, "WorldPosition lacks the attribute 'y'; it is a number")],
+    "missing_catalog": [(15, "no catalog 'Vehicels'")],
+    "missing_catalog_entry": [(15, "the catalog 'Vehicles' has no entry 'van_red'; known: red_van")],
+    "missing_element": [(38, "SpeedAction lacks the element SpeedActionDynamics")],
+    "missing_road_file": [(9, "no road file 'no_such_road.xodr'")],
+    "newer_element": [(57, "AngleCondition in EntityCondition; OpenSCENARIO has it since 1.3; the file says 1.2")],
+    "not_well_formed": [(57, "not well-formed XML")],
+    "several": [
+        (28, "did you mean 'Ego'?"),
+        (32, "lacks the attribute 'y'"),
+        (39, "did you mean 'sinusoidal'?"),
+        (41, "'fast', which is not a number"),
+    ],
+    "unknown_assignment": [(17, "unknown parameter 'TopSped'; did you mean 'TopSpeed'?")],
+    "unknown_attribute": [(32, "WorldPosition has no attribute 'heading'")],
+    "unknown_element": [(39, "unknown element SpeedActionDynamic in SpeedAction; did you mean 'SpeedActionDynamics'?")],
+    "unknown_parameter": [(41, "unknown parameter $Sped; did you mean 'Speed'?")],
+    "wrong_number": [(41, "value of AbsoluteTargetSpeed is 'fast', which is not a number")],
+    "wrong_order": [(19, "FrontAxle may not stand here; Axles holds FrontAxle, RearAxle, AdditionalAxle")],
+    "wrong_word": [(39, "'sinusodial', which is not a word of DynamicsShape; did you mean 'sinusoidal'?")],
+    "xml_bomb": [(2, "document type declaration")],
+}
+
+
+def test_every_broken_file_has_its_expectation() -> None:
+    assert {path.stem for path in BROKEN.glob("*.xosc")} == set(EXPECTED)
+
+
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+def test_broken_file_is_refused_where_it_is_wrong(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("EIDRIVE_MAPS", raising=False)
+    path = BROKEN / f"{name}.xosc"
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    problems = caught.value.problems
+    assert [problem.line for problem in problems] == [line for line, _ in EXPECTED[name]]
+    for problem, (line, text) in zip(problems, EXPECTED[name], strict=True):
+        assert problem.source == str(path)
+        assert str(problem).startswith(f"{path}:{line}: ")
+        assert text in str(problem)
+
+
+@pytest.mark.parametrize("name", ["xml_bomb", "external_entity"])
+def test_dangerous_files_are_refused_at_once(name: str) -> None:
+    started = time.perf_counter()
+    with pytest.raises(ScenarioError):
+        load_scenario(BROKEN / f"{name}.xosc")
+    assert time.perf_counter() - started < 0.5

@@ -1,0 +1,115 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from eidrive_scenario.openscenario.expressions import MAX_LENGTH, ExpressionError, concatenate, evaluate, joins_text
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2 * 3", 7),
+        ("(1 + 2) * 3", 9),
+        ("50 / 3.6", 50 / 3.6),
+        ("-$a", -5),
+        ("$a - $b", 3),
+        ("7 % 4", 3),
+        ("-7 % 4", -3),
+        ("5.5 % 2", 1.5),
+        ("round(2.5)", 3),
+        ("round(-2.5)", -3),
+        ("floor(-1.5)", -2),
+        ("ceil(1.2)", 2),
+        ("sqrt(16)", 4),
+        ("pow(2, 10)", 1024),
+        ("abs(-3)", 3),
+        ("sign(-0.1)", -1),
+        ("min(3, $b, 7)", 2),
+        ("max(3, 7)", 7),
+        ("sin(pi / 2)", 1),
+        ("atan(1) * 4", math.pi),
+        ("not true", False),
+        ("$flag and true", True),
+        ("false or false", False),
+    ],
+)
+def test_value(text: str, value: float) -> None:
+    assert evaluate(text, {"a": 5, "b": 2, "flag": True}) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "1 +",
+        "1 / 0",
+        "5 % 0",
+        "sqrt(-1)",
+        "2 ** 3",
+        "1 < 2",
+        "1 if 1 else 2",
+        "[1, 2]",
+        "'a' * 9",
+        "f'{1}'",
+        "(1).real",
+        "max.__class__",
+        "max(x=1)",
+        "max(*(1, 2))",
+        "lambda: 1",
+        "__import__('os')",
+        "open('x')",
+        "parameter_a",
+        "a",
+        "1; 2",
+        "0x10",
+        "1or 2",
+        "1j",
+        "pow(10, 400)",
+        "1e400",
+        "((((" * 200,
+        "-" * 900 + "1",
+        "9" * 999,
+        "1+" * MAX_LENGTH + "1",
+    ],
+)
+def test_what_is_no_expression_is_refused(text: str) -> None:
+    with pytest.raises(ExpressionError):
+        evaluate(text, {})
+
+
+def test_a_misspelt_function_is_named_with_its_nearest() -> None:
+    with pytest.raises(ExpressionError) as caught:
+        evaluate("squrt(4)", {})
+    assert caught.value.remedy == "did you mean 'sqrt'?"
+
+
+def test_a_bare_word_may_lack_its_dollar() -> None:
+    with pytest.raises(ExpressionError) as caught:
+        evaluate("speed + 1", {"speed": 3})
+    assert caught.value.remedy == "a parameter begins with $"
+
+
+def test_text_is_joined_where_a_bare_word_stands() -> None:
+    text = "BrakeCondition_HWT + _ + $HeadwayTime"
+    assert joins_text(text, {"HeadwayTime": 1.5})
+    assert concatenate(text, {"HeadwayTime": "1.5"}) == "BrakeCondition_HWT_1.5"
+    assert not joins_text("sqrt($x) + 1", {"x": 4})
+
+
+@given(st.text(alphabet="0123456789.+-*/%() ,eE_$abcxyzmaxinpowsqrtand'\"[]{}:;=<>!@\\\n", max_size=60))
+def test_nothing_but_our_error_comes_out(text: str) -> None:
+    try:
+        result = evaluate(text, {"a": 1, "b": 2.5, "c": True})
+    except ExpressionError:
+        return
+    assert math.isfinite(result)
+
+
+@given(st.text(max_size=80))
+def test_no_text_at_all_reaches_python(text: str) -> None:
+    try:
+        assert isinstance(evaluate(text, {}), int | float)
+    except ExpressionError:
+        return

@@ -1,0 +1,122 @@
+from collections.abc import Callable
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import Scenario, load_scenario, model
+
+Build = Callable[..., bytes]
+Text = Callable[..., str]
+
+
+def speed_of(scenario: Scenario) -> float:
+    return next(one.value for one in scenario.document.walk() if isinstance(one, model.AbsoluteTargetSpeed))
+
+
+def test_a_parameter_is_put_in(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+    xml = scenario_xml(declarations=parameters_xml(Speed=("double", "12.5")), story=story_xml(speed="$Speed"))
+    assert speed_of(load_scenario(xml)) == 12.5
+    assert load_scenario(xml).parameters == {"Speed": "12.5"}
+
+
+def test_a_value_from_outside_comes_first(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+    declared = parameters_xml(Kmh=("double", "36"), Speed=("double", "${$Kmh / 3.6}"))
+    xml = scenario_xml(declarations=declared, story=story_xml(speed="${$Speed + 1}"))
+    assert speed_of(load_scenario(xml)) == pytest.approx(11)
+    assert speed_of(load_scenario(xml, {"Kmh": "72"})) == pytest.approx(21)
+    assert load_scenario(xml, {"Kmh": "72"}).parameters["Kmh"] == "72"
+
+
+def test_unknown_or_unfit_values_from_outside_are_refused(scenario_xml: Build, parameters_xml: Text) -> None:
+    xml = scenario_xml(declarations=parameters_xml(Speed=("double", "10")))
+    with pytest.raises(ScenarioError, match=r"unknown parameter 'Sped'; did you mean 'Speed'\?"):
+        load_scenario(xml, {"Sped": "3"})
+    with pytest.raises(ScenarioError, match="the parameter 'Speed' is 'fast', which is not a number"):
+        load_scenario(xml, {"Speed": "fast"})
+    with pytest.raises(ScenarioError, match="unknown parameter 'Speed'"):
+        load_scenario(scenario_xml(), {"Speed": "3"})
+
+
+def test_an_inner_scope_hides_the_outer(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+    inner = parameters_xml(Speed=("double", "${$Speed * 2}"))
+    story = story_xml(speed="$Speed").replace('<Story name="story">', f'<Story name="story">{inner}')
+    xml = scenario_xml(declarations=parameters_xml(Speed=("double", "4")), story=story)
+    assert speed_of(load_scenario(xml)) == 8
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "rule", "limit", "fits"),
+    [
+        ("double", "10", "lessThan", "10.5", True),
+        ("double", "10", "lessThan", "10", False),
+        ("int", "3", "greaterOrEqual", "3", True),
+        ("string", "car", "notEqualTo", "car", False),
+        ("dateTime", "2026-01-31T12:00:00", "greaterThan", "2026-01-31T11:00:00Z", True),
+    ],
+)
+def test_constraints(scenario_xml: Build, kind: str, value: str, rule: str, limit: str, fits: bool) -> None:
+    declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="{kind}" value="{value}">
+    <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
+    </ParameterDeclaration></ParameterDeclarations>"""
+    if fits:
+        assert load_scenario(scenario_xml(declarations=declared)).parameters == {"P": value}
+    else:
+        with pytest.raises(ScenarioError, match="outside its constraints"):
+            load_scenario(scenario_xml(declarations=declared))
+
+
+def test_groups_of_constraints_are_alternatives(scenario_xml: Build) -> None:
+    group = '<ConstraintGroup><ValueConstraint rule="equalTo" value="{}"/></ConstraintGroup>'
+    declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="2">
+    {group.format(1)}{group.format(2)}</ParameterDeclaration></ParameterDeclarations>"""
+    xml = scenario_xml(declarations=declared)
+    assert load_scenario(xml).parameters == {"P": "2"}
+    with pytest.raises(ScenarioError, match="it has to be equalTo 1 or equalTo 2"):
+        load_scenario(xml, {"P": "3"})
+
+
+def test_whole_numbers_stay_whole_in_text(scenario_xml: Build, parameters_xml: Text) -> None:
+    position = '<LanePosition roadId="1" laneId="${$Lane - 1}" s="${$S * 2}"/>'
+    teleport = f"<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"
+    xml = scenario_xml(
+        declarations=parameters_xml(Lane=("double", "-1"), S=("int", "7")),
+        init=f'<Private entityRef="Ego">{teleport}</Private>',
+    )
+    lane = next(one for one in load_scenario(xml).document.walk() if isinstance(one, model.LanePosition))
+    assert (lane.lane_id, lane.s) == ("-2", 14.0)
+
+
+def test_a_wrong_declaration_is_reported_once(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
+    xml = scenario_xml(declarations=parameters_xml(Speed=("double", "${1 / 0}")), story=story_xml(speed="$Speed"))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(xml)
+    assert len(caught.value.problems) == 1
+    assert "has no value" in str(caught.value)
+
+
+def test_a_parameter_may_name_another_where_a_name_is_meant(scenario_xml: Build, parameters_xml: Text) -> None:
+    condition = '<ParameterCondition parameterRef="$Speed" rule="equalTo" value="3"/>'
+    stop = f"""<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
+    <ByValueCondition>{condition}</ByValueCondition></Condition></ConditionGroup>"""
+    scenario = load_scenario(scenario_xml(declarations=parameters_xml(Speed=("double", "10")), stop=stop))
+    found = next(one for one in scenario.document.walk() if isinstance(one, model.ParameterCondition))
+    assert found.parameter_ref == "Speed"
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150)
+@given(
+    kind=st.sampled_from(["double", "int", "string", "boolean", "dateTime", "unsignedShort"]),
+    value=st.text(alphabet="0123456789.+-*/%(),$abePstruefalsi {}", max_size=30),
+    speed=st.text(alphabet="0123456789.+-*/%(),$aPsqrtminmax {}", max_size=30),
+)
+def test_whatever_is_written_there_only_our_errors_come_out(
+    scenario_xml: Build, story_xml: Text, parameters_xml: Text, kind: str, value: str, speed: str
+) -> None:
+    declared = parameters_xml(P=(kind, value), a=("double", "1"))
+    try:
+        scenario = load_scenario(scenario_xml(declarations=declared, story=story_xml(speed=speed)))
+    except ScenarioError:
+        return
+    assert isinstance(speed_of(scenario), float)

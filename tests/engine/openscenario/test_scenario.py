@@ -1,0 +1,160 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_scenario, model
+
+Build = Callable[..., bytes]
+Text = Callable[..., str]
+
+CONTROLLER = """<ObjectController><Controller name="driver"><Properties>
+<Property name="module" value="eidrive"/></Properties></Controller></ObjectController>"""
+BOX = '<BoundingBox><Center x="0" y="0" z="1"/><Dimensions length="1" width="1" height="2"/></BoundingBox>'
+
+
+def state_condition(reference: str, kind: str = "event") -> str:
+    return (
+        f'<StoryboardElementStateCondition storyboardElementRef="{reference}" storyboardElementType="{kind}" '
+        'state="endTransition"/>'
+    )
+
+
+def test_a_scenario_is_read_from_a_path_from_bytes_and_from_a_tree(tmp_path: Path, scenario_xml: Build) -> None:
+    path = tmp_path / "crossing.xosc"
+    path.write_bytes(scenario_xml())
+    scenario = load_scenario(path)
+    assert (scenario.name, scenario.path, scenario.version) == ("crossing", path, (1, 3))
+    assert load_scenario(str(path)).document == scenario.document
+    assert load_scenario(scenario_xml()).document == scenario.document
+    assert load_scenario(scenario_xml()).name == "a test"
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"nowhere\.xosc: cannot be read: No such file or directory"):
+        load_scenario(tmp_path / "nowhere.xosc")
+
+
+def test_entities_and_their_controllers(scenario_xml: Build) -> None:
+    walker = f"""<ScenarioObject name="Walker"><Pedestrian name="p" mass="80" pedestrianCategory="pedestrian">{BOX}
+    </Pedestrian></ScenarioObject>"""
+    mast = f"""<ScenarioObject name="RSU"><MiscObject name="mast" mass="99" miscObjectCategory="pole">{BOX}</MiscObject>
+    {CONTROLLER}</ScenarioObject>"""
+    scenario = load_scenario(scenario_xml(entities=walker + mast))
+    assert {name: type(one) for name, one in scenario.entities.items()} == {
+        "Walker": model.Pedestrian,
+        "RSU": model.MiscObject,
+    }
+    assert scenario.controllers["Walker"] == ()
+    (driver,) = scenario.controllers["RSU"]
+    assert driver.properties is not None
+    assert driver.properties.property[0].value == "eidrive"
+    assert driver.properties.property[0].line > driver.line
+
+
+def test_trailers_are_entities(scenario_xml: Build) -> None:
+    xml = scenario_xml().decode()
+    start, end = xml.index("<Vehicle"), xml.index("</Vehicle>")
+    trailer = f'<Trailer><Trailer name="Trailer">{xml[start:end]}</Vehicle></Trailer></Trailer>'
+    scenario = load_scenario((xml[:end] + trailer + xml[end:]).encode())
+    assert list(scenario.entities) == ["Ego", "Trailer"]
+
+
+@pytest.mark.parametrize(
+    ("reference", "kind"),
+    [
+        ("event", "event"),
+        ("maneuver/event", "event"),
+        ("story/act/group/maneuver/event", "event"),
+        ("act::event", "event"),
+        ("action", "action"),
+        ("group", "maneuverGroup"),
+        ("story", "story"),
+    ],
+)
+def test_storyboard_elements_are_found_by_name_and_by_path(
+    scenario_xml: Build, story_xml: Text, reference: str, kind: str
+) -> None:
+    story = story_xml(condition=state_condition(reference, kind))
+    assert load_scenario(scenario_xml(story=story)).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("reference", "kind", "message"),
+    [
+        ("evnet", "event", r"names the event 'evnet', which is not there; did you mean 'event'\?"),
+        ("other/event", "event", r"names the event 'other/event', which is not there; did you mean 'event'\?"),
+        ("act", "event", r"'act' is of the kind act, not event; write storyboardElementType='act'"),
+    ],
+)
+def test_storyboard_elements_that_are_not_there(
+    scenario_xml: Build, story_xml: Text, reference: str, kind: str, message: str
+) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(scenario_xml(story=story_xml(condition=state_condition(reference, kind))))
+
+
+@pytest.mark.parametrize(
+    ("condition", "message"),
+    [
+        ('<VariableCondition variableRef="v" rule="equalTo" value="1"/>', "names the variable 'v'"),
+        ('<ParameterCondition parameterRef="p" rule="equalTo" value="1"/>', "names the parameter 'p'"),
+        (
+            '<TrafficSignalControllerCondition trafficSignalControllerRef="c" phase="go"/>',
+            "names the signal controller 'c'",
+        ),
+    ],
+)
+def test_dangling_names(scenario_xml: Build, story_xml: Text, condition: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(scenario_xml(story=story_xml(condition=condition)))
+
+
+def test_criteria_of_scenario_runner_name_no_parameter(scenario_xml: Build) -> None:
+    stop = """<ConditionGroup><Condition name="criteria_CollisionTest" delay="0" conditionEdge="rising">
+    <ByValueCondition><ParameterCondition parameterRef="" value="" rule="lessThan"/></ByValueCondition>
+    </Condition></ConditionGroup>"""
+    assert load_scenario(scenario_xml(stop=stop)).warnings == ()
+
+
+def test_values_that_exclude_each_other(scenario_xml: Build, story_xml: Text) -> None:
+    keep = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" freespace="true" continuous="true"
+    distance="10" timeGap="2"/></LongitudinalAction>"""
+    with pytest.raises(ScenarioError, match="either distance or timeGap"):
+        load_scenario(scenario_xml(story=story_xml(action=keep)))
+
+
+def test_a_name_side_by_side_with_its_double_is_a_warning(scenario_xml: Build, story_xml: Text) -> None:
+    scenario = load_scenario(scenario_xml(story=story_xml() + story_xml()))
+    assert scenario.warnings[0].message == "two elements of the kind story are named 'story'"
+
+
+class TestRoadFile:
+    LOGIC = '<LogicFile filepath="{}"/>'
+
+    def test_beside_the_scenario(self, tmp_path: Path, scenario_xml: Build) -> None:
+        (tmp_path / "roads").mkdir()
+        (tmp_path / "roads" / "town.xodr").touch()
+        path = tmp_path / "scene.xosc"
+        path.write_bytes(scenario_xml(road=self.LOGIC.format("roads/town.xodr")))
+        assert load_scenario(path).road_file == tmp_path / "roads" / "town.xodr"
+
+    @pytest.mark.parametrize("name", ["Town01", "Town01.xodr", "../elsewhere/Town01.xodr", "C:\\maps\\Town01.xodr"])
+    def test_in_a_folder_of_maps(
+        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        (tmp_path / "Town01.xodr").touch()
+        monkeypatch.setenv("EIDRIVE_MAPS", f"/nonexistent:{tmp_path}")
+        assert load_scenario(scenario_xml(road=self.LOGIC.format(name))).road_file == tmp_path / "Town01.xodr"
+
+    def test_the_nearest_name_is_shown(
+        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "Town01.xodr").touch()
+        monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
+        with pytest.raises(ScenarioError, match=r"no road file 'Twon01\.xodr' .* did you mean 'Town01\.xodr'\?"):
+            load_scenario(scenario_xml(road=self.LOGIC.format("Twon01.xodr")))
+
+    def test_none_is_named(self, scenario_xml: Build) -> None:
+        assert load_scenario(scenario_xml()).road_file is None
