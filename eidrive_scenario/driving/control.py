@@ -61,7 +61,7 @@ class Controller:
         if target < STANDSTILL and ego.speed < STANDSTILL:
             self._speed.reset()
             return -HOLDING
-        return self._speed.update(target - ego.speed, falling)
+        return self._speed.update(target - ego.speed, falling or plan.acceleration)
 
     def _pedals(self, acceleration: float, steering: float) -> Control:
         if acceleration >= 0.0:

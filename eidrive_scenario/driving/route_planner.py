@@ -28,9 +28,9 @@ BEHIND = 5
 
 
 class RoutePlanner(Planner):
-    """Drives by the shortest route to the goal's last waypoint through the others, and stops there.
+    """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
 
-    Without waypoints it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
+    Without either it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
     joined by a smooth curve. Objects are not looked at. Raises RouteError if no road leads to a waypoint.
     """
 
@@ -39,7 +39,7 @@ class RoutePlanner(Planner):
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         self._path: Path | None = None
-        self._waypoints: Array | None = None
+        self._way: tuple[Array | None, Array | None] = (None, None)
         self._progress = 0
         self._lane: list[LaneLocation] = []
         self._first_speed: float | None = None
@@ -54,8 +54,10 @@ class RoutePlanner(Planner):
         part = slice(self._progress, self._progress + HORIZON)
         target = self._target_speed(ego, goal)
         speeds = np.minimum(path.limits[part], target)
-        reason = "keep speed" if speeds[0] >= target else "curve or end of route ahead"
-        return Plan(path.points[part], speeds, reason)
+        free = bool(speeds[0] >= target)
+        reason = "keep speed" if free else "curve or end of route ahead"
+        acceleration = goal.acceleration if goal is not None and free else 0.0
+        return Plan(path.points[part], speeds, reason, acceleration)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
         if goal is not None and goal.speed is not None:
@@ -67,15 +69,19 @@ class RoutePlanner(Planner):
         return self._first_speed
 
     def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> Path:
-        waypoints = None if goal is None else goal.waypoints
-        if self._path is None or not _same(waypoints, self._waypoints):
-            self._waypoints, self._progress, self._lane = waypoints, 0, []
-            if waypoints is not None and len(waypoints):
-                line = self._by_road(x, y, waypoints)
-                self._path = Path(_curve(x, y, yaw, waypoints) if line is None else line, ends=True)
-            else:
-                self._path = self._lane_ahead(x, y, yaw)
+        way = (None, None) if goal is None else (goal.path, goal.waypoints)
+        if self._path is None or not all(map(_same, way, self._way)):
+            self._way, self._progress, self._lane = way, 0, []
+            self._path = self._laid_out(x, y, yaw, *way)
         return self._path
+
+    def _laid_out(self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None) -> Path:
+        if path is not None and len(path) > 1:
+            return Path(path[:, :2], ends=True)
+        if waypoints is not None and len(waypoints):
+            line = self._by_road(x, y, waypoints)
+            return Path(_curve(x, y, yaw, waypoints) if line is None else line, ends=True)
+        return self._lane_ahead(x, y, yaw)
 
     def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
         """The route through all waypoints, None if one of them or the vehicle itself is on no road."""

@@ -18,11 +18,15 @@ Array = NDArray[np.float64]
 class Goal:
     """What the storyboard asks of a driven vehicle; None leaves it to the agent's own settings.
 
-    speed      to reach and keep [m/s]
-    waypoints  (M, 3) points to pass, the last is the destination [m], world frame
+    speed      to have now [m/s]
+    acceleration  with which that speed is changing [m/s²]
+    path       (M, 3) points of a line to drive along, to its end [m], world frame
+    waypoints  (M, 3) points to pass where there is no path, the last is the destination [m]; the agent finds the way
     """
 
     speed: float | None = None
+    acceleration: float = 0.0
+    path: Array | None = None
     waypoints: Array | None = None
 
 
@@ -33,6 +37,8 @@ class Plan:
     points: Array
     speeds: Array
     reason: str
+    acceleration: float = 0.0
+    """With which the first speed is changing [m/s²]."""
     braking: float | None = None
     """A deceleration to apply whatever the speeds say [m/s²]."""
 
