@@ -38,7 +38,7 @@ def lane_strips(road: Road, section: LaneSection, cuts: Array) -> Iterator[Strip
         if road.junction_id is not None and lane.type == "none" and lane.id:
             continue
         marks = lane.road_marks
-        for mark, following in zip(marks, (*marks[1:], None), strict=True):
+        for mark, following in zip(marks, (*marks[1:], None), strict=False):
             start = section.s + max(mark.s_offset, 0.0)
             end = section.end if following is None else min(section.s + following.s_offset, section.end)
             if mark.type in PAINTED and end - start > 1e-3:

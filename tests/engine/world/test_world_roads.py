@@ -1,0 +1,112 @@
+"""Driven cars on slopes, rays over hills, buildings from the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.dynamics import GRAVITY
+
+CarFactory = Callable[..., ActorSpec]
+
+ROAD = """<OpenDRIVE>
+  <header revMajor="1" revMinor="6" name="" version="1.0"/>
+  <road name="" length="400" id="1" junction="-1">
+    <planView><geometry s="0" x="0" y="0" hdg="{heading}" length="400"><line/></geometry></planView>
+    <elevationProfile>{elevation}</elevationProfile>
+    <lateralProfile><superelevation s="0" a="{bank}" b="0" c="0" d="0"/></lateralProfile>
+    <lanes><laneSection s="0">
+      <center><lane id="0" type="none" level="false"/></center>
+      <right>
+        <lane id="-1" type="driving" level="false"><width sOffset="0" a="8" b="0" c="0" d="0"/></lane>
+      </right>
+    </laneSection></lanes>
+    <objects>{objects}</objects>
+  </road>
+</OpenDRIVE>"""
+
+
+def road(elevation: str = "", heading: float = 0.0, bank: float = 0.0, objects: str = "") -> RoadNetwork:
+    return RoadNetwork.parse(ROAD.format(elevation=elevation, heading=heading, bank=bank, objects=objects))
+
+
+def slope(grade: float) -> str:
+    return f'<elevation s="0" a="0" b="{grade}" c="0" d="0"/>'
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_a_car_follows_the_slope(car: CarFactory, heading: float) -> None:
+    along = np.array([math.cos(heading), math.sin(heading)])
+    aside = np.array([math.sin(heading), -math.cos(heading)])
+    with World(road(slope(0.05), heading)) as world:
+        x, y = 10 * along + 4 * aside
+        world.add(car(), Placement(x, y, yaw=heading, speed=10.0), driven=True)
+        for _ in range(60):
+            world.step({}, {"Ego": Control(throttle=0.3)})
+            view = world.view()
+            travelled = view.position[0, :2] @ along
+            assert view.position[0, 2] == pytest.approx(0.05 * travelled, abs=1e-6)
+        assert view.pitch[0] == pytest.approx(-math.atan(0.05), abs=1e-9)
+        assert view.roll[0] == pytest.approx(0.0, abs=1e-9)
+        assert view.velocity[0, 2] == pytest.approx(0.05 * math.hypot(*view.velocity[0, :2]), rel=1e-3)
+        assert abs(view.position[0, :2] @ aside - 4.0) < 1e-3
+
+
+def test_gravity_pulls_along_the_slope_and_the_brake_holds(car: CarFactory) -> None:
+    free = {"drag_area": 0, "rolling_resistance": 0}
+    with World(road(slope(0.08))) as world:
+        world.add(car("Rolls", **free), Placement(200.0, -2.0), driven=True)
+        world.add(car("Held", **free), Placement(200.0, -6.0), driven=True)
+        for _ in range(40):
+            world.step({}, {"Held": Control(brake=0.3)})
+        view = world.view()
+    assert view.speed[0] == pytest.approx(-GRAVITY * math.sin(math.atan(0.08)) * 2.0, rel=0.02)
+    assert view.speed[1] == pytest.approx(0.0, abs=1e-9)
+    assert view.position[1, 0] == pytest.approx(200.0, abs=1e-3)
+
+
+def test_a_bank_rolls_the_car(car: CarFactory) -> None:
+    with World(road(bank=0.06)) as world:
+        world.add(car(), Placement(50.0, -4.0, yaw=math.pi, speed=5.0), driven=True)
+        world.step({}, {})
+        view = world.view()
+    # Against the direction of the road, what lifted the left now lifts the right.
+    assert view.roll[0] == pytest.approx(-0.06, abs=1e-3)
+    assert view.position[0, 2] == pytest.approx(-4.0 * math.tan(0.06), rel=0.02)
+
+
+def test_a_crest_hides_what_is_behind_it(car: CarFactory) -> None:
+    crest = '<elevation s="0" a="0" b="0.1" c="0" d="0"/><elevation s="100" a="10" b="-0.1" c="0" d="0"/>'
+    with World(road(crest)) as world:
+        world.add(car("Behind"), Placement(150.0, -4.0, 5.0))
+        assert world.cast([[50.0, -4.0, 6.5]], [[151.0, -4.0, 6.0]]).rows.tolist() == [-1]
+        assert world.cast([[50.0, -4.0, 16.0]], [[151.0, -4.0, 6.0]]).rows.tolist() == [0]
+        ground = world.cast([[60.0, -4.0, 20.0]], [[60.0, -4.0, -5.0]])
+        assert ground.position[0, 2] == pytest.approx(6.0, abs=0.05)
+
+
+def test_a_building_of_the_map_stands_in_the_way() -> None:
+    place = 's="50" t="20" zOffset="0" hdg="0"'
+    house = f'<object id="7" type="building" name="School" {place} length="20" width="10" height="9"/>'
+    with World(road(objects=house)) as world:
+        hits = world.cast([[50.0, 0.0, 3.0], [50.0, 0.0, 12.0]], [[50.0, 40.0, 3.0], [50.0, 40.0, 12.0]])
+    assert hits.rows.tolist() == [-1, -2]
+    assert hits.position[0] == pytest.approx((50.0, 15.0, 3.0), abs=1e-3)
+
+
+def test_the_picture_shows_road_and_verge() -> None:
+    pose = np.array([[0.0, 0.0, 1.0, 10.0], [-1.0, 0.0, 0.0, -4.0], [0.0, -1.0, 0.0, 2.0], [0.0, 0.0, 0.0, 1.0]])
+    with World(road()) as world:
+        picture = world.camera(pose, 160, 120, math.radians(90))
+    middle, left = picture.rgb[115, 80].astype(int), picture.rgb[70, 2].astype(int)
+    assert max(middle) - min(middle) < 15
+    assert left[1] > left[0] + 10
+    assert left[1] > left[2] + 10
+    # Flat ground 2 m below at the middle of row 115, 35.5 lines below the axis, with a focal length of 80.
+    assert picture.depth[115, 80] == pytest.approx(2.0 * 80 / 55.5, rel=0.01)
