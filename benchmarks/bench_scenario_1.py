@@ -1,8 +1,8 @@
 """How fast scenario 1 runs with the oracle on one core, against a bare pybullet loop, and where the time goes.
 
 The bare loop has the same bodies: it repeats the run's calls to pybullet that move them, step the physics and cast the
-rays, in the same order, and does nothing else; what the run reads back from pybullet it leaves out. Both are measured
-alternately in this process, after a warm-up; medians are printed.
+rays, in the same order, and does nothing else. A second one also reads back poses, velocities and contacts as the run
+does. All are measured alternately in this process, after a warm-up; medians are printed.
 
     python benchmarks/bench_scenario_1.py [--runs 7] [--seed 1] [--channel ideal]
 """
@@ -38,6 +38,7 @@ SETUP = frozenset({"setPhysicsEngineParameter", "createCollisionShape", "createM
                    "setCollisionFilterGroupMask", "removeBody"})  # fmt: skip
 LOOP = frozenset({"resetBasePositionAndOrientation", "resetBaseVelocity", "stepSimulation",
                   "performCollisionDetection", "rayTestBatch"})  # fmt: skip
+READING = frozenset({"getBasePositionAndOrientation", "getBaseVelocity", "getContactPoints"})
 
 
 @dataclass
@@ -69,7 +70,7 @@ class Trace:
 
 @contextmanager
 def listening(trace: Trace) -> Iterator[None]:
-    """Note each call to one of the functions of SETUP and LOOP while the run goes on."""
+    """Note each call to one of the functions of SETUP, LOOP and READING while the run goes on."""
 
     def noted(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*given: Any, **options: Any) -> Any:
@@ -78,7 +79,7 @@ def listening(trace: Trace) -> Iterator[None]:
 
         return call
 
-    originals = {name: getattr(bullet, name) for name in SETUP | LOOP}
+    originals = {name: getattr(bullet, name) for name in SETUP | LOOP | READING}
     for name, function in originals.items():
         setattr(bullet, name, noted(function))
     try:
@@ -88,13 +89,14 @@ def listening(trace: Trace) -> Iterator[None]:
             setattr(bullet, name, function)
 
 
-def bare_loop(trace: Trace) -> float:
-    """Seconds for the ticks of the trace in pybullet alone."""
+def bare_loop(trace: Trace, kinds: frozenset[str]) -> float:
+    """Seconds for the calls of these kinds in the ticks of the trace, in pybullet alone."""
+    chosen = [[call for call in calls if call[0].__name__ in kinds] for calls in trace.ticks]
     client = bullet.connect(bullet.DIRECT)
     for function, given, options in trace.setup:
         function(*given, **options, physicsClientId=client)
     started = time.perf_counter()
-    for calls in trace.ticks:
+    for calls in chosen:
         for function, given, options in calls:
             function(*given, **options, physicsClientId=client)
     seconds = time.perf_counter() - started
@@ -167,14 +169,17 @@ def main() -> None:
     trace = Trace()
     with listening(trace):
         simulated = build(trace).run().simulated_s
-    bare_loop(trace)
-    whole, loading, bare = [], [], []
+    bare_loop(trace, LOOP | READING)
+    whole, loading, bare, reading = [], [], [], []
     for _ in range(given.runs):
         loading.append(timed(lambda: build().close()))
         whole.append(build().run().wall_s)
-        bare.append(bare_loop(trace))
+        bare.append(bare_loop(trace, LOOP))
+        reading.append(bare_loop(trace, LOOP | READING))
     steps, rays = trace.count("stepSimulation"), trace.count("rayTestBatch", lambda call: len(call[1][0]))
-    ratios = [ours / theirs for ours, theirs in zip(whole, bare, strict=True)]
+    ratio, reading_ratio = (
+        median(ours / theirs for ours, theirs in zip(whole, alone, strict=True)) for alone in (bare, reading)
+    )
 
     print(
         f"{SCENARIO}, oracle, channel {given.channel}, seed {given.seed}: {simulated:.2f} s in {len(trace.ticks)} ticks"
@@ -183,8 +188,11 @@ def main() -> None:
     print(f"  simulated s per wall s     {simulated / median(whole):8.1f}   (aim: at least 30)")
     print(f"  the same with loading      {simulated / (median(whole) + median(loading)):8.1f}")
     print(f"  per tick                   {1e3 * median(whole) / len(trace.ticks):8.3f} ms")
-    print(f"  bare pybullet loop         {1e3 * median(bare) / len(trace.ticks):8.3f} ms per tick")
-    print(f"  ratio to the bare loop     {median(ratios):8.2f}   (aim: below 3)")
+    print(f"  bare pybullet loop         {1e3 * median(bare) / len(trace.ticks):8.3f} ms per tick, ratio {ratio:.2f}")
+    print(
+        f"  the same, reading back     {1e3 * median(reading) / len(trace.ticks):8.3f} ms per tick, "
+        f"ratio {reading_ratio:.2f}   (aim: below 3)"
+    )
     profile = cProfile.Profile()
     simulation = build()
     profile.enable()

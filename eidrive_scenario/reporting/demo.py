@@ -14,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.text import Text
 
@@ -43,6 +44,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
 from eidrive_scenario.world.specs import actor_spec
 
+Array = NDArray[np.float64]
 Told = tuple[RunResult, Story | None]
 
 
@@ -51,28 +53,32 @@ def tell(job: Job, watched: int) -> Told:
     path = resolve_scenario(job.scenario)
     if job.seed != watched:
         return run_file(path, seed=job.seed, settings=job.settings), None
-    observer = KeyFrames(EGO, HIDDEN)
+    observer = KeyFrames(EGO, HIDDEN, conflict_areas(load_for_seed(path, job.seed, job.settings.parameters)))
     result = run_file(path, seed=job.seed, settings=job.settings, observers=(observer,))
     return result, observer.story()
+
+
+def conflict_areas(scenario: Scenario) -> tuple[Array, ...]:
+    """The areas for which the ego brakes, polygons (M, 2) [m]."""
+    return tuple(
+        np.array(polygon)
+        for controller in scenario.controllers.get(EGO, ())
+        if is_agent(controller)
+        for polygon in agent_settings(controller).conflict_area or ()
+    )
 
 
 def place_of(name: str, seed: int, story: Story) -> Place:
     """What the pictures of a scenario share, and camera pictures out of one of its runs."""
     scenario = load_for_seed(resolve_scenario(name), seed, RunSettings().parameters)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
-    areas = [
-        np.array(polygon)
-        for controller in scenario.controllers.get(EGO, ())
-        if is_agent(controller)
-        for polygon in agent_settings(controller).conflict_area or ()
-    ]
     drawing = road_drawing(roads.roads.values() if roads is not None else ())
-    return Place(drawing, tuple(areas), _views(scenario, roads, story))
+    return Place(drawing, conflict_areas(scenario), _views(scenario, roads, story))
 
 
 def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple[CameraPicture, ...]:
     """The street at the instant in which the ego brakes, as it and its helper see it."""
-    snapshot = story.moment("braked").snapshot or story.moment("hidden").snapshot
+    snapshot = next((moment.snapshot for moment in story.moments if moment.kind == "braked"), None)
     if snapshot is None:
         return ()
     view, pictures = snapshot.view, []
@@ -81,7 +87,7 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
     pictures.append(
         CameraPicture(
             f"What {EGO} sees",
-            f"at {view.time:.2f} s, when it brakes for a car that it has only heard of",
+            f"at {view.time:.2f} s, as it begins to brake",
             street_picture(bodies, roads, view, pose, without=EGO),
         )
     )

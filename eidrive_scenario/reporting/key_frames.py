@@ -5,12 +5,18 @@ from __future__ import annotations
 import bisect
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.geometry import box_distance, points_in_polygon
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
+
+Array = NDArray[np.float64]
 
 NEAR = 3.0
 """A box whose centre is this near to where the car was then is taken for it [m]."""
@@ -21,7 +27,7 @@ class Moment:
     """One decisive instant: what happened, and the picture; None where it never came to that."""
 
     kind: str
-    """hidden, heard, braked or closest"""
+    """heard or hidden, entered, braked, closest"""
     title: str
     snapshot: Snapshot | None
 
@@ -52,14 +58,17 @@ class Story:
 class KeyFrames:
     """An observer of a run that keeps its decisive instants.
 
+    heard    the ego knows the car from others alone; where it never does:
     hidden   others see the car, and the ego does not (any more)
-    heard    the ego knows the car from others alone
+    entered  the car's centre enters a conflict area, where there are any
     braked   the ego brakes with a deceleration that its plan asks for
     closest  the smallest gap between the bodies, or their first touch
+
+    `areas` are the conflict areas, polygons (M, 2) [m].
     """
 
-    def __init__(self, ego: str, hidden: str) -> None:
-        self.ego, self.hidden = ego, hidden
+    def __init__(self, ego: str, hidden: str, areas: Sequence[Array] = ()) -> None:
+        self.ego, self.hidden, self.areas = ego, hidden, tuple(areas)
         self._knowledge = Knowledge(ego)
         self._times: list[float] = []
         self._where: list[tuple[float, float]] = []
@@ -89,12 +98,15 @@ class KeyFrames:
     def story(self) -> Story:
         """What was found so far."""
         moments = []
+        first = "heard" if "heard" in self._found else "hidden"
         for kind, absent in (
-            ("hidden", f"{self.hidden} is never in sight of others alone"),
-            ("heard", f"{self.ego} never knows {self.hidden} from others alone"),
+            (first, f"{self.hidden} is never in sight of others alone"),
+            ("entered", f"{self.hidden} never enters the conflict area"),
             ("braked", f"{self.ego} never brakes for it"),
             ("closest", "the two are never there together"),
         ):
+            if kind == "entered" and not self.areas:
+                continue
             title, snapshot = self._found.get(kind, (absent, None))
             moments.append(Moment(kind, title, snapshot and _portable(snapshot)))
         return Story(
@@ -134,6 +146,10 @@ class KeyFrames:
                 if senders:
                     title = f"{self.ego} knows {self.hidden} from {_listed(senders)} alone"
                     self._found["heard"] = (title, snapshot)
+        if "entered" not in self._found and self.areas:
+            at = snapshot.view.centres[snapshot.view.row(self.hidden), :2]
+            if any(points_in_polygon(at, area) for area in self.areas):
+                self._found["entered"] = (f"{self.hidden} enters the conflict area", snapshot)
         if "braked" not in self._found and step is not None and step.plan is not None and step.plan.braking is not None:
             self._found["braked"] = (f"{self.ego} brakes", snapshot)
 

@@ -19,8 +19,11 @@ from eidrive_scenario.world.view import WorldView
 Play = Callable[..., list[Frame]]
 
 
+AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
+
+
 def story_of(frames: list[Frame]) -> Story:
-    observer = KeyFrames("Ego", "Incoming")
+    observer = KeyFrames("Ego", "Incoming", [AREA])
     for frame in frames:
         observer.observe(frame)
     observer.close()
@@ -47,7 +50,7 @@ def time_of(story: Story, kind: str) -> float:
 
 
 def test_the_helper_sees_the_car_at_20_m(street: Play) -> None:
-    story = story_of(street(1))
+    story = story_of(street(None))
     assert time_of(story, "hidden") == pytest.approx(1.40)
     assert story.moment("hidden").title == "RSU sees Incoming, Ego does not"
 
@@ -62,7 +65,7 @@ def test_the_ego_hears_of_it_as_many_ticks_later_as_the_message_takes(street: Pl
 def test_what_the_ego_sees_itself_is_not_hidden(street: Play) -> None:
     """Until 1.00 s the ego sees the car too; the RSU sees it all the time."""
     frames = []
-    for frame in street(1):
+    for frame in street(None):
         seen = detections_of(frame.view, "Incoming")
         steps = {
             "Ego": dataclasses.replace(
@@ -79,15 +82,27 @@ def test_lost_messages_put_it_off(street: Play) -> None:
     assert time_of(story, "heard") == pytest.approx(1.60)
 
 
-def test_without_a_channel_the_ego_neither_hears_nor_brakes(street: Play) -> None:
+def test_without_a_channel_the_ego_does_not_brake(street: Play) -> None:
     story = story_of(street(None))
     assert [(moment.kind, moment.snapshot is None) for moment in story.moments] == [
         ("hidden", False),
-        ("heard", True),
+        ("entered", False),
         ("braked", True),
         ("closest", False),
     ]
-    assert story.moment("heard").title == "Ego never knows Incoming from others alone"
+    assert story.moment("braked").title == "Ego never brakes for it"
+
+
+def test_the_car_enters_the_area_when_its_centre_does(street: Play) -> None:
+    """y = 39.5 - 14 t falls below 10.5 m after 2.071 s."""
+    assert time_of(story_of(street(1)), "entered") == pytest.approx(2.10)
+
+
+def test_without_an_area_nothing_is_told_of_one(street: Play) -> None:
+    observer = KeyFrames("Ego", "Incoming")
+    for frame in street(1):
+        observer.observe(frame)
+    assert [moment.kind for moment in observer.story().moments] == ["heard", "braked", "closest"]
 
 
 def test_distances_over_time_are_those_of_centres_and_bodies(street: Play) -> None:
