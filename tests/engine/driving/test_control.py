@@ -94,10 +94,8 @@ def test_it_stops_at_the_destination_and_stays(car: ActorSpec, vehicle: Any) -> 
 @pytest.mark.parametrize("offset", [0.5, 1.5, -1.5])
 def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, offset: float) -> None:
     ego = vehicle(y=offset, speed=10.0)
-    goal = Goal(speed=10.0, waypoints=np.array([[200.0, 0.0, 0.0]]))
+    goal = Goal(speed=10.0, path=np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]]))
     route, controller = planner(car), Controller(car, 0.05)
-    route._path = Path(np.array([[0.0, 0.0], [300.0, 0.0]]), ends=True)
-    route._waypoints = goal.waypoints
     for _ in range(120):
         state = ego.state()
         ego.drive(controller.control(state, route.plan(state, NOTHING, goal, ego.time)))
