@@ -6,9 +6,9 @@ python -m eidrive_scenario.reporting.demo --out reports/demo.html
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -33,6 +33,7 @@ from eidrive_scenario.experiments.paper import (
     tabulate,
 )
 from eidrive_scenario.experiments.repetitions import Job, jobs_of, repeat
+from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
@@ -99,10 +100,10 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
 
 
 def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
-    """All results as JSON, one object a run as `--json` prints it. Returns `out`."""
+    """All results as JSON, one object a run as `--json` prints it, one line each. Returns `out`."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    objects = [{**result.as_json(), "scenario": job.scenario} for job, result in runs]
-    out.write_text(json.dumps(objects, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    lines = (as_json_text(replace(result, scenario=job.scenario)) for job, result in runs)
+    out.write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
     return out
 
 

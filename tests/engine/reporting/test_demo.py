@@ -1,0 +1,56 @@
+"""The main job end to end, with one seed."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from eidrive_scenario.experiments.paper import SCENARIOS, checks, run_settings
+from eidrive_scenario.reporting.demo import demo, main
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, tuple[bool, ...]]:
+    out = tmp_path_factory.mktemp("demo") / "demo.html"
+    printed = io.StringIO()
+    tables = demo(out, range(1, 2), 1, Console(file=printed, width=80))
+    return out, printed.getvalue(), tuple(check.holds for table in tables for check in checks(table)[:2])
+
+
+def test_cooperation_keeps_farther_away_than_none_and_than_late_messages(
+    done: tuple[Path, str, tuple[bool, ...]],
+) -> None:
+    assert all(done[2])
+
+
+def test_both_tables_and_the_sentence_are_printed(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+    text = done[1]
+    assert text.count("Table II") == 2
+    assert text.count("no cooperation ") >= 4
+    assert "Delaying and dropping the ego's own detections" in text
+    assert "14/14" in text
+
+
+def test_every_run_is_kept_as_json(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+    runs = json.loads(done[0].with_suffix(".json").read_text(encoding="utf-8"))
+    assert {(run["scenario"], run["channel"]) for run in runs} == {(s, c) for s in SCENARIOS for c in run_settings()}
+    assert all(len(run["trace_hash"]) >= 16 for run in runs)
+
+
+def test_the_page_has_camera_pictures_of_ego_and_helper(done: tuple[Path, str, tuple[bool, ...]]) -> None:
+    page = done[0].read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 4
+    assert "What RSU sees" in page
+    assert "What Spectator sees" in page
+
+
+@pytest.mark.parametrize("arguments", [["--seeds", "0"], ["--workers", "0"], ["--sedes", "3"]])
+def test_wrong_arguments_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert "error:" in capsys.readouterr().err
