@@ -7,6 +7,8 @@ import sys
 import tempfile
 from typing import Any
 
+from eidrive_scenario.errors import SimulationError
+
 _NOTICE = b"pybullet build time:"
 
 
@@ -38,3 +40,11 @@ def _import_silently() -> Any:
 
 
 bullet: Any = _import_silently()
+
+
+def connect() -> int:
+    """A new client without a window. Raises SimulationError when pybullet has no more to give."""
+    client: int = bullet.connect(bullet.DIRECT)
+    if client < 0:
+        raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
+    return client

@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.bodies import Body, quaternion
-from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.bullet import bullet, connect
 from eidrive_scenario.world.camera import Array, Picture, metres, projection_matrix, sky, view_matrix
 from eidrive_scenario.world.meshes import actor_mesh, shadow
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
@@ -36,9 +35,7 @@ class Visuals:
     """
 
     def __init__(self, scenery: Scenery) -> None:
-        self._client: int = bullet.connect(bullet.DIRECT)
-        if self._client < 0:
-            raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
+        self._client = connect()
         self._scenery = scenery
         self._parts: dict[str, tuple[Body, list[int]]] = {}
         self._shown_buildings = 0

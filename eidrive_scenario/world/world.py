@@ -14,28 +14,17 @@ from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
-from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.bullet import bullet, connect
 from eidrive_scenario.world.camera import Picture
-from eidrive_scenario.world.contacts import ContactTracker, Touch, closing_speed
+from eidrive_scenario.world.contacts import ContactTracker
 from eidrive_scenario.world.ground import GroundUnder
+from eidrive_scenario.world.physics import Physics, substeps_per_tick
 from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.visuals import Visuals
 
 Array = NDArray[np.float64]
-
-_ROLL = Control()
-
-
-def substeps_per_tick(dt: float, physics_rate: float) -> int:
-    """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them."""
-    exact = dt * physics_rate
-    count = round(exact)
-    if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
-        what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
-        raise SettingError(Problem(what, "choose dt and the rate so that this is a whole number, at least 1"))
-    return count
 
 
 class _Cast(NamedTuple):
@@ -58,13 +47,8 @@ class World:
     def __init__(self, roads: RoadNetwork | None = None, *, dt: float = 0.05, physics_rate: float = 200.0) -> None:
         self.dt = dt
         self.tick = 0
-        self._substeps = substeps_per_tick(dt, physics_rate)
-        self._client: int = bullet.connect(bullet.DIRECT)
-        if self._client < 0:
-            raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
-        bullet.setPhysicsEngineParameter(
-            fixedTimeStep=dt / self._substeps, deterministicOverlappingPairs=1, physicsClientId=self._client
-        )
+        substeps = substeps_per_tick(dt, physics_rate)
+        self._client = connect()
         self._roads = roads
         self._bodies: dict[str, Body] = {}
         self._driven: dict[str, DrivenBody] = {}
@@ -78,6 +62,7 @@ class World:
         self._row_of_handle = np.empty(0, dtype=np.int64)
         self._broadphase_fresh = False
         self._scenery = Scenery(self._client, roads)
+        self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
         self._changed()
 
@@ -172,10 +157,10 @@ class World:
                     body.place(placement)
             elif placement is not None:
                 self._driven[name].jump(placement)
-        touches = self._drive(controls) if self._driven else {}
+        touches = self._physics.tick(self._bodies, self._driven, controls, self._friction) if self._driven else {}
         self.tick += 1
         self._view = None
-        self._broadphase_fresh = False
+        self._broadphase_fresh = bool(self._driven)
         self._contacts = self._tracker.update(self._in_order, touches)
 
     def view(self) -> WorldView:
@@ -253,7 +238,7 @@ class World:
     def _enter(self, spec: ActorSpec, placement: Placement, driven: bool) -> None:
         if driven:
             ground = GroundUnder(None if self._scenery.level else self._roads, placement.z)
-            body = DrivenBody(self._client, spec, placement, self.dt, self.dt / self._substeps, ground)
+            body = DrivenBody(self._client, spec, placement, self.dt, self._physics.step, ground)
             self._driven[spec.name] = body
             self._bodies[spec.name] = body
         else:
@@ -287,81 +272,3 @@ class World:
         if not self._broadphase_fresh:
             bullet.performCollisionDetection(physicsClientId=self._client)
             self._broadphase_fresh = True
-
-    def _drive(self, controls: Mapping[str, Control]) -> dict[tuple[str, str], Touch]:
-        """All physics steps of this tick; returns the contacts that pybullet resolved in it."""
-        client, friction = self._client, self._friction
-        driven = [(body, controls.get(name, _ROLL)) for name, body in self._driven.items()]
-        passing, watched = self._within_reach()
-        touches: dict[tuple[str, str], Touch] = {}
-        for number in range(self._substeps):
-            for scripted in passing:
-                scripted.pass_through(number / self._substeps)
-            for body, control in driven:
-                body.drive(control, friction)
-            before = {body.handle: body.present_velocity() for body in watched}
-            bullet.stepSimulation(physicsClientId=client)
-            for body in watched:
-                self._note_touches(body, before, touches)
-        for scripted in passing:
-            scripted.settle()
-        for body, _ in driven:
-            body.read_back()
-        bullet.performCollisionDetection(physicsClientId=client)
-        self._broadphase_fresh = True
-        return touches
-
-    def _within_reach(self) -> tuple[list[ScriptedBody], list[DrivenBody]]:
-        """Scripted bodies that move near a driven one, and the driven ones near any other body or a building."""
-        passing: dict[str, ScriptedBody] = {}
-        watched: list[DrivenBody] = []
-        for name, body in self._driven.items():
-            near = self._scenery.near(body.centre_x, body.centre_y, self._reach(body))
-            for other_name, other in self._bodies.items():
-                if other_name == name:
-                    continue
-                dx, dy = other.centre_x - body.centre_x, other.centre_y - body.centre_y
-                reach = self._reach(body) + self._reach(other)
-                if dx * dx + dy * dy <= reach * reach:
-                    near = True
-                    if isinstance(other, ScriptedBody) and other.moved:
-                        passing[other_name] = other
-            if near:
-                watched.append(body)
-        return list(passing.values()), watched
-
-    def _reach(self, body: Body) -> float:
-        """How far any part of a body can be from its centre during a tick, with a margin for blows [m]."""
-        vx, vy, _ = body.velocity
-        return body.radius + (abs(vx) + abs(vy) + 20.0) * self.dt + 1.0
-
-    def _note_touches(
-        self, body: DrivenBody, before: Mapping[int, Vector3], touches: dict[tuple[str, str], Touch]
-    ) -> None:
-        """Add what pybullet resolved between this body and others in the last physics step."""
-        for point in bullet.getContactPoints(body.handle, physicsClientId=self._client):
-            gap, force, other_handle = point[8], point[9], point[2] if point[1] == body.handle else point[1]
-            if gap > 0.0 and force <= 0.0:
-                continue
-            row = self._row_of_handle[other_handle]
-            other = self._in_order[row] if row >= 0 else None
-            pair = self._pair(body, other, other_handle)
-            if pair in touches:
-                continue
-            if other is None:
-                # A wall has no centre that matters: what counts is the speed towards it.
-                sign = 1.0 if point[1] == body.handle else -1.0
-                nx, ny, nz = point[7]
-                speed = closing_speed(before[body.handle], (0.0, 0.0, 0.0), (-sign * nx, -sign * ny, -sign * nz))
-            else:
-                theirs = before.get(other_handle, other.velocity)
-                apart = (other.centre_x - body.centre_x, other.centre_y - body.centre_y, other.centre_z - body.centre_z)
-                speed = closing_speed(before[body.handle], theirs, apart)
-            touches[pair] = Touch(point[5], speed)
-
-    def _pair(self, body: Body, other: Body | None, handle: int) -> tuple[str, str]:
-        """The names of two bodies in the order of the view's rows; a building comes last."""
-        if other is None:
-            return body.name, self._scenery.name_of(handle)
-        first, second = (body, other) if self._rows[body.name] < self._rows[other.name] else (other, body)
-        return first.name, second.name
