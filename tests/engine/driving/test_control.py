@@ -129,12 +129,12 @@ def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: fl
 def test_a_demanded_deceleration_is_the_pedal_exactly_and_steering_goes_on(car: ActorSpec, vehicle: Any) -> None:
     ego = vehicle(y=1.0, speed=8.0)
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]])
-    free, braked = (Plan(points, np.full(5, 8.0), "", braking) for braking in (None, 5.0))
+    free, braked = (Plan(points, np.full(5, 8.0), "", braking=braking) for braking in (None, 5.0))
     first, second = (Controller(car, 0.05).control(ego.state(), plan) for plan in (free, braked))
     assert second.throttle == 0.0
     assert second.brake == pytest.approx(5.0 / 9.0)
     assert second.steering == first.steering < 0.0
-    beyond = Plan(points, np.full(5, 8.0), "", 12.0)
+    beyond = Plan(points, np.full(5, 8.0), "", braking=12.0)
     assert Controller(car, 0.05).control(ego.state(), beyond).brake == 1.0
 
 
@@ -143,7 +143,7 @@ def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: Act
     ego, controller = vehicle(speed=8.0), Controller(car, 0.05)
     points = np.stack([np.arange(60.0), np.zeros(60)], axis=1)
     while ego.speed > 0.01 and ego.time < 5.0:
-        ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", 5.0)))
+        ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", braking=5.0)))
     assert 1.5 <= ego.time < 1.61
     assert 6.0 < ego.x < 6.4
 
