@@ -12,12 +12,12 @@ TYPES: dict[str, type[model.Element]] = {
 
 
 class CollisionCondition(EntityCondition):
-    """Its bounding box overlaps that of a named entity, or of any entity of a type."""
+    """Its bounding box touches that of a named entity, or of any entity of a type."""
 
     element: model.CollisionCondition
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Look for overlap."""
+        """Look for touch."""
         return bool(self._touched(stage, entity))
 
     def explain_for(self, stage: Stage, entity: str) -> str:
@@ -34,7 +34,18 @@ class CollisionCondition(EntityCondition):
 
     def _touched(self, stage: Stage, entity: str) -> list[str]:
         box = box_of(stage, entity)
-        return [name for name in self._others(stage) if name != entity and overlap(box, box_of(stage, name))]
+        # Bodies that rebound within a step no longer overlap at its end: the contact that began counts too.
+        begun = {
+            name
+            for contact in stage.view.contacts
+            for name in (contact.first, contact.second)
+            if entity in (contact.first, contact.second)
+        }
+        return [
+            name
+            for name in self._others(stage)
+            if name != entity and (name in begun or overlap(box, box_of(stage, name)))
+        ]
 
     def _others(self, stage: Stage) -> list[str]:
         if self.element.entity_ref is not None:
