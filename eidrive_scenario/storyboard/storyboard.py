@@ -49,6 +49,7 @@ class Storyboard:
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
         self.init.start()
+        self._refresh(self.stage.commands)
         return self._finished(self.stage.commands)
 
     def tick(self, view: WorldView) -> Commands:
@@ -64,6 +65,7 @@ class Storyboard:
         if self.root.state is State.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
         commands = self.stage.commands
+        self._refresh(commands)
         for name, actor in self.stage.actors.items():
             if not actor.present:
                 continue
@@ -72,6 +74,11 @@ class Storyboard:
             elif actor.motion.jumped:
                 commands.placements[name] = actor.motion.placement()
         return self._finished(commands)
+
+    def _refresh(self, commands: Commands) -> None:
+        """Who enters has the speed that later actions of the same tick gave it."""
+        for name in commands.additions:
+            commands.additions[name] = self.stage.actors[name].motion.placement()
 
     def _finished(self, commands: Commands) -> Commands:
         stage = self.stage

@@ -1,0 +1,154 @@
+"""A stage without roads and two cars on it, and doubles for conditions and actions whose course a test writes down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from py_trees.common import Status
+
+from eidrive_scenario.openscenario import load_scenario, model
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour, Domain
+from eidrive_scenario.storyboard.condition import Condition
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.world.view import WorldView
+
+CAR = """<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="car">
+  <BoundingBox><Center x="1.5" y="0" z="0.75"/><Dimensions width="2" length="5" height="1.5"/></BoundingBox>
+  <Performance maxSpeed="70" maxAcceleration="10" maxDeceleration="10"/>
+  <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.8" positionX="3" positionZ="0.3"/>
+  <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.8" positionX="0" positionZ="0.3"/></Axles>
+  <Properties/></Vehicle></ScenarioObject>"""
+
+SCENARIO = """<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="two cars" author="test"/>
+  <CatalogLocations/><RoadNetwork/>
+  <Entities>{cars}</Entities>
+  <Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard></OpenSCENARIO>"""
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+  <road name="street" length="{length}" id="1" junction="-1"><link/>
+    <planView><geometry s="0" x="0" y="0" hdg="0" length="{length}">{shape}</geometry></planView>
+    <lanes><laneSection s="0">
+      <left><lane id="1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></left>
+      <center><lane id="0" type="none" level="false"/></center>
+      <right>
+        <lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
+        <lane id="-2" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>
+      </right></laneSection></lanes></road></OpenDRIVE>"""
+
+
+def empty_view(time: float = 0.0, tick: int = 0) -> WorldView:
+    """A view of nobody."""
+    none, points = np.empty(0), np.empty((0, 3))
+    return WorldView(time, tick, (), (), points, none, none, none, points, points, none, none, points, points)
+
+
+class Clock:
+    """Steps a stage through time without a world."""
+
+    def __init__(self, stage: Stage, dt: float) -> None:
+        self.stage, self.dt, self.tick = stage, dt, -1
+
+    def step(self) -> Stage:
+        """One tick further."""
+        self.tick += 1
+        self.stage.begin(replace(self.stage.view, time=self.tick * self.dt, tick=self.tick), self.dt)
+        return self.stage
+
+
+class Script(Condition):
+    """A condition that holds as a list says, one value per evaluation; after its end the last one stays."""
+
+    def __init__(self, values: Sequence[bool]) -> None:
+        super().__init__(model.SimulationTimeCondition(rule=model.Rule.EQUAL_TO, value=0.0))
+        self.values, self.asked = list(values), 0
+
+    def holds(self, stage: Stage) -> bool:
+        value = self.values[min(self.asked, len(self.values) - 1)]
+        self.asked += 1
+        return value
+
+    def explain(self, stage: Stage) -> str:
+        return f"value {self.asked} at {stage.time:g} s"
+
+
+class Task(ActionBehaviour):
+    """An action that takes a number of ticks."""
+
+    def __init__(self, stage: Stage, ticks: int, *, actor: str | None = None, domain: Domain = Domain.NONE) -> None:
+        super().__init__(model.VisibilityAction(graphics=True, sensors=True, traffic=True), stage, actor=actor)
+        self.ticks, self.starts, self._domain = ticks, 0, domain
+
+    @property
+    def controls(self) -> Domain:
+        return self._domain
+
+    def initialise(self) -> None:
+        self.starts += 1
+        self._left = self.ticks
+
+    def update(self) -> Status:
+        self._left -= 1
+        return Status.SUCCESS if self._left <= 0 else Status.RUNNING
+
+
+@pytest.fixture
+def stage() -> Stage:
+    """A stage with cars A and B and no roads."""
+    cars = "".join(CAR.format(name=name) for name in "AB")
+    scenario = load_scenario(SCENARIO.format(cars=cars).encode())
+    return Stage(scenario, None, dt=0.1, seed=0, nobody=empty_view(tick=-1))
+
+
+@pytest.fixture
+def clock(stage: Stage) -> Clock:
+    """Time in steps of 0.1 s."""
+    return Clock(stage, 0.1)
+
+
+@pytest.fixture
+def script() -> Callable[[Sequence[bool]], Script]:
+    """Makes conditions."""
+    return Script
+
+
+@pytest.fixture
+def task(stage: Stage) -> Callable[..., Task]:
+    """Makes actions."""
+    return lambda ticks, **more: Task(stage, ticks, **more)
+
+
+@pytest.fixture
+def street() -> RoadNetwork:
+    """A straight street along x, 200 m: lane 1 (y = 2, towards -x), lanes -1 (y = -2) and -2 (y = -6, towards +x)."""
+    return RoadNetwork.parse(ROAD.format(length=200, shape="<line/>"))
+
+
+@pytest.fixture
+def bend() -> RoadNetwork:
+    """The same street in a left bend of radius 50 m, a quarter circle."""
+    return RoadNetwork.parse(ROAD.format(length=78.5398163397, shape='<arc curvature="0.02"/>'))
+
+
+ACT = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
+  <Actors selectTriggeringEntities="false"><EntityRef entityRef="A"/></Actors>
+  <Maneuver name="maneuver">{events}</Maneuver></ManeuverGroup></Act></Story>"""
+
+
+@pytest.fixture
+def build() -> Callable[..., Storyboard]:
+    """A storyboard over cars A and B without roads: A's actions in Init, events for A, stop trigger, global actions."""
+
+    def made(init: str, events: str = "", stop: str = "<StopTrigger/>", everywhere: str = "") -> Storyboard:
+        text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
+        actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
+        stories = ACT.format(events=events) if events else ""
+        text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)
+        return Storyboard(load_scenario(text.encode()), None, dt=0.1)
+
+    return made

@@ -1,0 +1,211 @@
+"""The state machine, tick by tick. Actions take a written number of ticks; triggers fire as a list says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.storyboard.behaviour import Domain
+from eidrive_scenario.storyboard.elements import (
+    ActElement,
+    ActionElement,
+    EventElement,
+    InitBlock,
+    ManeuverElement,
+    ManeuverGroupElement,
+    StoryboardElement,
+    StoryNode,
+)
+from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+
+YES, NO = True, False
+
+
+class Builder:
+    """Elements of one tree; paths do not matter here."""
+
+    def __init__(self, stage: Any, script: Any) -> None:
+        self.stage, self.script = stage, script
+
+    def wait(self, values: Any) -> Any:
+        if values is None:
+            return None
+        trigger = Trigger([ConditionGroup((ConditionMonitor(self.script(values)),))])
+        return WaitFor("trigger", trigger, self.stage)
+
+    def action(self, name: Any, *tasks: Any) -> Any:
+        by_actor = {task.actor_name: [task] for task in tasks}
+        return ActionElement(self.stage, (name,), lambda actor: by_actor[actor], list(by_actor))
+
+    def event(self, name: Any, *tasks: Any, start: Any = None, priority: Any = "parallel", limit: Any = 1) -> Any:
+        actions = [self.action(f"{name}.{number}", task) for number, task in enumerate(tasks)]
+        return EventElement(self.stage, (name,), actions, priority=priority, start=self.wait(start), limit=limit)
+
+    def maneuver(self, *events: Any) -> Any:
+        for event in events:
+            event.rivals = tuple(other for other in events if other is not event)
+        return ManeuverElement(self.stage, ("maneuver",), events)
+
+    def group(self, *maneuvers: Any, limit: Any = 1) -> Any:
+        return ManeuverGroupElement(self.stage, ("group",), maneuvers, limit=limit)
+
+    def act(self, *groups: Any, start: Any = None, stop: Any = None, name: Any = "act") -> Any:
+        return ActElement(self.stage, (name,), groups, start=self.wait(start), stop=self.wait(stop))
+
+    def storyboard(self, *acts: Any, stop: Any = None) -> Any:
+        story = StoryNode(self.stage, ("story",), acts)
+        return StoryboardElement(self.stage, ("storyboard",), [story], stop=self.wait(stop))
+
+
+@pytest.fixture
+def make(stage: Any, script: Any) -> Any:
+    return Builder(stage, script)
+
+
+def play(clock: Any, root: Any, ticks: Any) -> Any:
+    """One list of `element transition` per tick."""
+    seen = []
+    for _ in range(ticks):
+        stage = clock.step()
+        if root.state is None:
+            root.stand_by()
+            root.begin()
+        root.judge()
+        root.tick_once()
+        seen.append([f"{c.element} {c.transition.name.lower()}" for c in stage.progress.changes if c.transition])
+    return seen
+
+
+def test_without_triggers_all_falls_through_in_one_tick_and_ends_from_the_bottom_up(
+    clock: Any, make: Any, task: Any
+) -> None:
+    root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
+    first, second, third = play(clock, root, 3)
+    assert first == [
+        f"{name} start" for name in ("storyboard", "story", "act", "group", "maneuver", "event", "event.0")
+    ]
+    assert second == [f"{name} end" for name in ("event.0", "event", "maneuver", "group", "act", "story", "storyboard")]
+    assert third == []
+
+
+def test_an_action_of_one_tick_starts_and_ends_in_the_same(clock: Any, make: Any, task: Any) -> None:
+    root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))))
+    assert play(clock, root, 1)[0][-2:] == ["story end", "storyboard end"]
+
+
+def test_an_act_waits_for_its_trigger_and_its_events_begin_to_look_only_then(clock: Any, make: Any, task: Any) -> None:
+    event = make.event("event", task(1), start=[YES])
+    root = make.storyboard(make.act(make.group(make.maneuver(event)), start=[NO, NO, YES]))
+    ticks = play(clock, root, 3)
+    assert ticks[1] == []
+    assert ticks[2][:5] == ["act start", "group start", "maneuver start", "event start", "event.0 start"]
+    assert event.start_leaf.trigger.groups[0].monitors[0].condition.asked == 1
+
+
+def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, task: Any) -> None:
+    late = make.event("late", task(1), start=[NO, YES])
+    running = make.event("running", task(9))
+    root = make.storyboard(make.act(make.group(make.maneuver(running, late))), stop=[NO, YES])
+    ticks = play(clock, root, 2)
+    assert ticks[1] == [
+        f"{name} stop" for name in ("running.0", "running", "late", "maneuver", "group", "act", "story", "storyboard")
+    ]
+
+
+def test_an_act_is_stopped_alone_and_its_stop_trigger_is_asked_from_the_tick_after_its_start(
+    clock: Any, make: Any, task: Any
+) -> None:
+    one = make.act(make.group(make.maneuver(make.event("one", task(9)))), stop=[NO, YES], name="first")
+    two = make.act(make.group(make.maneuver(make.event("two", task(9)))), name="second")
+    ticks = play(clock, make.storyboard(one, two), 3)
+    assert ticks[1] == []
+    assert ticks[2] == ["one.0 stop", "one stop", "maneuver stop", "group stop", "first stop"]
+    assert two.state.name == "RUNNING"
+
+
+def test_override_stops_the_running_events_of_its_maneuver_only(clock: Any, make: Any, task: Any) -> None:
+    old, new = make.event("old", task(9)), make.event("new", task(1), start=[NO, YES], priority="override")
+    other = make.maneuver(make.event("other", task(9)))
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new), other))), 2)
+    assert ticks[1] == ["old.0 stop", "old stop", "new start", "new.0 start", "new.0 end", "new end", "maneuver end"]
+    assert other.state.name == "RUNNING"
+
+
+def test_skip_stands_by_while_another_runs_and_may_start_later(clock: Any, make: Any, task: Any) -> None:
+    running = make.event("running", task(2))
+    shy = make.event("shy", task(1), start=[NO, YES, YES], priority="skip")
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(running, shy)))), 3)
+    assert ticks[1][:1] == ["shy skip"]
+    assert ticks[2][:2] == ["shy start", "shy.0 start"]
+
+
+def test_parallel_lets_others_run(clock: Any, make: Any, task: Any) -> None:
+    old, new = make.event("old", task(9)), make.event("new", task(9), start=[NO, YES])
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new)))), 2)
+    assert ticks[1] == ["new start", "new.0 start"]
+
+
+def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: Any) -> None:
+    event = make.event("event", task(1), start=[NO, YES], limit=2)
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 4)
+    assert ticks[1] == ["event start", "event.0 start", "event.0 end", "event end"]
+    assert event.executions == 2
+    assert ticks[2][-1] == "storyboard end"
+
+
+def test_a_group_that_is_executed_again_starts_all_below_anew(clock: Any, make: Any, task: Any) -> None:
+    doing = task(1)
+    group = make.group(make.maneuver(make.event("event", doing)), limit=3)
+    ticks = play(clock, make.storyboard(make.act(group)), 4)
+    assert [tick.count("group start") for tick in ticks] == [1, 1, 1, 0]
+    assert doing.starts == 3
+    assert ticks[2][-1] == "storyboard end"
+
+
+def test_what_has_no_children_runs_until_it_is_stopped(clock: Any, make: Any) -> None:
+    group = make.group()
+    ticks = play(clock, make.storyboard(make.act(group), stop=[NO, NO, YES]), 3)
+    assert ticks[1] == []
+    assert ticks[2] == ["group stop", "act stop", "story stop", "storyboard stop"]
+
+
+def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, make: Any, task: Any) -> None:
+    root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))), stop=[NO])
+    assert play(clock, root, 1)[0][-1] == "story end"
+    assert root.state.name == "RUNNING"
+
+
+def test_a_younger_action_ends_an_older_one_on_the_same_domain_of_the_same_actor(
+    clock: Any, make: Any, task: Any
+) -> None:
+    slow = make.event("slow", task(9, actor="A", domain=Domain.LONGITUDINAL))
+    aside = make.event("aside", task(9, actor="A", domain=Domain.LATERAL))
+    other = make.event("other", task(9, actor="B", domain=Domain.LONGITUDINAL))
+    fast = make.event("fast", task(9, actor="A", domain=Domain.LONGITUDINAL), start=[NO, YES])
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(slow, aside, other, fast)))), 2)
+    assert ticks[1] == ["fast start", "fast.0 start", "slow.0 stop", "slow end"]
+
+
+def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any, task: Any) -> None:
+    action = make.action("action", task(1, actor="A"), task(2, actor="B"))
+    event = EventElement(make.stage, ("event",), [action], priority="parallel")
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 2)
+    assert "action end" not in ticks[0]
+    assert ticks[1][0] == "action end"
+
+
+def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, stage: Any) -> None:
+    init = InitBlock(stage, [task(9, actor="A", domain=Domain.LONGITUDINAL)])
+    init.start()
+    event = make.event("event", task(9, actor="A", domain=Domain.LONGITUDINAL))
+    play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 1)
+    assert init.running == []
+
+
+def test_a_removed_actor_ends_what_it_was_doing(clock: Any, make: Any, task: Any, stage: Any) -> None:
+    event = make.event("event", task(9, actor="A", domain=Domain.LATERAL))
+    root = make.storyboard(make.act(make.group(make.maneuver(event))))
+    play(clock, root, 1)
+    stage.leave("A")
+    assert play(clock, root, 1)[0][:2] == ["event end", "maneuver end"]

@@ -1,0 +1,115 @@
+"""Scripted motion, by hand: on the street (lane -1 along y = -2 towards +x, lane 1 along y = 2 towards -x)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.motion import Motion, Place, Steering
+
+
+def on_lane(roads: Any, lane: Any, s: Any, *, heading: Any = 0.0, offset: Any = 0.0) -> Any:
+    motion = Motion(roads)
+    here = roads.location("1", lane, s, offset)
+    motion.put(Place(roads.pose(here).turned(heading), here))
+    return motion
+
+
+def test_without_roads_it_goes_straight_on() -> None:
+    motion = Motion(None)
+    motion.put(Place(Pose(1.0, 2.0, 0.5, math.pi / 2, 0.0, 0.0)))
+    motion.speed = 10.0
+    placement = motion.step(0.1)
+    assert (placement.x, placement.y, placement.z) == pytest.approx((1.0, 3.0, 0.5))
+    assert placement.teleport
+    assert not motion.step(0.1).teleport
+
+
+@pytest.mark.parametrize(
+    ("lane", "heading", "speed", "x", "yaw"),
+    [
+        (-1, 0.0, 10.0, 101.0, 0.0),
+        (1, 0.0, 10.0, 99.0, math.pi),
+        (-1, math.pi, 10.0, 99.0, math.pi),
+        (-1, 0.0, -10.0, 99.0, 0.0),
+    ],
+)
+def test_it_follows_its_lane_where_it_points(
+    street: Any, lane: Any, heading: Any, speed: Any, x: Any, yaw: Any
+) -> None:
+    motion = on_lane(street, lane, 100.0, heading=heading)
+    motion.speed = speed
+    placement = motion.step(0.1)
+    assert placement.x == pytest.approx(x)
+    assert math.cos(placement.yaw - yaw) == pytest.approx(1.0)
+    assert placement.y == pytest.approx(2.0 if lane > 0 else -2.0)
+
+
+def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend: Any) -> None:
+    """Lane -1 is a circle of 52 m: 10 m are 10/52 rad of it."""
+    motion = on_lane(bend, -1, 0.0)
+    motion.speed = 10.0
+    for _ in range(10):
+        placement = motion.step(0.1)
+    angle = 10.0 / 52.0
+    assert placement.x == pytest.approx(52.0 * math.sin(angle), abs=1e-6)
+    assert placement.y == pytest.approx(50.0 - 52.0 * math.cos(angle), abs=1e-6)
+    assert placement.yaw == pytest.approx(angle)
+
+
+def test_it_stops_where_the_road_ends(street: Any) -> None:
+    motion = on_lane(street, -1, 199.5)
+    motion.speed = 10.0
+    placement = motion.step(0.1)
+    assert (placement.x, placement.speed) == (200.0, 0.0)
+    assert motion.end_of_road
+
+
+@pytest.mark.parametrize(("lane", "y"), [(-1, -1.4), (1, 1.4)])
+def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: Any, lane: Any, y: Any) -> None:
+    """0.6 m to the left and 0.8 m along make the 1 m that the speed covers."""
+    motion = on_lane(street, lane, 100.0)
+    motion.speed = 10.0
+    motion.steer(Steering(0.6))
+    placement = motion.step(0.1)
+    sign = -math.copysign(1.0, lane)
+    assert (placement.x, placement.y) == pytest.approx((100.0 + sign * 0.8, y))
+    along = 0.0 if lane < 0 else math.pi
+    assert math.sin(placement.yaw - along) == pytest.approx(0.6)
+
+
+def test_a_lane_may_be_expressed_by_its_neighbour_even_if_that_one_comes_towards(street: Any) -> None:
+    motion = on_lane(street, -1, 100.0)
+    assert motion.relate_to_lane(1).offset == pytest.approx(-4.0)
+    assert motion.direction == -1
+    motion.speed = 10.0
+    assert motion.step(0.1).x == pytest.approx(101.0)
+
+
+def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
+    motion = on_lane(street, -1, 100.0, heading=math.pi / 2)
+    motion.speed = 2.0
+    for _ in range(10):
+        placement = motion.step(0.1)
+    assert (placement.x, placement.y) == pytest.approx((100.0, 0.0), abs=1e-9)
+
+
+def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
+    motion = on_lane(street, -1, 100.0)
+    motion.speed = 10.0
+    motion.go_to(Pose(120.0, -6.5, 0.0, 0.0, 0.0, 0.0), land=True)
+    assert motion.step(0.1).x == 120.0
+    placement = motion.step(0.1)
+    assert (placement.x, placement.y) == pytest.approx((121.0, -6.5))
+    assert motion.location.lane == -2
+
+
+def test_a_shift_adds_to_the_way_of_one_step(street: Any) -> None:
+    motion = on_lane(street, -1, 100.0)
+    motion.speed = 10.0
+    motion.shift(3.0)
+    assert motion.step(0.1).x == pytest.approx(104.0)
+    assert motion.step(0.1).x == pytest.approx(105.0)

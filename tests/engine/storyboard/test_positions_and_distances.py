@@ -1,0 +1,181 @@
+"""Positions and distances with numbers by hand, on the street: lane 1 y = 2 (towards -x), lanes -1, -2 y = -2, -6."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.distances import distance
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.positions import count_lanes, resolve
+from eidrive_scenario.storyboard.stage import Absent, Stage
+
+
+@pytest.fixture
+def on_street(stage: Any, street: Any) -> Any:
+    """A at x = 50 in lane -1, B at x = 80 in lane 1 (coming towards A)."""
+    scenario = stage.scenario
+    made = Stage(scenario, street, dt=0.1, seed=0, nobody=stage.view)
+    for name, lane, s in (("A", -1, 50.0), ("B", 1, 80.0)):
+        here = street.location("1", lane, s)
+        made.enter(name, Place(street.pose(here), here))
+    return made
+
+
+def relative(h: Any) -> Any:
+    return model.Orientation(h=h, type=model.ReferenceContext.RELATIVE)
+
+
+@pytest.mark.parametrize(
+    ("frame", "x", "y", "h"),
+    [
+        (model.WorldPosition(x=3, y=4, h=1.0), 3, 4, 1.0),
+        (model.RelativeWorldPosition(entity_ref="A", dx=5, dy=1), 55, -1, 0.0),
+        (model.RelativeObjectPosition(entity_ref="B", dx=10, dy=4), 70, -2, math.pi),
+        (model.RelativeObjectPosition(entity_ref="B", dx=10, dy=4, orientation=relative(0.5)), 70, -2, math.pi + 0.5),
+        (model.RoadPosition(road_id="1", s=20, t=-3), 20, -3, 0.0),
+        (model.RoadPosition(road_id="1", s=20, t=1), 20, 1, math.pi),
+        (model.RelativeRoadPosition(entity_ref="A", ds=10, dt=1), 60, -1, 0.0),
+        (model.LanePosition(road_id="1", lane_id="-2", s=30), 30, -6, 0.0),
+        (model.LanePosition(road_id="1", lane_id="1", s=30, offset=0.5), 30, 2.5, math.pi),
+        (model.LanePosition(road_id="1", lane_id="1", s=30, orientation=model.Orientation(h=0.2)), 30, 2, 0.2),
+        (model.RelativeLanePosition(entity_ref="A", d_lane=-1, ds=10), 60, -6, 0.0),
+        (model.RelativeLanePosition(entity_ref="A", d_lane=1, ds=-10), 40, 2, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds_lane=10), 70, 2, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds=10, offset=0.5), 70, -1.5, 0.0),
+    ],
+)
+def test_frames(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:
+    names = {
+        model.WorldPosition: "world_position",
+        model.RelativeWorldPosition: "relative_world_position",
+        model.RelativeObjectPosition: "relative_object_position",
+        model.RoadPosition: "road_position",
+        model.RelativeRoadPosition: "relative_road_position",
+        model.LanePosition: "lane_position",
+        model.RelativeLanePosition: "relative_lane_position",
+    }
+    place = resolve(model.Position(**{names[type(frame)]: frame}), on_street)
+    assert place.pose[:2] == pytest.approx((x, y))
+    assert math.cos(place.pose.h - h) == pytest.approx(1.0)
+
+
+def waypoint(lane: Any, s: Any) -> Any:
+    lane_position = model.LanePosition(road_id="1", lane_id=str(lane), s=s)
+    return model.Waypoint(
+        route_strategy=model.RouteStrategy.SHORTEST, position=model.Position(lane_position=lane_position)
+    )
+
+
+@pytest.mark.parametrize(
+    ("within", "x", "y"),
+    [
+        (
+            {"from_lane_coordinates": model.PositionInLaneCoordinates(lane_id="-2", path_s=15, lane_offset=0.5)},
+            25,
+            -5.5,
+        ),
+        ({"from_road_coordinates": model.PositionInRoadCoordinates(path_s=15, t=-5)}, 25, -5),
+        ({"from_current_entity": model.PositionOfCurrentEntity(entity_ref="A")}, 50, -2),
+    ],
+)
+def test_a_route_position_counts_from_the_first_waypoint(on_street: Any, within: Any, x: Any, y: Any) -> None:
+    route = model.Route(closed=False, name="way", waypoint=(waypoint(-1, 10.0), waypoint(-1, 100.0)))
+    frame = model.RoutePosition(
+        route_ref=model.RouteRef(route=route), in_route_position=model.InRoutePosition(**within)
+    )
+    assert resolve(model.Position(route_position=frame), on_street).pose[:2] == pytest.approx((x, y), abs=1e-6)
+
+
+def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: Any) -> None:
+    corners = tuple(
+        model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=y)))
+        for x, y in ((0, 50), (0, 90))
+    )
+    way = model.Trajectory(closed=False, name="way", shape=model.Shape(polyline=model.Polyline(vertex=corners)))
+    frame = model.TrajectoryPosition(s=10, t=2, trajectory_ref=model.TrajectoryRef(trajectory=way))
+    pose = resolve(model.Position(trajectory_position=frame), on_street).pose
+    assert (pose.x, pose.y, pose.h) == pytest.approx((-2.0, 60.0, math.pi / 2))
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        ({"lane_position": model.LanePosition(road_id="9", lane_id="-1", s=3)}, "names road '9'"),
+        ({"lane_position": model.LanePosition(road_id="1", lane_id="-5", s=3)}, "its lanes there: 1, -1, -2"),
+        ({"lane_position": model.LanePosition(road_id="1", lane_id="-1", s=300)}, "that road is 200.00 m long"),
+        ({"relative_lane_position": model.RelativeLanePosition(entity_ref="A", d_lane=-3, ds=0)}, "names lane -4"),
+        ({"geo_position": model.GeoPosition(latitude_deg=1, longitude_deg=2)}, "not understood"),
+    ],
+)
+def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text: Any) -> None:
+    with pytest.raises(ScenarioError, match=text):
+        resolve(model.Position(**frame), on_street)
+
+
+def test_a_place_beside_somebody_who_is_not_there_is_absent(on_street: Any) -> None:
+    on_street.leave("B")
+    with pytest.raises(Absent):
+        resolve(
+            model.Position(relative_world_position=model.RelativeWorldPosition(entity_ref="B", dx=0, dy=0)), on_street
+        )
+
+
+@pytest.mark.parametrize(
+    ("lane", "steps", "target"), [(-1, 1, 1), (1, -1, -1), (-2, 1, -1), (-2, 3, 2), (2, -3, -2), (-1, 0, -1)]
+)
+def test_counting_lanes_leaves_out_the_one_that_is_none(lane: Any, steps: Any, target: Any) -> None:
+    assert count_lanes(lane, steps) == target
+
+
+@pytest.mark.parametrize(
+    ("frame", "kind", "freespace", "expected"),
+    [
+        ("entity", "longitudinal", False, 30.0),
+        ("entity", "lateral", False, 4.0),
+        ("entity", "euclidianDistance", False, math.hypot(30, 4)),
+        ("road", "longitudinal", False, 30.0),
+        ("lane", "lateral", False, 4.0),
+        ("world", "longitudinal", False, 30.0),
+        ("entity", "longitudinal", True, 30.0 - 4.0 - 4.0),
+        ("road", "longitudinal", True, 30.0 - 4.0 - 4.0),
+        ("entity", "lateral", True, 2.0),
+        ("entity", "euclidianDistance", True, math.hypot(22, 2)),
+    ],
+)
+def test_distances_from_a_to_b_who_comes_towards(
+    on_street: Any, frame: Any, kind: Any, freespace: Any, expected: Any
+) -> None:
+    """Both reach 4 m ahead of their reference point, 1 m behind it and 1 m to each side."""
+    found = distance(on_street, "A", "B", frame=frame, kind=kind, freespace=freespace)
+    assert found == pytest.approx(expected)
+
+
+def test_behind_and_right_are_negative(on_street: Any) -> None:
+    here = on_street.roads.location("1", -2, 20.0)
+    on_street.enter("B", Place(on_street.roads.pose(here), here))
+    assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=False) == pytest.approx(-30.0)
+    assert distance(on_street, "A", "B", frame="road", kind="lateral", freespace=False) == pytest.approx(-4.0)
+    assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=True) == pytest.approx(-25.0)
+
+
+def test_boxes_side_by_side_leave_no_gap_along(on_street: Any) -> None:
+    on_street.enter("B", Place(Pose(52.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
+    assert distance(on_street, "A", "B", frame="entity", kind="longitudinal", freespace=True) == 0.0
+
+
+def test_in_a_bend_the_road_is_longer_than_the_sight(stage: Any, bend: Any) -> None:
+    """A quarter circle of the reference line's 50 m lies between the two; both drive in lane -1, a circle of 52 m."""
+    made = Stage(stage.scenario, bend, dt=0.1, seed=0, nobody=stage.view)
+    for name, s in (("A", 0.0), ("B", 25 * math.pi)):
+        here = bend.location("1", -1, s)
+        made.enter(name, Place(bend.pose(here), here))
+    along = distance(made, "A", "B", frame="road", kind="longitudinal", freespace=False)
+    assert along == pytest.approx(25 * math.pi, abs=1e-6)
+    sight = distance(made, "A", "B", frame="entity", kind="longitudinal", freespace=False)
+    assert sight == pytest.approx(52.0, abs=1e-6)

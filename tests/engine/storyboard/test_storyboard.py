@@ -1,0 +1,169 @@
+"""The storyboard as a whole, from a file: what it commands, how it ends, what it refuses, how it prints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.storyboard.rendering import render
+
+TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
+AT = '<WorldPosition x="{x}" y="0"/>'
+SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
+  <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}"/>
+  <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget>
+  </SpeedAction></LongitudinalAction></PrivateAction>"""
+EVENT = '<Event name="{name}" priority="override"><Action name="{name} action">{action}</Action>{trigger}</Event>'
+AFTER = """<{kind}Trigger><ConditionGroup><Condition name="later" delay="0" conditionEdge="{edge}"><ByValueCondition>
+  <SimulationTimeCondition value="{value}" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>
+  </{kind}Trigger>"""
+STARTS = TELEPORT.format(position=AT.format(x=5)) + SPEED.format(shape="step", value=0, speed=10)
+
+
+def view_of(placements: Any, tick: Any, like: Any) -> Any:
+    """The view of cars that are where they were put."""
+    count = len(placements)
+    rows = list(placements.values())
+    zeros = np.zeros((count, 3))
+    return replace(
+        like,
+        time=tick * 0.1,
+        tick=tick,
+        names=tuple(placements),
+        position=np.array([[p.x, p.y, p.z] for p in rows]).reshape(count, 3),
+        yaw=np.array([p.yaw for p in rows]),
+        pitch=np.zeros(count),
+        roll=np.zeros(count),
+        velocity=zeros,
+        acceleration=zeros,
+        speed=np.array([p.speed for p in rows]),
+        size=zeros,
+        offset=zeros,
+    )
+
+
+def play(storyboard: Any, ticks: Any) -> Any:
+    """The commands of each tick, in a world that obeys."""
+    placements = dict(storyboard.initial().additions)
+    answers = []
+    for tick in range(ticks):
+        commands = storyboard.tick(view_of(placements, tick, storyboard.stage.view))
+        answers.append(commands)
+        placements.update(commands.additions)
+        placements.update(commands.placements)
+        for name in commands.removals:
+            placements.pop(name)
+    return answers
+
+
+def test_init_holds_before_the_first_view_and_only_who_has_a_place_is_there(build: Any) -> None:
+    commands = build(STARTS).initial()
+    assert list(commands.additions) == ["A"]
+    assert (commands.additions["A"].x, commands.additions["A"].speed) == (5.0, 10.0)
+    assert commands.driven == frozenset()
+
+
+def test_the_order_of_init_does_not_matter_where_one_is_placed_beside_another(build: Any) -> None:
+    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
+    storyboard = build(beside + '</Private><Private entityRef="B">' + TELEPORT.format(position=AT.format(x=30)))
+    assert storyboard.initial().additions["A"].x == 32.0
+
+
+def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
+    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
+    with pytest.raises(ScenarioError, match="nobody places"):
+        build(beside).initial()
+
+
+def test_a_step_of_speed_moves_the_actor_in_the_step_in_which_it_starts(build: Any) -> None:
+    """At 10 m/s from x = 5; the event at 0.2 s (the first time above 0.15 s) makes it 20 m/s."""
+    trigger = AFTER.format(kind="Start", edge="rising", value=0.15)
+    event = EVENT.format(name="go", action=SPEED.format(shape="step", value=0, speed=20), trigger=trigger)
+    answers = play(build(STARTS, event), 4)
+    assert [round(a.placements["A"].x, 6) for a in answers] == [6.0, 7.0, 9.0, 11.0]
+
+
+def test_a_linear_change_of_speed_ends_in_the_tick_that_commands_its_target(build: Any) -> None:
+    event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=0.3, speed=13), trigger="")
+    storyboard = build(STARTS, event)
+    answers = play(storyboard, 3)
+    assert [a.placements["A"].speed for a in answers] == pytest.approx([11.0, 12.0, 13.0])
+    assert storyboard.ended == "storyboard complete"
+
+
+def test_the_stop_trigger_ends_the_run(build: Any) -> None:
+    storyboard = build(STARTS, stop=AFTER.format(kind="Stop", edge="none", value=0.25))
+    play(storyboard, 3)
+    assert storyboard.ended is None
+    storyboard.tick(replace(storyboard.stage.view, time=0.3, tick=3))
+    assert storyboard.ended == "stop trigger"
+    assert storyboard.changes[-1].why == "simulation time 0.30 s > 0.25 s"
+
+
+def test_criteria_in_the_stop_trigger_stop_nothing(build: Any) -> None:
+    stop = AFTER.format(kind="Stop", edge="none", value=-1).replace('"later"', '"criteria_CollisionTest"')
+    storyboard = build(STARTS, stop=stop)
+    play(storyboard, 2)
+    assert storyboard.ended is None
+
+
+def test_without_a_stop_trigger_and_without_stories_it_goes_on(build: Any) -> None:
+    storyboard = build(STARTS)
+    play(storyboard, 5)
+    assert storyboard.ended is None
+
+
+def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
+    entity = '<GlobalAction><EntityAction entityRef="B">{}</EntityAction></GlobalAction>'
+    come = entity.format(f"<AddEntityAction><Position>{AT.format(x=50)}</Position></AddEntityAction>")
+    go = entity.format("<DeleteEntityAction/>")
+    events = EVENT.format(name="come", action=come, trigger=AFTER.format(kind="Start", edge="none", value=0.05))
+    events += EVENT.format(name="go", action=go, trigger=AFTER.format(kind="Start", edge="none", value=0.25))
+    first, second, third, fourth = play(build(STARTS, events), 4)
+    assert "B" not in first.additions
+    assert second.additions["B"].x == 50.0
+    assert "B" in third.placements
+    assert fourth.removals == {"B"}
+    assert "B" not in fourth.placements
+
+
+def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) -> None:
+    swarm = "<GlobalAction><TrafficAction><TrafficStopAction/></TrafficAction></GlobalAction>"
+    with pytest.raises(ScenarioError) as caught:
+        build(STARTS, EVENT.format(name="odd", action=swarm, trigger=""), everywhere=swarm)
+    messages = [problem.message for problem in caught.value.problems]
+    assert messages == ["TrafficStopAction is not executed yet"] * 2
+    assert all(problem.line for problem in caught.value.problems)
+
+
+def test_a_reference_to_no_element_is_an_error_with_the_nearest_name(build: Any) -> None:
+    trigger = """<StartTrigger><ConditionGroup><Condition name="state" delay="0" conditionEdge="none"><ByValueCondition>
+      <StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="goo" state="endTransition"/>
+      </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
+    action = SPEED.format(shape="step", value=0, speed=20)
+    with pytest.raises(ScenarioError, match="did you mean 'go'"):
+        build(STARTS, EVENT.format(name="go", action=action, trigger=trigger))
+
+
+def test_the_tree_in_words(build: Any) -> None:
+    trigger = AFTER.format(kind="Start", edge="rising", value=2)
+    event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=3, speed=20), trigger=trigger)
+    stop = AFTER.format(kind="Stop", edge="none", value=9)
+    assert render(build(STARTS, event, stop)).splitlines() == [
+        "storyboard",
+        "├─ Init",
+        "│  ├─ A: teleport to WorldPosition x 5 y 0",
+        "│  └─ A: speed to 10 m/s, at once",
+        "├─ story story",
+        "│  └─ act act",
+        "│     └─ group group",
+        "│        └─ maneuver maneuver",
+        "│           └─ event go (override)",
+        "│              ├─ when simulation time > 2 s becomes true",
+        "│              └─ action go action: A: speed to 20 m/s, linear in 3 s",
+        "└─ stop when simulation time > 9 s",
+    ]

@@ -1,0 +1,104 @@
+"""Trajectories against what geometry says of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.trajectory import lay_out
+
+
+def at(x: Any, y: Any, h: Any = None) -> Any:
+    return model.Position(world_position=model.WorldPosition(x=x, y=y, h=h))
+
+
+def resolve(position: Any) -> Any:
+    frame = position.world_position
+    return Pose(frame.x, frame.y, frame.z or 0.0, frame.h or 0.0, 0.0, 0.0)
+
+
+def trajectory(closed: Any = False, **shape: Any) -> Any:
+    return model.Trajectory(closed=closed, name="way", shape=model.Shape(**shape))
+
+
+def polyline(*points: Any, closed: Any = False) -> Any:
+    vertices = tuple(model.Vertex(time=time, position=at(x, y, h)) for x, y, time, h in points)
+    return lay_out(trajectory(closed, polyline=model.Polyline(vertex=vertices)), resolve)
+
+
+def test_a_polyline_turns_at_its_corners() -> None:
+    way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
+    assert way.length == 7.0
+    assert way.at(1.0)[:4] == pytest.approx((1.0, 0.0, 0.0, 0.0))
+    assert way.at(5.0)[:4] == pytest.approx((3.0, 2.0, 0.0, math.pi / 2))
+    assert way.times is None
+
+
+def test_given_headings_change_from_corner_to_corner() -> None:
+    way = polyline((0, 0, None, 0.0), (10, 0, None, 1.0))
+    assert way.at(5.0).h == pytest.approx(0.5)
+
+
+def test_a_closed_polyline_comes_back_to_its_start() -> None:
+    way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
+    assert way.length == 12.0
+    assert way.at(14.0)[:2] == pytest.approx((2.0, 0.0))
+
+
+def test_times_are_kept_at_the_corners_at_constant_speed_between() -> None:
+    way = polyline((0, 0, 1.0, None), (10, 0, 3.0, None), (10, 30, 5.0, None))
+    assert [way.at_time(t) for t in (0.0, 1.0, 2.0, 3.0, 4.0, 9.0)] == pytest.approx([0, 0, 5, 10, 25, 40])
+    assert way.time_at(25.0) == pytest.approx(4.0)
+
+
+def test_times_are_kept_at_the_corners_with_speeds_that_change_linearly() -> None:
+    """From 10 m/s, 5 m in 1 s end at 0 m/s: half way in time 3.75 m are done."""
+    way = polyline((0, 0, 0.0, None), (5, 0, 1.0, None), (9, 0, 2.0, None))
+    speeds = way.speeds_from(10.0)
+    assert way.at_time(0.5, speeds) == pytest.approx(3.75)
+    assert way.at_time(1.0, speeds) == pytest.approx(5.0)
+    assert way.at_time(1.5, speeds) == pytest.approx(6.0)
+
+
+def test_a_clothoid_without_change_of_curvature_is_an_arc() -> None:
+    shape = model.Clothoid(curvature=0.1, length=5 * math.pi, curvature_prime=0.0, position=at(0, 0))
+    way = lay_out(trajectory(clothoid=shape), resolve)
+    assert way.at(way.length)[:4] == pytest.approx((10.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
+
+
+def test_a_clothoid_turns_by_its_mean_curvature() -> None:
+    shape = model.Clothoid(
+        curvature=0.0, length=20.0, curvature_prime=0.01, start_time=1.0, stop_time=3.0, position=at(0, 0)
+    )
+    way = lay_out(trajectory(clothoid=shape), resolve)
+    assert way.at(20.0).h == pytest.approx(0.5 * 0.01 * 400.0)
+    assert way.at_time(2.0) == pytest.approx(10.0)
+
+
+def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
+    pieces = (
+        model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=10.0, position_start=at(0, 0)),
+        model.ClothoidSplineSegment(curvature_start=0.1, curvature_end=0.1, length=5 * math.pi),
+    )
+    way = lay_out(trajectory(clothoid_spline=model.ClothoidSpline(clothoid_spline_segment=pieces)), resolve)
+    assert way.length == pytest.approx(10.0 + 5 * math.pi)
+    assert way.at(way.length)[:4] == pytest.approx((20.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
+
+
+def test_a_rational_spline_makes_an_exact_circle() -> None:
+    """The quarter circle of Piegl and Tiller: weights 1, 1/√2, 1."""
+    points = ((10, 0, 1.0), (10, 10, math.sqrt(0.5)), (0, 10, 1.0))
+    shape = model.Nurbs(
+        order=3,
+        control_point=tuple(model.ControlPoint(weight=w, position=at(x, y)) for x, y, w in points),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
+    )
+    way = lay_out(trajectory(nurbs=shape), resolve)
+    assert way.length == pytest.approx(5 * math.pi, rel=1e-4)
+    for share in (0.1, 0.37, 0.8):
+        pose = way.at(share * way.length)
+        assert math.hypot(pose.x, pose.y) == pytest.approx(10.0, abs=1e-3)

@@ -1,0 +1,54 @@
+"""Shapes of TransitionDynamics by hand: from 10 to 20 over 4."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.openscenario.model import DynamicsShape
+from eidrive_scenario.storyboard.transition import Transition
+
+
+@pytest.mark.parametrize(
+    ("shape", "quarter", "half"),
+    [
+        (DynamicsShape.LINEAR, 12.5, 15.0),
+        (DynamicsShape.CUBIC, 10.0 + 10.0 * (3 / 16 - 2 / 64), 15.0),
+        (DynamicsShape.SINUSOIDAL, 10.0 + 5.0 * (1.0 - math.cos(math.pi / 4)), 15.0),
+        (DynamicsShape.STEP, 20.0, 20.0),
+    ],
+)
+def test_values_along_the_way(shape: Any, quarter: Any, half: Any) -> None:
+    transition = Transition(shape, 10.0, 20.0, 4.0)
+    assert transition.advance(1.0) == pytest.approx(quarter)
+    assert transition.advance(1.0) == pytest.approx(half)
+    assert transition.advance(2.0) == 20.0
+    assert transition.done
+
+
+@pytest.mark.parametrize(
+    ("shape", "extent"),
+    [(DynamicsShape.LINEAR, 5.0), (DynamicsShape.CUBIC, 7.5), (DynamicsShape.SINUSOIDAL, 2.5 * math.pi)],
+)
+def test_a_rate_is_the_steepest_slope(shape: Any, extent: Any) -> None:
+    transition = Transition.by_rate(shape, 10.0, 20.0, -2.0)
+    assert transition.extent == pytest.approx(extent)
+    transition.advance(extent / 2 - 1e-4)
+    before = transition.value
+    assert (transition.advance(2e-4) - before) / 2e-4 == pytest.approx(2.0, rel=1e-4)
+
+
+def test_a_bend_is_the_largest_second_derivative() -> None:
+    """Cubic: 6 Δ / T² = 0.6 at the ends, so T = 10."""
+    assert Transition.by_bend(DynamicsShape.CUBIC, 0.0, 10.0, 0.6).extent == pytest.approx(10.0)
+
+
+def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
+    linear = Transition(DynamicsShape.LINEAR, 0.0, 20.0, 1.0)
+    linear.limit_rate(10.0)
+    assert linear.extent == pytest.approx(2.0)
+    step = Transition(DynamicsShape.STEP, 0.0, 20.0, 1.0)
+    step.limit_rate(10.0)
+    assert step.extent == 0.0
