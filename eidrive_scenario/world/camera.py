@@ -40,9 +40,12 @@ def projection_matrix(width: int, height: int, fov: float, near: float, far: flo
 
 def metres(buffer: NDArray[np.float32], near: float, far: float) -> NDArray[np.float32]:
     """Distance along the optical axis [m] for values of the depth buffer in [0, 1]; inf at its far end."""
-    value = buffer.astype(np.float64)
-    depth = far * near / (far - (far - near) * value)
-    depth[value >= 1.0] = np.inf
+    depth = buffer.astype(np.float64)
+    np.multiply(depth, near - far, out=depth)
+    np.add(depth, far, out=depth)
+    beyond = depth <= near
+    np.divide(far * near, depth, out=depth)
+    np.copyto(depth, np.inf, where=beyond)
     return depth.astype(np.float32)
 
 

@@ -66,9 +66,10 @@ class Visuals:
         )
         seen = np.asarray(handles, dtype=np.int32).reshape(height, width)
         depth = metres(np.asarray(buffer, dtype=np.float32).reshape(height, width), near, far)
-        depth[seen < 0] = np.inf
+        nothing = seen < 0
+        np.copyto(depth, np.float32(np.inf), where=nothing)
         rgb = np.ascontiguousarray(np.asarray(colours, dtype=np.uint8).reshape(height, width, 4)[..., :3])
-        rgb[seen < 0] = sky(pose, width, height, fov)[seen < 0]
+        np.copyto(rgb, sky(pose, width, height, fov), where=nothing[..., None])
         return Picture(rgb, depth, rows[seen])
 
     def _arrange(self, shown: Mapping[int, Body]) -> NDArray[np.int32]:
