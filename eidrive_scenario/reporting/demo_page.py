@@ -133,7 +133,7 @@ def _picture(moment: Moment, story: Story, arm: Arm, place: Place, window: Windo
 
 def _summary(cell: Cell, story: Story, watched: int) -> str:
     nearest = min(story.boxes) if story.boxes else float("nan")
-    outcome = "they collide" if nearest == 0.0 else f"{nearest:.2f} m apart at the closest"
+    outcome = "they collide" if story.touched else f"{nearest:.2f} m apart at the closest"
     free = cell.collision_free
     return f"seed {watched}: {outcome}; all seeds: {free.successes} of {free.trials} without a collision"
 

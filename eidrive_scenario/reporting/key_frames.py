@@ -46,6 +46,8 @@ class Story:
     centres: tuple[float, ...]
     boxes: tuple[float, ...]
     speeds: tuple[float, ...]
+    touched: bool
+    """Whether the two bodies touched."""
 
     def moment(self, kind: str) -> Moment:
         """The moment of that kind. Raises KeyError if there is none."""
@@ -78,6 +80,7 @@ class KeyFrames:
         self._met: list[float] = []
         self._found: dict[str, tuple[str, Snapshot]] = {}
         self._least = (math.inf, math.inf)
+        self._touched = False
 
     def observe(self, frame: Frame) -> None:
         """Take the next frame."""
@@ -117,6 +120,7 @@ class KeyFrames:
             tuple(self._centres),
             tuple(self._boxes),
             tuple(self._speeds),
+            self._touched,
         )
 
     def _measure(self, ego: list[float], hidden: list[float], snapshot: Snapshot) -> None:
@@ -125,10 +129,13 @@ class KeyFrames:
         self._centres.append(centre)
         self._boxes.append(box)
         self._speeds.append(float(snapshot.view.speed[snapshot.view.row(self.ego)]))
-        touching = self._least[0] == 0.0
-        if not touching and (box, centre) < self._least:
+        if self._touched:
+            return
+        pair = {self.ego, self.hidden}
+        self._touched = box == 0.0 or any({touch.first, touch.second} == pair for touch in snapshot.view.contacts)
+        if self._touched or (box, centre) < self._least:
             self._least = (box, centre)
-            title = f"{self.hidden} hits {self.ego}" if box == 0.0 else f"closest, {box:.2f} m apart"
+            title = f"{self.hidden} and {self.ego} collide" if self._touched else f"closest, {box:.2f} m apart"
             self._found["closest"] = (title, snapshot)
 
     def _notice(self, frame: Frame, snapshot: Snapshot) -> None:

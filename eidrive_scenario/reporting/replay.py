@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -49,9 +50,16 @@ def write_replay(recording: Recording, out: Path) -> Path:
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
-        facts={key: value for key, value in recording.metadata.items() if key not in ("format",)},
+        facts=_facts(recording),
         data=data,
     )
+
+
+def _facts(recording: Recording) -> dict[str, str]:
+    """What the page tells of the run beside the pictures; each scenario parameter in a line of its own."""
+    facts = {name: text for name, text in recording.metadata.items() if name not in ("format", "parameters")}
+    parameters = json.loads(recording.metadata.get("parameters", "{}"))
+    return facts | {f"${name}": str(value) for name, value in parameters.items()}
 
 
 def replay_data(frames: Iterable[Frame], roads: RoadDrawing | None = None) -> dict[str, Any]:
@@ -59,7 +67,7 @@ def replay_data(frames: Iterable[Frame], roads: RoadDrawing | None = None) -> di
 
     actors   by name: category and size; poses[frame][name] = x, y, yaw of the box centre, speed
     stations by name, for each frame: own and heard boxes [x, y, l, w, yaw], links [sender, delivered], plan's reason
-    changes  [time, path, after, why] of the storyboard
+    changes  [time, path, after, why] of the storyboard's transitions
     """
     actors: dict[str, dict[str, Any]] = {}
     times: list[float] = []
@@ -89,6 +97,7 @@ def replay_data(frames: Iterable[Frame], roads: RoadDrawing | None = None) -> di
         changes.extend(
             [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
             for change in frame.changes
+            if change.transition is not None
         )
     return {
         "times": times,

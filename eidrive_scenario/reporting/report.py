@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,10 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
 from eidrive_scenario.reporting.page import write_page
 
+PREFERRED = ("min_distance", "time_to_collision", "collision.count")
+"""Metrics that the overview shows before others, by how their names begin."""
 SHOWN = 4
-"""So many metrics stand in the overview; those that most runs have come first."""
+"""So many metrics stand in the overview."""
 
 
 class ReportedCriterion(BaseModel):
@@ -84,7 +88,7 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
             for index, ((scenario, channel), group) in enumerate(groups.items())
         ],
         number=_number,
-        footer=footer,
+        footer=footer or f"eidrive-scenario {version('eidrive-scenario')}",
     )
 
 
@@ -100,11 +104,14 @@ def _checked(result: Mapping[str, Any]) -> ReportedRun:
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
-    counts: dict[str, int] = {}
-    for run in runs:
-        for name in run.metrics:
-            counts[name] = counts.get(name, 0) + 1
-    return sorted(counts, key=lambda name: (-counts[name], name))[:SHOWN]
+    """The preferred ones, then those that most runs have; instants of time do not make a mean."""
+    counts = Counter(name for run in runs for name in run.metrics if not name.endswith(".time"))
+
+    def rank(name: str) -> tuple[int, int, str]:
+        place = next((index for index, start in enumerate(PREFERRED) if name.startswith(start)), len(PREFERRED))
+        return place, -counts[name], name
+
+    return sorted(counts, key=rank)[:SHOWN]
 
 
 def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:

@@ -2,7 +2,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const element = (id) => document.getElementById(id);
 const canvas = element("street"), pen = canvas.getContext("2d");
-const C = data.colours, INK = "#334155", SELF = "#0f172a";
+const C = data.colours, INK = "#334155", SELF = "#0f172a", NEAR = 30;
 let index = 0, playing = false, startedAt = 0, startedFrom = 0;
 let scale = 10, centreX = 0, centreY = 0;
 
@@ -33,7 +33,9 @@ for (const [colour, text] of [[C.own, "seen by the station itself"], [C.received
 
 function fit() {
   let left = Infinity, right = -Infinity, bottom = Infinity, top = -Infinity;
+  const first = Object.keys(data.stations)[0];
   for (const poses of data.poses) for (const [x, y] of Object.values(poses)) {
+    if (first && poses[first] && Math.hypot(x - poses[first][0], y - poses[first][1]) > NEAR) continue;
     left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y);
   }
   const area = canvas.getBoundingClientRect();

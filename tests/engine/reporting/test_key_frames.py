@@ -14,7 +14,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import Contact, WorldView
 
 Play = Callable[..., list[Frame]]
 
@@ -98,6 +98,15 @@ def test_the_car_enters_the_area_when_its_centre_does(street: Play) -> None:
     assert time_of(story_of(street(1)), "entered") == pytest.approx(2.10)
 
 
+def test_a_contact_that_the_world_reports_is_a_collision(street: Play) -> None:
+    frames = street(1)
+    blow = Contact("Ego", "Incoming", (0.0, 0.0, 0.0), 3.0)
+    frames[50] = dataclasses.replace(frames[50], view=dataclasses.replace(frames[50].view, contacts=(blow,)))
+    story = story_of(frames)
+    assert (story.touched, time_of(story, "closest")) == (True, frames[50].view.time)
+    assert story_of(street(1)).touched is False
+
+
 def test_without_an_area_nothing_is_told_of_one(street: Play) -> None:
     observer = KeyFrames("Ego", "Incoming")
     for frame in street(1):
@@ -139,5 +148,5 @@ def test_a_collision_is_shown_at_its_first_touch(street: Play) -> None:
         for frame in street(None)
     ]
     story = story_of(frames)
-    assert story.moment("closest").title == "Incoming hits Ego"
+    assert story.moment("closest").title == "Incoming and Ego collide"
     assert time_of(story, "closest") == story.times[story.boxes.index(0.0)]

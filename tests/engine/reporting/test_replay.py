@@ -20,7 +20,8 @@ Play = Callable[..., list[Frame]]
 
 
 def recorded(frames: list[Frame], folder: Path) -> Path:
-    recorder = Recorder(folder / "run.mcap", metadata={"scenario": "street <1>", "seed": "7"})
+    parameters = json.dumps({"EgoSpeed": "8.0"})
+    recorder = Recorder(folder / "run.mcap", metadata={"scenario": "street <1>", "seed": "7", "parameters": parameters})
     for frame in frames:
         recorder.observe(frame)
     recorder.close()
@@ -71,6 +72,7 @@ def test_the_page_holds_the_run_and_nothing_from_elsewhere(street: Play, tmp_pat
     assert root.findtext(".//h1") == "street <1>, seed 7"
     data = json.loads(root.findtext(".//script[@id='data']"))
     assert len(data["times"]) == 100
+    assert "$EgoSpeed" in [term.text for term in root.iterfind(".//dt")]
 
 
 def test_an_empty_recording_is_refused(tmp_path: Path) -> None:

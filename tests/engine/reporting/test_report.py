@@ -84,3 +84,10 @@ def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
     assert "http" not in text
     assert "<link" not in text
     assert "src=" not in text
+
+
+def test_distances_come_first_and_instants_are_no_metrics(tmp_path: Path) -> None:
+    metrics = {"collision.time": 3.0, "collision.count": 1.0, "a": 1.0, "b": 2.0, "min_distance.A.B.box": 0.5, "c": 0.0}
+    page = write_report([result(1, "ideal", False, metrics=metrics)], tmp_path)
+    heads = [head.text for head in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//thead/tr/th")][4:8]
+    assert heads == ["min_distance A B box", "collision count", "a", "b"]
