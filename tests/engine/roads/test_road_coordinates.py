@@ -1,0 +1,176 @@
+"""Road and lane coordinates to the world and back."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eidrive_scenario.roads import PositionError, RoadNetwork, curves
+from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.model import Header, Lane, LaneSection, Road, RoadMap
+from eidrive_scenario.roads.polynomials import Polynomials, combine
+
+Text = Callable[..., str]
+BANKED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
+
+
+@st.composite
+def networks(draw: st.DrawFn) -> RoadNetwork:
+    """One road of up to five joined curves, with lanes of changing width on both sides, elevation and bank."""
+    found: list[Curve] = []
+    x, y, h, s, curvature = draw(st.floats(-50, 50)), draw(st.floats(-50, 50)), draw(st.floats(-3, 3)), 0.0, 0.0
+    for _ in range(draw(st.integers(1, 5))):
+        length = draw(st.floats(5.0, 40.0))
+        kind = draw(st.sampled_from(["line", "arc", "spiral", "cubic"]))
+        bend = draw(st.floats(-0.03, 0.03))
+        if kind == "line":
+            found.append(Arc(s, x, y, h, length))
+        elif kind == "arc":
+            found.append(Arc(s, x, y, h, length, bend))
+        elif kind == "spiral":
+            found.append(curves.spiral(s, x, y, h, length, curvature, bend))
+        else:
+            found.append(Cubic(s, x, y, h, length, (0, length, 0, 0), (0, 0, 0.1 * length * bend, 0), 1 / length))
+        x, y, h, curvature, _ = found[-1].at(length)
+        s += length
+    width = Polynomials([(0.0, draw(st.floats(2.0, 4.0)), draw(st.floats(-0.005, 0.005)), 0.0, 0.0)])
+    lanes = {0: Lane(0, "none", Polynomials(), Polynomials(), Polynomials(), Polynomials())}
+    for side in (1, -1):
+        inner = Polynomials()
+        for k in (1, 2):
+            outer = combine([(1.0, inner), (1.0, width)])
+            lanes[side * k] = Lane(side * k, "driving", width, inner, outer, combine([(0.5, inner), (0.5, outer)]))
+            inner = outer
+    slope, bank = draw(st.floats(-0.1, 0.1)), draw(st.floats(-0.1, 0.1))
+    section = LaneSection(0, 0.0, s, {number: lanes[number] for number in sorted(lanes, reverse=True)})
+    road = Road(
+        id="r",
+        name="",
+        length=s,
+        rule="RHT",
+        junction_id=None,
+        reference=ReferenceLine(found, s),
+        elevation=Polynomials([(0.0, 1.0, slope, 0.0, 0.0)]),
+        superelevation=Polynomials([(0.0, bank, 0.0, 0.0, 0.0)]),
+        lane_offset=Polynomials([(0.0, draw(st.floats(-1, 1)), draw(st.floats(-0.01, 0.01)), 0.0, 0.0)]),
+        sections=(section,),
+        section_starts=(0.0,),
+    )
+    return RoadNetwork(RoadMap("drawn", Header(), {"r": road}, {}, {}, {}, ()))
+
+
+@settings(max_examples=60, deadline=None)
+@given(networks(), st.data())
+def test_there_and_back(network: RoadNetwork, data: st.DataObject) -> None:
+    length = network.roads["r"].length
+    lane = data.draw(st.sampled_from([-2, -1, 1, 2]))
+    s = data.draw(st.floats(0.5, length - 0.5))
+    offset = data.draw(st.floats(-0.6, 0.6))
+    there = network.location("r", lane, s, offset)
+    pose = network.lane_pose_at("r", lane, s, offset)
+    for found in (network.locate_at(pose.x, pose.y), network.locate_at(pose.x, pose.y, there)):
+        assert found is not None
+        back = network.lane_pose_at(found.road, found.lane, found.s, found.offset)
+        assert math.dist(back[:3], pose[:3]) < 0.01
+        if length < 60.0:
+            # A longer road may cross itself; then its other branch is an answer too.
+            assert (found.road, found.lane) == ("r", lane)
+            assert (found.s, found.offset, found.t) == pytest.approx((there.s, there.offset, there.t), abs=1e-3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(networks())
+def test_arrays_and_single_places_agree(network: RoadNetwork) -> None:
+    s = np.linspace(0.0, network.roads["r"].length, 23)
+    for lane in (-2, 1):
+        many = np.column_stack(network.lane_pose("r", lane, s, 0.3))
+        assert many == pytest.approx(np.array([network.lane_pose_at("r", lane, v, 0.3) for v in s]), abs=1e-9)
+    many = np.column_stack(network.road_pose("r", s, -2.0))
+    assert many == pytest.approx(np.array([network.road_pose_at("r", v, -2.0) for v in s]), abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(networks(), st.data())
+def test_a_lane_heads_where_it_goes(network: RoadNetwork, data: st.DataObject) -> None:
+    road = network.roads["r"]
+    s = data.draw(st.floats(1.0, road.length - 1.0))
+    if min(abs(s - start) for start in (*road.reference.starts, road.length)) < 0.01:
+        return
+    a, b = (network.lane_pose_at("r", 2, v) for v in (s - 1e-4, s + 1e-4))
+    here = network.lane_pose_at("r", 2, s)
+    step = (math.cos(here.h) * math.cos(here.p), math.sin(here.h) * math.cos(here.p), -math.sin(here.p))
+    gone = np.subtract(b[:3], a[:3])
+    assert gone / np.linalg.norm(gone) == pytest.approx(np.array(step), abs=1e-5)
+
+
+def test_bank_and_slope(road: Text, map_of: Text) -> None:
+    rising = '<elevationProfile><elevation s="0" a="2" b="0.05" c="0" d="0"/></elevationProfile>'
+    extra = f"{rising}<lateralProfile>{BANKED}</lateralProfile>"
+    network = RoadNetwork.parse(map_of(road(extra=extra)))
+    pose = network.road_pose_at("1", 20.0, 3.0)
+    assert pose == pytest.approx((20.0, 3 * math.cos(0.1), 3.0 + 3 * math.sin(0.1), 0.0, -math.atan(0.05), 0.1))
+    back = network.road_pose_at("1", 20.0, 3.0).turned(math.pi)
+    assert (back.h, back.p, back.r) == pytest.approx((math.pi, math.atan(0.05), -0.1))
+    aside = network.road_pose_at("1", 20.0, 0.0).turned(math.pi / 2)
+    assert math.sin(aside.p) == pytest.approx(-math.cos(math.atan(0.05)) * math.sin(0.1))
+
+
+def test_a_pavement_lies_higher_than_the_road(road: Text, map_of: Text) -> None:
+    lanes = (
+        '<laneSection s="0"><center><lane id="0"/></center><right>'
+        '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
+        '<lane id="-2" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/>'
+        '<height sOffset="0" inner="0.1" outer="0.14"/></lane></right></laneSection>'
+    )
+    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+    assert network.lane_pose_at("1", -1, 10.0).z == 0.0
+    assert [network.lane_pose_at("1", -2, 10.0, d).z for d in (1.0, 0.0, -1.0)] == pytest.approx([0.10, 0.12, 0.14])
+    assert network.lane_pose("1", -2, [10.0], [0.0]).z == pytest.approx(0.12)
+
+
+def test_places_that_do_not_exist(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road("10"), road("11", y=30.0)))
+    with pytest.raises(PositionError, match=r"there is no road '12'; known: 10, 11"):
+        network.lane_pose_at("12", -1, 0.0)
+    with pytest.raises(PositionError, match=r"road '10' has no lane -3 at s = 5 m; its lanes are 1, 0, -1"):
+        network.lane_pose_at("10", -3, 5.0)
+    with pytest.raises(PositionError, match=r"s = 120 m is not on road '10'; the road runs from 0 to 100 m"):
+        network.road_pose_at("10", 120.0, 0.0)
+    with pytest.raises(PositionError, match=r"s = 101 m is not on road '11'"):
+        network.road_pose("11", [0.0, 101.0])
+    with pytest.raises(PositionError, match=r"no lane 2"):
+        network.lane_pose("11", [1, 2], 3.0)
+
+
+def test_points_beside_and_beyond_the_road(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road()))
+    found = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
+    assert found.found.tolist() == [True, True, True, False]
+    assert found.lane.tolist() == [-1, 1, 1, 0]
+    assert found.outside == pytest.approx([0.0, 2.5, 3.0, 86.5])
+    assert found.offset[:2] == pytest.approx([0.75, 4.25])
+    assert found.location(3) is None
+    beside = network.locate_at(50.0, 6.0)
+    assert beside is not None
+    assert not network.on_road(beside)
+
+
+def test_a_bridge_is_told_from_the_road_below_by_its_height(road: Text, map_of: Text) -> None:
+    bridge = '<elevationProfile><elevation s="0" a="6" b="0" c="0" d="0"/></elevationProfile>'
+    network = RoadNetwork.parse(map_of(road("low"), road("high", x=50.0, y=-50.0, hdg=math.pi / 2, extra=bridge)))
+    found = network.locate([51.0, 51.0], [-1.0, -1.0], [0.2, 6.3])
+    assert [network.tables.ids[index] for index in found.road] == ["low", "high"]
+    high = network.locate_at(51.0, -1.0, z=6.0)
+    assert high is not None
+    assert high.road == "high"
+
+
+def test_a_hint_keeps_to_the_road_that_one_is_on(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road("a"), road("b", x=50.0, y=-50.0, hdg=math.pi / 2)))
+    for name, s in (("a", 49.0), ("b", 48.0)):
+        found = network.locate_at(51.0, -1.0, network.location(name, -1, s))
+        assert found is not None
+        assert found.road == name

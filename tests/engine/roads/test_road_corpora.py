@@ -1,0 +1,146 @@
+"""Maps of others: they load, and our geometry is CARLA's and esmini's."""
+
+import csv
+import gzip
+import math
+import warnings
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from eidrive_scenario.roads import RoadNetwork, surface_meshes
+
+TOWNS = ("Town01", "Town03", "Town04", "Town05", "Town06")
+
+
+@pytest.fixture(scope="module")
+def carla() -> ModuleType:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        module: ModuleType = pytest.importorskip("carla", reason="the carla wheel is not installed")
+    return module
+
+
+def test_every_map_loads_and_can_be_drawn(corpora: Path) -> None:
+    files = sorted(corpora.rglob("*.xodr"))
+    assert len(files) >= 40
+    for file in files:
+        network = RoadNetwork.load(file)
+        points = [network.lane_pose(key.road, key.lane, 0.0) for key in list(network.graph)[:50] if key.section == 0]
+        assert np.all(np.isfinite(np.array(points))), file
+        if file.stat().st_size < 1_000_000:
+            assert all(np.all(np.isfinite(mesh.vertices)) for mesh in surface_meshes(network)), file
+
+
+@pytest.mark.parametrize("town", TOWNS)
+def test_lane_centres_are_where_carla_has_them(corpora: Path, carla: Any, town: str) -> None:
+    file = corpora / "carla_towns" / f"{town}.xodr"
+    network = RoadNetwork.load(file)
+    waypoints = carla.Map(town, file.read_text()).generate_waypoints(4.0)
+    assert len(waypoints) > 1000
+    for waypoint in waypoints:
+        road, lane = str(waypoint.road_id), waypoint.lane_id
+        pose = network.lane_pose_at(road, lane, min(waypoint.s, network.roads[road].length))
+        place, yaw = waypoint.transform.location, -math.radians(waypoint.transform.rotation.yaw)
+        assert math.dist(pose[:3], (place.x, -place.y, place.z)) < 0.02, waypoint
+        turned = 0.0 if network.driving_direction(road, lane) > 0 else math.pi
+        assert math.cos(pose.h + turned - yaw) > 1.0 - 1e-6, waypoint
+        assert network.lane_width(road, lane, waypoint.s) == pytest.approx(waypoint.lane_width, abs=1e-3)
+
+
+@pytest.mark.parametrize("town", ["Town03", "Town05"])
+def test_lanes_lead_where_carla_says(corpora: Path, carla: Any, town: str) -> None:
+    file = corpora / "carla_towns" / f"{town}.xodr"
+    network = RoadNetwork.load(file)
+    reached: dict[tuple[str, int], set[tuple[str, int]]] = {}
+    for start, end in carla.Map(town, file.read_text()).get_topology():
+        reached.setdefault((str(start.road_id), start.lane_id), set()).add((str(end.road_id), end.lane_id))
+    missing = 0
+    for (road, lane), ends in reached.items():
+        mine = {(k.road, k.lane) for k in network.graph if k.road == road and k.lane == lane}
+        mine |= {(o.road, o.lane) for k in network.graph if (k.road, k.lane) == (road, lane) for o in network.graph[k]}
+        missing += len(ends - mine - {(road, lane)})
+    assert missing == 0
+
+
+def test_a_hundred_thousand_points_of_a_town(corpora: Path) -> None:
+    network = RoadNetwork.load(corpora / "carla_towns" / "Town04.xodr")
+    rng = np.random.default_rng(4)
+    keys = [key for key, drivable in network.graph.nodes(data="drivable") if drivable]
+    rows = rng.integers(len(keys), size=100_000)
+    tables = network.tables
+    road = np.array([tables.index[key.road] for key in keys])[rows]
+    lane = np.array([key.lane for key in keys])[rows]
+    sections = [network.roads[key.road].sections[key.section] for key in keys]
+    s = (
+        np.array([part.s + 0.001 for part in sections])[rows]
+        + rng.uniform(0, 1, len(rows)) * np.array([max(part.length - 0.002, 0.0) for part in sections])[rows]
+    )
+    row = tables.lane_row(road, s, lane)
+    width = tables.width.value(row, s - tables.section_start[tables.lane_section[row]])
+    poses = tables.lane_poses(row, s, rng.uniform(-0.45, 0.45, len(rows)) * width)
+    network.locate(poses.x[:1], poses.y[:1])
+    before = perf_counter()
+    found = network.locate(poses.x, poses.y, poses.z)
+    assert perf_counter() - before < 2.0
+    assert np.all(found.outside == 0.0)
+    back = tables.road_poses(found.road, found.s, found.t)
+    assert np.hypot(back.x - poses.x, back.y - poses.y).max() < 0.01
+    assert np.abs(back.z - poses.z).max() < 0.5, "another storey"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "road_file"),
+    [
+        ("cut-in", "e6mini.xodr"),
+        ("left-hand-traffic_using_road_rule", "e6mini-lht.xodr"),
+        ("velodrome", "velodrome.xodr"),
+        ("lane_change_crest", "crest-curve.xodr"),
+        ("pedestrian", "fabriksgatan.xodr"),
+        ("pedestrian_collision", "fabriksgatan.xodr"),
+        ("highway_merge", "soderleden.xodr"),
+    ],
+)
+def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str, road_file: str) -> None:
+    network = RoadNetwork.load(corpora / "esmini" / "xodr" / road_file)
+    root = etree.parse(str(corpora / "esmini" / "xosc" / f"{scenario}.xosc")).getroot()
+    known = {p.get("name"): p.get("value") for p in root.iterfind("ParameterDeclarations/ParameterDeclaration")}
+
+    def value(element: Any, name: str, default: str = "0") -> str:
+        text = element.get(name, default)
+        return known[text[1:]] if text.startswith("$") else text
+
+    with gzip.open(corpora / "reference" / f"esmini__{scenario}.csv.gz", "rt") as file:
+        first = {row["name"]: row for row in csv.DictReader(file) if float(row["time"]) == 0.0}
+    checked = 0
+    for private in root.iterfind("Storyboard/Init/Actions/Private"):
+        row = first[value(private, "entityRef")]
+        for place in private.iterfind("PrivateAction/TeleportAction/Position/LanePosition"):
+            at = network.location(
+                value(place, "roadId"),
+                int(value(place, "laneId")),
+                float(value(place, "s")),
+                float(value(place, "offset")),
+            )
+            pose = network.pose(at)
+            orientation = place.find("Orientation")
+            turn = 0.0 if orientation is None else float(value(orientation, "h"))
+            assert math.dist(pose[:3], [float(row[axis]) for axis in "xyz"]) < 0.002
+            assert math.cos(pose.h + turn - float(row["h"])) > 1.0 - 1e-6
+            checked += 1
+    assert checked >= 1
+
+
+def test_a_banked_track_is_as_steep_as_esminis(corpora: Path) -> None:
+    network = RoadNetwork.load(corpora / "esmini" / "xodr" / "velodrome.xodr")
+    with gzip.open(corpora / "reference" / "esmini__velodrome.csv.gz", "rt") as file:
+        trace = np.array([[float(row[column]) for column in ("x", "y", "z", "r")] for row in csv.DictReader(file)])
+    found = network.locate(trace[:, 0], trace[:, 1], trace[:, 2])
+    poses = network.tables.road_poses(found.road, found.s, found.t)
+    assert np.abs(poses.z - trace[:, 2]).max() < 0.005
+    assert np.cos(poses.r - trace[:, 3]).min() > 1.0 - 1e-4

@@ -1,0 +1,79 @@
+"""The roads of the scenario library: the lanes at the paper's places, and files that fit together."""
+
+import math
+import runpy
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+
+NAMES = ("coop_1", "coop_2")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_lane_goes_on_where_and_as_it_ends(library: Path, name: str) -> None:
+    network = RoadNetwork.load(library / f"{name}.xodr")
+    checked = 0
+    for key in network.graph:
+        direction = network.driving_direction(key.road, key.lane)
+        for other, way in network.links.beyond(key, direction):
+            end = network.lane_pose_at(key.road, key.lane, network.roads[key.road].length if direction > 0 else 0.0)
+            start = network.lane_pose_at(other.road, other.lane, 0.0 if way > 0 else network.roads[other.road].length)
+            assert math.dist(end[:2], start[:2]) < 1e-6
+            assert math.cos(end.h - start.h) * direction * way == pytest.approx(1.0)
+            widths = [network.lane_width(k.road, k.lane, s) for k, s in ((key, 0.0), (other, 0.0))]
+            assert widths[0] == widths[1]
+            checked += 1
+    assert checked >= 24
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_committed_file_is_what_the_script_writes(library: Path, tmp_path: Path, name: str) -> None:
+    script = runpy.run_path(str(library / "make_roads.py"))
+    crossing = next(crossing for crossing in script["CROSSINGS"] if crossing.name == name)
+    script["write"](crossing, tmp_path / "again.xodr")
+    assert (tmp_path / "again.xodr").read_bytes() == (library / f"{name}.xodr").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "y", "heading", "road", "lane"),
+    [
+        ("coop_1", 0.0, 0.0, 0.0, "1", -1),
+        ("coop_1", 29.5, 39.5, -90.0, "3", 3),
+        ("coop_2", 0.0, 0.0, 0.0, "1", -1),
+        ("coop_2", 25.0, 34.5, -90.0, "3", 1),
+    ],
+)
+def test_cars_of_the_paper_start_on_a_lane_centre(
+    library: Path, name: str, x: float, y: float, heading: float, road: str, lane: int
+) -> None:
+    network = RoadNetwork.load(library / f"{name}.xodr")
+    found = network.locate_at(x, y)
+    assert found is not None
+    assert (found.road, found.lane) == (road, lane)
+    assert found.offset == pytest.approx(0.0, abs=1e-6)
+    assert math.cos(network.pose(found).h - math.radians(heading)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: str) -> None:
+    network = RoadNetwork.load(library / f"{name}.xodr")
+    reached = {}
+    for connection in network.junctions["100"].connections:
+        target = network.roads[connection.connecting_road].successor
+        assert target is not None
+        reached.setdefault(connection.incoming_road, set()).add(target.element_id)
+    arms = {"1", "2", "3", "4"}
+    assert reached == {arm: arms - {arm} for arm in arms}
+    assert len(network.signals) == 4
+    assert sorted(item.type for item in network.objects) == ["crosswalk"] * 4 + ["roadMark"] * 4
+
+
+def test_straight_roads_of_sixty_metres_each_way(library: Path) -> None:
+    for name, x in (("coop_1", 29.5), ("coop_2", 25.0)):
+        network = RoadNetwork.load(library / f"{name}.xodr")
+        for y in (-75.0, -30.0, 0.0, 30.0, 75.0):
+            found = network.locate_at(x, y)
+            assert found is not None
+            assert network.on_road(found)

@@ -1,0 +1,167 @@
+"""Along lanes, through links and junctions."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.movement import Branch
+
+Text = Callable[..., str]
+
+
+def lane(number: int, link: str = "", width: str = 'a="3" b="0" c="0" d="0"') -> str:
+    return f'<lane id="{number}" type="driving"><link>{link}</link><width sOffset="0" {width}/></lane>'
+
+
+def section(s: float, right: str, left: str = "") -> str:
+    return (
+        f'<laneSection s="{s}"><left>{left}</left><center><lane id="0"/></center><right>{right}</right></laneSection>'
+    )
+
+
+def chained(road: Text, map_of: Text) -> RoadNetwork:
+    """Road a along x, then road b whose reference line points back: its lane +1 continues a's lane -1."""
+    a = road(
+        "a",
+        lanes=section(0, lane(-1, '<successor id="1"/>'), lane(1, '<successor id="-1"/>')),
+        link='<successor elementType="road" elementId="b" contactPoint="end"/>',
+    )
+    b = road(
+        "b",
+        x=200.0,
+        hdg=math.pi,
+        lanes=section(0, lane(-1, '<successor id="1"/>'), lane(1, '<successor id="-1"/>')),
+        link='<successor elementType="road" elementId="a" contactPoint="end"/>',
+    )
+    return RoadNetwork.parse(map_of(a, b))
+
+
+def test_the_offset_keeps_its_place_in_the_world_where_the_next_road_runs_the_other_way(
+    road: Text, map_of: Text
+) -> None:
+    network = chained(road, map_of)
+    start = network.location("a", -1, 90.0, 0.4)
+    end = network.advance(start, 30.0)
+    assert end is not None
+    assert (end.road, end.lane, end.s, end.offset) == pytest.approx(("b", 1, 80.0, -0.4))
+    pose = network.pose(end)
+    assert (pose.x, pose.y, math.cos(pose.h)) == pytest.approx((120.0, -1.1, 1.0))
+    back = network.advance(end, -30.0)
+    assert back is not None
+    assert back == pytest.approx(start)
+
+
+def test_the_lane_ends_with_the_road(road: Text, map_of: Text) -> None:
+    network = chained(road, map_of)
+    assert network.advance(network.location("a", -1, 90.0), 110.5) is None
+    assert network.advance(network.location("a", 1, 10.0), 10.5) is None
+    left = network.advance(network.location("a", 1, 10.0), 10.0)
+    assert left is not None
+    assert left.s == pytest.approx(0.0)
+
+
+def test_left_hand_traffic_drives_the_other_way(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road("r", rule="LHT")))
+    assert [network.driving_direction("r", n) for n in (1, -1)] == [1, -1]
+    moved = network.advance(network.location("r", 1, 20.0), 5.0)
+    assert moved is not None
+    assert moved.s == pytest.approx(25.0)
+
+
+def test_distance_counts_on_the_lane_not_on_the_reference_line(road: Text, map_of: Text) -> None:
+    length = 20 * math.pi
+    bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
+    network = RoadNetwork.parse(map_of(road("r", length=length, geometry=bend)))
+    outer = network.advance(network.location("r", -1, 0.0), 10.0)
+    inner = network.advance(network.location("r", 1, 30.0), 10.0)
+    assert outer is not None
+    assert inner is not None
+    assert outer.s == pytest.approx(10.0 * 20.0 / 21.75)
+    assert 30.0 - inner.s == pytest.approx(10.0 * 20.0 / 18.25)
+
+
+def test_lanes_are_renumbered_from_section_to_section(road: Text, map_of: Text) -> None:
+    lanes = section(0, lane(-1, '<successor id="-2"/>')) + section(40, lane(-1) + lane(-2, '<predecessor id="-1"/>'))
+    network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
+    moved = network.advance(network.location("r", -1, 35.0), 10.0)
+    assert moved is not None
+    assert (moved.lane, moved.s, moved.offset) == pytest.approx((-2, 45.0, 0.0))
+    exactly = network.advance(network.location("r", -1, 35.0), 5.0)
+    assert exactly is not None
+    assert (exactly.lane, exactly.s) == pytest.approx((-2, 40.0))
+    back = network.advance(network.location("r", -2, 45.0), -10.0)
+    assert back is not None
+    assert (back.lane, back.s) == pytest.approx((-1, 35.0))
+
+
+def test_where_a_lane_ends_the_car_stays_where_it_is_on_the_lane_beside(road: Text, map_of: Text) -> None:
+    lanes = section(0, lane(-1, '<successor id="-1"/>') + lane(-2)) + section(40, lane(-1, '<predecessor id="-1"/>'))
+    network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
+    moved = network.advance(network.location("r", -2, 35.0), 10.0)
+    assert moved is not None
+    assert (moved.lane, moved.s, moved.offset, moved.t) == pytest.approx((-1, 45.0, -3.0, -4.5))
+
+
+def fork(road: Text, map_of: Text) -> RoadNetwork:
+    """Road a leads to a junction with a way to the left and one that bends a little to the right."""
+    ways = []
+    rest = ['<junction id="9" name="">']
+    for i, (number, bend) in enumerate((("left", 0.05), ("ahead", -0.01))):
+        arc = f'<geometry s="0" x="100" y="0" hdg="0" length="20"><arc curvature="{bend}"/></geometry>'
+        link = '<predecessor elementType="road" elementId="a" contactPoint="end"/>'
+        lanes = section(0, lane(-1, '<predecessor id="-1"/>'))
+        ways.append(road(number, length=20.0, geometry=arc, lanes=lanes, link=link, junction="9"))
+        rest.append(
+            f'<connection id="{i}" incomingRoad="a" connectingRoad="{number}" contactPoint="start">'
+            '<laneLink from="-1" to="-1"/></connection>'
+        )
+    a = road("a", lanes=section(0, lane(-1)), link='<successor elementType="junction" elementId="9"/>')
+    return RoadNetwork.parse(map_of(a, *ways, rest="".join(rest) + "</junction>"))
+
+
+def test_at_a_junction_the_straightest_way_is_taken_unless_told_otherwise(road: Text, map_of: Text) -> None:
+    network = fork(road, map_of)
+    start = network.location("a", -1, 95.0)
+    default = network.advance(start, 10.0)
+    assert default is not None
+    assert default.road == "ahead"
+    seen: list[Branch] = []
+
+    def leftmost(branches: object) -> Branch:
+        assert isinstance(branches, list)
+        seen.extend(branches)
+        return max(branches, key=lambda branch: branch.turn)
+
+    chosen = network.advance(start, 10.0, choose=leftmost)
+    assert chosen is not None
+    assert chosen.road == "left"
+    assert {branch.lane.road: branch.turn for branch in seen} == pytest.approx({"left": 1.0, "ahead": -0.2})
+    route = network.route(start, network.location("left", -1, 15.0))
+    followed = network.advance(start, 10.0, route=route)
+    assert followed is not None
+    assert followed.road == "left"
+
+
+def test_back_out_of_a_junction(road: Text, map_of: Text) -> None:
+    network = fork(road, map_of)
+    back = network.advance(network.location("left", -1, 4.0), -20.0)
+    assert back is not None
+    assert back.road == "a"
+
+
+def test_distances_along_connected_roads(road: Text, map_of: Text) -> None:
+    network = chained(road, map_of)
+    a = network.location("a", -1, 90.0)
+    b = network.location("b", 1, 80.0, -0.4)
+    assert network.distance(a, b) == pytest.approx((30.0, 0.4))
+    assert network.distance(b, a) == pytest.approx((-30.0, -0.4))
+    oncoming = network.location("a", 1, 90.0)
+    assert network.distance(oncoming, b) == pytest.approx((-30.0, 2.6))
+    assert network.distance(a, network.location("a", 1, 60.0)) == pytest.approx((-30.0, 3.0))
+
+
+def test_no_distance_between_roads_that_are_not_joined(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road("a"), road("b", y=50.0)))
+    assert network.distance(network.location("a", -1, 1.0), network.location("b", -1, 1.0)) is None

@@ -1,0 +1,168 @@
+"""What a file may say, and what is said about a file that is wrong."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import RoadError
+from eidrive_scenario.roads import RoadNetwork
+
+Text = Callable[..., str]
+
+
+def problems(text: str) -> list[str]:
+    with pytest.raises(RoadError) as caught:
+        RoadNetwork.parse(text, "town.xodr")
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(RoadError, match=r"none\.xodr: cannot read: No such file or directory; give the path"):
+        RoadNetwork.load(tmp_path / "none.xodr")
+
+
+def test_a_document_type_is_refused_before_anything_is_read() -> None:
+    bomb = '<!DOCTYPE x [<!ENTITY a "b"><!ENTITY c "&a;&a;&a;&a;">]><OpenDRIVE>&c;</OpenDRIVE>'
+    assert problems(bomb) == ["town.xodr:1: has a document type declaration; remove <!DOCTYPE …>"]
+    outside = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/hostname">]><OpenDRIVE>&a;</OpenDRIVE>'
+    assert problems(outside) == ["town.xodr:1: has a document type declaration; remove <!DOCTYPE …>"]
+
+
+def test_broken_xml_and_other_xml() -> None:
+    (found,) = problems("<OpenDRIVE>\n<road></OpenDRIVE>")
+    assert found.startswith("town.xodr:2: not well-formed XML: Opening and ending tag mismatch")
+    assert problems("<OpenSCENARIO/>") == [
+        "town.xodr:1: the root element is <OpenSCENARIO>; an OpenDRIVE file begins with <OpenDRIVE>"
+    ]
+
+
+def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Text) -> None:
+    text = map_of(
+        "\n"
+        + road("1", geometry='<geometry s="0" x="0" y="nan" hdg="0" length="100"><arc curvatur="0.1"/></geometry>'),
+        "\n" + road("1", rule="LTH"),
+        "\n" + road("2", link='<successor elementType="road" elementId="7" contactPoint="begin"/>'),
+        "\n" + road("3", geometry='<geometry s="0" x="0" y="0" hdg="0" length="100"><spline/></geometry>'),
+    )
+    assert problems(text) == [
+        "town.xodr:2: <geometry> has y='nan'; give a finite number",
+        "town.xodr:2: <arc> lacks the attribute 'curvature'; did you mean 'curvatur'? (rename it to curvature)",
+        "town.xodr:3: road '1' occurs twice; give each road its own id",
+        "town.xodr:3: road '1' has rule='LTH'; did you mean 'LHT'?",
+        "town.xodr:4: <successor> has contactPoint='begin'; known: end, start",
+        "town.xodr:4: road '2' links to road '7', which does not exist; known: 1, 2, 3",
+        "town.xodr:5: unknown geometry <spline>; did you mean 'line'?",
+        "town.xodr:5: road '3' has no <geometry>; add at least one",
+    ]
+
+
+def test_lanes_that_stand_on_the_wrong_side_or_twice(road: Text, map_of: Text) -> None:
+    lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
+    sides = f'<left>{lane}</left><center><lane id="0"/></center><right>{lane}{lane}</right>'
+    section = f'<laneSection s="0">{sides}</laneSection>'
+    found = problems(map_of(road(lanes=section)))
+    assert [line.split(": ", 1)[1] for line in found] == [
+        "lane -1 stands under <left>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
+        "lane -1 occurs twice in its section; give each lane its own id",
+    ]
+
+
+def test_a_length_that_the_geometry_does_not_cover(road: Text, map_of: Text) -> None:
+    short = '<geometry s="0" x="0" y="0" hdg="0" length="80"><line/></geometry>'
+    (found,) = problems(map_of(road(geometry=short)))
+    assert "road '1' has length 100 m, but its geometry ends at 80 m; correct the length" in found
+
+
+def test_a_namespace_is_no_obstacle(road: Text, map_of: Text) -> None:
+    text = map_of(road()).replace(
+        "<OpenDRIVE>", '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
+    )
+    assert list(RoadNetwork.parse(text).roads) == ["1"]
+
+
+def test_borders_say_the_same_as_widths(road: Text, map_of: Text) -> None:
+    def lane(number: int, entry: str) -> str:
+        return f'<lane id="{number}" type="driving">{entry}</lane>'
+
+    def section(inner: str, outer: str) -> str:
+        return (
+            '<laneOffset s="0" a="0.5" b="0" c="0" d="0"/><laneSection s="0"><center><lane id="0"/></center>'
+            f"<right>{lane(-1, inner)}{lane(-2, outer)}</right></laneSection>"
+        )
+
+    borders = section(
+        '<border sOffset="0" a="-2.5" b="-0.01" c="0" d="0"/>', '<border sOffset="0" a="-6" b="-0.03" c="0" d="0"/>'
+    )
+    widths = section(
+        '<width sOffset="0" a="3" b="0.01" c="0" d="0"/>', '<width sOffset="0" a="3.5" b="0.02" c="0" d="0"/>'
+    )
+    one, two = (RoadNetwork.parse(map_of(road(lanes=lanes))) for lanes in (borders, widths))
+    for s in (0.0, 33.0, 100.0):
+        for number in (-1, -2):
+            assert one.lane_width("1", number, s) == pytest.approx(two.lane_width("1", number, s))
+            assert one.lane_pose_at("1", number, s) == pytest.approx(two.lane_pose_at("1", number, s))
+
+
+def test_sections_of_one_side_only(road: Text, map_of: Text) -> None:
+    def part(s: int, tag: str, number: int, a: float, b: float) -> str:
+        lane = f'<lane id="{number}" type="driving"><width sOffset="0" a="{a}" b="{b}" c="0" d="0"/></lane>'
+        centre = '<center><lane id="0"/></center>'
+        return f'<laneSection s="{s}" singleSide="true"><{tag}>{lane}</{tag}>{centre}</laneSection>'
+
+    lanes = part(0, "right", -1, 3.0, 0.01) + part(0, "left", 1, 4.0, 0.0) + part(40, "left", 1, 2.0, 0.0)
+    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+    assert network.lane_width("1", -1, 70.0) == pytest.approx(3.7)
+    assert [network.lane_width("1", 1, s) for s in (39.0, 41.0)] == [4.0, 2.0]
+    moved = network.advance(network.location("1", -1, 10.0), 80.0)
+    assert moved is not None
+    assert moved.s == pytest.approx(90.0, abs=0.2)
+
+
+def test_speed_limits_of_roads_and_lanes(road: Text, map_of: Text) -> None:
+    lane = (
+        '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/>'
+        '<speed sOffset="20" max="30" unit="mph"/></lane>'
+    )
+    kinds = (
+        '<type s="0" type="town"><speed max="50" unit="km/h"/></type>'
+        '<type s="50" type="motorway"><speed max="no limit"/></type><type s="80" type="rural"/>'
+    )
+    lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
+    network = RoadNetwork.parse(map_of(road(lanes=lanes, extra=kinds)))
+    assert network.speed_limit("1", 10.0) == pytest.approx(50 / 3.6)
+    assert network.speed_limit("1", 10.0, -1) == pytest.approx(50 / 3.6)
+    assert network.speed_limit("1", 30.0, -1) == pytest.approx(13.4112)
+    assert network.speed_limit("1", 60.0) == math.inf
+    assert network.speed_limit("1", 90.0) is None
+
+
+SIGNALS = (
+    '<signals><signal s="90" t="-4" id="7" name="light" dynamic="yes" orientation="+" zOffset="5" country="OpenDRIVE" '
+    'type="1000001" subtype="-1" hOffset="0.1"><validity fromLane="-1" toLane="-1"/></signal></signals>'
+)
+
+
+def test_signals_references_and_controllers(road: Text, map_of: Text) -> None:
+    other = '<signals><signalReference s="5" t="3" id="7" orientation="-"/></signals>'
+    rest = '<controller id="1" name="c"><control signalId="7" type="0"/></controller>'
+    network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=other), rest=rest))
+    signal = network.signals["7"]
+    assert signal.dynamic
+    assert signal.place.validity == ((-1, -1),)
+    assert [(place.road, place.s, place.orientation) for place in signal.references] == [("2", 5.0, "-")]
+    assert network.controllers["1"].signals == ("7",)
+    pose = network.signal_pose(signal)
+    assert pose[:4] == pytest.approx((90.0, -4.0, 5.0, math.pi + 0.1))
+
+
+def test_a_reference_to_a_signal_that_does_not_exist(road: Text, map_of: Text) -> None:
+    extra = '<signals><signalReference s="5" t="3" id="9" orientation="-"/></signals>'
+    (found,) = problems(map_of(road(extra=extra)))
+    assert found == "town.xodr:1: reference to signal '9', which does not exist; correct the id"
+
+
+def test_signals_that_share_an_id_keep_apart(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=SIGNALS)))
+    assert {key: signal.place.road for key, signal in network.signals.items()} == {"7": "1", "7#2": "2"}

@@ -1,0 +1,128 @@
+"""Routes over the lane graph."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
+
+Text = Callable[..., str]
+
+
+@pytest.fixture
+def crossing(library: Path) -> RoadNetwork:
+    return RoadNetwork.load(library / "coop_1.xodr")
+
+
+def ring(road: Text, map_of: Text) -> RoadNetwork:
+    """Two half circles of radius 50 m that follow each other; two lanes, both counter-clockwise."""
+    lanes = (
+        '<laneSection s="0"><center><lane id="0"/></center><right>'
+        + "".join(
+            f'<lane id="{n}" type="driving"><link><predecessor id="{n}"/><successor id="{n}"/></link>'
+            '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
+            for n in (-1, -2)
+        )
+        + "</right></laneSection>"
+    )
+    length = 50 * math.pi
+    roads = []
+    for number, other, x, h in (("a", "b", 50.0, math.pi / 2), ("b", "a", -50.0, -math.pi / 2)):
+        arc = f'<geometry s="0" x="{x}" y="0" hdg="{h!r}" length="{length!r}"><arc curvature="0.02"/></geometry>'
+        link = "".join(
+            f'<{tag} elementType="road" elementId="{other}" contactPoint="{end}"/>'
+            for tag, end in (("predecessor", "end"), ("successor", "start"))
+        )
+        roads.append(road(number, length=length, geometry=arc, lanes=lanes, link=link))
+    return RoadNetwork.parse(map_of(*roads))
+
+
+def test_straight_over_the_crossing(crossing: RoadNetwork) -> None:
+    route = crossing.route(crossing.location("1", -1, 80.0), crossing.location("2", -1, 40.0))
+    assert [key.road for key in route.lanes] == ["1", "101", "2"]
+    assert route.length == pytest.approx(94.5)
+    line = route.polyline(10.0)
+    assert line[:, 1:] == pytest.approx(np.zeros((len(line), 2)), abs=1e-9)
+    assert line[0, 0] == pytest.approx(0.0)
+    assert np.diff(line[:, 0]).max() <= 10.0 + 1e-9
+
+
+def test_a_left_turn_leads_from_lane_to_lane_without_a_kink(crossing: RoadNetwork) -> None:
+    route = crossing.route(crossing.location("1", -1, 80.0), crossing.location("3", -1, 30.0))
+    line = route.polyline(0.5)
+    steps = np.diff(line[:, :2], axis=0)
+    turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
+    assert np.abs(turns).max() < 0.5 / 8.0
+    assert turns.sum() == pytest.approx(math.pi / 2, abs=1e-6)
+    assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(route.length, rel=1e-3)
+
+
+def test_a_lane_change_costs_less_than_the_way_round(road: Text, map_of: Text) -> None:
+    network = ring(road, map_of)
+    start, end = network.location("a", -1, 10.0), network.location("b", -2, 10.0)
+    route = network.route(start, end)
+    kinds = [network.graph.edges[a, b]["kind"] for a, b in zip(route.lanes, route.lanes[1:], strict=False)]
+    assert kinds.count("change") == 1
+    line = route.polyline(1.0)
+    radius = np.hypot(line[:, 0], line[:, 1])
+    assert (radius[0], radius[-1]) == pytest.approx((52.0, 56.0), abs=1e-6)
+    assert np.all(np.diff(radius) > -1e-3)
+    assert route.location_at(0.0).lane == -1
+    assert route.location_at(route.length).lane == -2
+
+
+def test_a_goal_behind_the_start_is_reached_by_the_way_round(road: Text, map_of: Text) -> None:
+    network = ring(road, map_of)
+    for lane in (-1, -2):
+        route = network.route(network.location("a", -1, 20.0), network.location("a", lane, 10.0))
+        assert [key.road for key in route.lanes if key.lane == lane][-1] == "a"
+        assert route.length > 2 * math.pi * 52.0 - 15.0
+
+
+def test_the_cheapest_way_is_the_one_that_dijkstra_finds(crossing: RoadNetwork) -> None:
+    lanes = [key for key, drivable in crossing.graph.nodes(data="drivable") if drivable]
+    roads = crossing.roads
+
+    def middle(key: LaneKey) -> LaneLocation:
+        return crossing.location(key.road, key.lane, 0.5 * roads[key.road].length)
+
+    checked = 0
+    for source in lanes:
+        costs = nx.single_source_dijkstra_path_length(crossing.graph, source)
+        for target, cost in costs.items():
+            if target != source and target in lanes:
+                found = crossing.route(middle(source), middle(target)).lanes
+                assert nx.path_weight(crossing.graph, found, "weight") == pytest.approx(cost)
+                checked += 1
+    assert checked > 100
+
+
+def test_no_way_against_the_traffic(crossing: RoadNetwork) -> None:
+    with pytest.raises(RouteError, match=r"no way over the lanes from road '2' lane -1 .* to road '1' lane -1"):
+        crossing.route(crossing.location("2", -1, 5.0), crossing.location("1", -1, 5.0))
+
+
+def test_by_way_of_a_place(road: Text, map_of: Text) -> None:
+    network = ring(road, map_of)
+    a, b = network.location("a", -1, 10.0), network.location("a", -1, 60.0)
+    once = network.route(a, b)
+    round_ = network.route(a, b, via=[network.location("b", -1, 50.0)])
+    assert once.length == pytest.approx(50.0 * 52.0 / 50.0, rel=1e-3)
+    assert round_.length == pytest.approx(once.length + 2 * math.pi * 52.0, rel=1e-3)
+
+
+def test_places_along_a_route(crossing: RoadNetwork) -> None:
+    route = crossing.route(crossing.location("3", 3, 25.0), crossing.location("4", 3, 30.0))
+    assert route.s_along(crossing.location("3", 3, 5.0)) == pytest.approx(20.0)
+    assert route.s_along(crossing.location("1", -1, 5.0)) is None
+    assert route.project(28.5, 20.0) == pytest.approx((19.5, -1.0))
+    assert route.project(30.0, 20.0, near=15.0) == pytest.approx((19.5, 0.5))
+    pose = route.pose_at(30.0)
+    assert (pose.x, pose.y) == pytest.approx((29.5, 9.5))
+    assert math.sin(pose.h) == pytest.approx(-1.0)
+    place = route.location_at(10.0)
+    assert (place.road, place.lane, place.s) == pytest.approx(("3", 3, 15.0))

@@ -1,0 +1,95 @@
+"""What is drawn of a road."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.roads import KINDS, RoadNetwork, SurfaceMesh, outlines, placed_objects, surface_meshes
+
+Text = Callable[..., str]
+
+
+def area(mesh: SurfaceMesh) -> float:
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
+
+
+def by_kind(network: RoadNetwork) -> dict[str, SurfaceMesh]:
+    return {mesh.kind: mesh for mesh in surface_meshes(network)}
+
+
+def marked(kind: str, color: str = "white") -> str:
+    return (
+        '<laneSection s="0"><center><lane id="0" type="none">'
+        f'<roadMark sOffset="0" type="{kind}" color="{color}" width="0.2"/></lane></center>'
+        '<right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
+    )
+
+
+def test_a_straight_lane_needs_few_triangles(road: Text, map_of: Text) -> None:
+    mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("none")))))["driving"]
+    assert area(mesh) == pytest.approx(400.0)
+    assert len(mesh.faces) <= 12
+    assert np.diff(np.unique(mesh.vertices[:, 0])).max() <= 25.0
+    assert mesh.colour == KINDS["driving"]
+
+
+def test_a_bend_is_drawn_to_the_centimetre(road: Text, map_of: Text) -> None:
+    length = 20 * math.pi
+    bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
+    mesh = by_kind(RoadNetwork.parse(map_of(road(length=length, geometry=bend, lanes=marked("none")))))["driving"]
+    assert area(mesh) == pytest.approx(math.pi / 2 * (24.0**2 - 20.0**2), rel=2e-3)
+
+
+def test_marks_are_as_long_and_as_wide_as_they_should_be(road: Text, map_of: Text) -> None:
+    expected = {"solid": 20.0, "broken": 0.2 * 34, "solid solid": 40.0, "broken solid": 20.0 + 0.2 * 34}
+    for kind, size in expected.items():
+        mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked(kind, "yellow")))))["marking_yellow"]
+        assert area(mesh) == pytest.approx(size), kind
+        assert mesh.vertices[:, 2].min() > 0.0
+
+
+def test_the_broken_line_of_a_centre_lane_lies_on_the_left_if_it_is_named_first(road: Text, map_of: Text) -> None:
+    mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("broken solid")))))["marking_white"]
+    left = mesh.vertices[mesh.faces][np.mean(mesh.vertices[mesh.faces][:, :, 1], axis=1) > 0.0]
+    assert left[:, :, 0].max() - left[:, :, 0].min() == pytest.approx(100.0, abs=1.1)
+    assert len(left) == 2 * 12
+
+
+@pytest.mark.parametrize("name", ["coop_1", "coop_2"])
+def test_faces_of_the_ground_look_upwards(library: Path, name: str) -> None:
+    for mesh in surface_meshes(RoadNetwork.load(library / f"{name}.xodr")):
+        a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        assert np.all(np.isfinite(mesh.vertices))
+        if mesh.kind != "curb":
+            assert np.all(normal[:, 2] > -1e-9), mesh.kind
+
+
+def test_a_crosswalk_is_striped_and_a_kerb_is_raised(library: Path) -> None:
+    network = RoadNetwork.load(library / "coop_2.xodr")
+    meshes = by_kind(network)
+    assert meshes["sidewalk"].vertices[:, 2] == pytest.approx(0.12)
+    assert set(np.round(meshes["curb"].vertices[:, 2], 6)) == {0.0, 0.12}
+    crosswalk = next(item for item in network.objects if item.type == "crosswalk" and item.road == "3")
+    (ground,) = outlines(network, crosswalk)
+    assert ground[:, 1].min() == pytest.approx(24.3)
+    assert ground[:, 1].max() == pytest.approx(27.3)
+    assert np.ptp(ground[:, 0]) == pytest.approx(2 * (3.5 + 3.5 + 0.5 + 0.63))
+
+
+def test_objects_repeat_along_the_road(road: Text, map_of: Text) -> None:
+    objects = (
+        '<objects><object id="1" type="pole" s="0" t="0" radius="0.1" height="1">'
+        '<repeat s="10" length="40" distance="20" tStart="4" tEnd="6" heightStart="1" heightEnd="2" '
+        'zOffsetStart="0" zOffsetEnd="0"/></object>'
+        '<object id="2" type="barrier" s="0" t="0" height="1" width="0.3"><repeat s="0" length="12" distance="0" '
+        'tStart="5" tEnd="5" heightStart="1" heightEnd="1" zOffsetStart="0" zOffsetEnd="0"/></object></objects>'
+    )
+    placed = list(placed_objects(RoadNetwork.parse(map_of(road(extra=objects)))))
+    posts, parts = np.array([(p.pose.x, p.pose.y, p.height) for p in placed[:3]]), placed[3:]
+    assert posts == pytest.approx(np.array([(10, 4, 1), (30, 5, 1.5), (50, 6, 2)]))
+    assert np.array([(p.pose.x, p.length) for p in parts]) == pytest.approx(np.array([(2, 4), (6, 4), (10, 4)]))

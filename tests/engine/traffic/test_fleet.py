@@ -1,0 +1,226 @@
+"""Cars that follow lanes and each other."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.geometry import overlap
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.traffic import Fleet, IntelligentDriver
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.view import WorldView
+
+LENGTH, WIDTH, REAR_AXLE = 4.6, 1.9, 1.4
+DT = 0.05
+RADIUS = 100.0
+
+
+def spec(name: str) -> ActorSpec:
+    return ActorSpec(name, "car", "car", (LENGTH, WIDTH, 1.5), (REAR_AXLE, 0.0, 0.75), wheelbase=2.8)
+
+
+def view(placements: dict[str, Placement], time: float = 0.0) -> WorldView:
+    rows = list(placements.values())
+    count = len(rows)
+    yaw, speed = np.array([p.yaw for p in rows]), np.array([p.speed for p in rows])
+    return WorldView(
+        time=time,
+        tick=0,
+        names=tuple(placements),
+        categories=("car",) * count,
+        position=np.array([(p.x, p.y, p.z) for p in rows]).reshape(count, 3),
+        yaw=yaw,
+        pitch=np.zeros(count),
+        roll=np.zeros(count),
+        velocity=np.stack([speed * np.cos(yaw), speed * np.sin(yaw), 0.0 * yaw], axis=1),
+        acceleration=np.zeros((count, 3)),
+        yaw_rate=np.zeros(count),
+        speed=speed,
+        size=np.tile((LENGTH, WIDTH, 1.5), (count, 1)),
+        offset=np.tile((REAR_AXLE, 0.0, 0.75), (count, 1)),
+    )
+
+
+@pytest.fixture(scope="module")
+def loop() -> RoadNetwork:
+    """A circle of radius 100 m in two roads; lane -1 runs counter-clockwise at 102 m from the middle."""
+    length = math.pi * RADIUS
+    roads = []
+    for number, other, x, h in (("a", "b", RADIUS, math.pi / 2), ("b", "a", -RADIUS, -math.pi / 2)):
+        roads.append(
+            f'<road id="{number}" length="{length!r}" junction="-1"><link>'
+            f'<predecessor elementType="road" elementId="{other}" contactPoint="end"/>'
+            f'<successor elementType="road" elementId="{other}" contactPoint="start"/></link><planView>'
+            f'<geometry s="0" x="{x}" y="0" hdg="{h!r}" length="{length!r}"><arc curvature="{1 / RADIUS}"/></geometry>'
+            '</planView><lanes><laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">'
+            '<link><predecessor id="-1"/><successor id="-1"/></link>'
+            '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>'
+        )
+    return RoadNetwork.parse(f"<OpenDRIVE>{''.join(roads)}</OpenDRIVE>")
+
+
+@pytest.fixture(scope="module")
+def crossing() -> RoadNetwork:
+    return RoadNetwork.load(Path(__file__).parents[3] / "xosc" / "roads" / "coop_2.xodr")
+
+
+def gaps(placements: dict[str, Placement]) -> list[float]:
+    """Bumper to bumper along the circle, from each car to the next."""
+    angles = np.sort([math.atan2(p.y, p.x) for p in placements.values()])
+    between = np.diff(np.append(angles, angles[0] + 2 * math.pi))
+    return [float(angle) * (RADIUS + 2.0) - LENGTH for angle in between]
+
+
+def test_a_ring_of_cars_settles_at_the_equilibrium_of_the_model(loop: RoadNetwork) -> None:
+    driver = IntelligentDriver(lateral_acceleration=9.0)
+    fleet = Fleet(loop, driver=driver)
+    rng = np.random.default_rng(5)
+    count = 24
+    for k in range(count):
+        place = (k + 0.3 * rng.uniform(-1, 1)) * 2 * math.pi * RADIUS / count % (2 * math.pi * RADIUS)
+        road, s = ("a", place) if place < math.pi * RADIUS else ("b", place - math.pi * RADIUS)
+        fleet.add(spec(f"car{k}"), loop.location(road, -1, s), speed=float(rng.uniform(0, 6)), desired_speed=15.0)
+    smallest = math.inf
+    for _ in range(8000):
+        smallest = min(smallest, *gaps(fleet.step(None, DT)))
+    assert smallest > 0.5
+    speeds = np.array(list(fleet.speeds.values()))
+    assert np.ptp(speeds) < 0.2
+    mean_gap = 2 * math.pi * (RADIUS + 2.0) / count - LENGTH
+    assert driver.equilibrium_gap(float(speeds.mean()), 15.0) == pytest.approx(mean_gap, rel=0.02)
+
+
+def test_a_string_of_cars_stops_behind_an_obstacle_and_goes_on_when_it_leaves(loop: RoadNetwork) -> None:
+    fleet = Fleet(loop)
+    for k in range(5):
+        fleet.add(spec(f"car{k}"), loop.location("a", -1, 100.0 - 20.0 * k), speed=10.0, desired_speed=13.0)
+    pose = loop.lane_pose_at("a", -1, 250.0)
+    wall = {"wall": Placement(pose.x, pose.y, yaw=pose.h)}
+    closest = math.inf
+    for _ in range(1200):
+        placements = fleet.step(view(wall), DT)
+        closest = min(closest, *gaps(placements | wall))
+    queue = sorted(gaps(placements | wall))[:5]
+    assert closest > 1.5
+    assert all(speed < 0.05 for speed in fleet.speeds.values())
+    assert queue == pytest.approx([2.0] * 5, abs=0.5)
+    for _ in range(400):
+        fleet.step(view({}), DT)
+    assert min(fleet.speeds.values()) > 5.0
+
+
+def test_a_car_beside_the_lane_is_no_obstacle(loop: RoadNetwork) -> None:
+    fleet = Fleet(loop)
+    fleet.add(spec("car"), loop.location("a", -1, 50.0), speed=10.0, desired_speed=10.0)
+    pose = loop.lane_pose_at("a", -1, 90.0, -4.0)
+    for _ in range(100):
+        fleet.step(view({"parked": Placement(pose.x, pose.y, yaw=pose.h)}), DT)
+    assert fleet.speeds["car"] > 9.9
+
+
+def test_steps_are_as_long_as_the_speed_says(loop: RoadNetwork) -> None:
+    fleet = Fleet(loop)
+    before = fleet.add(spec("car"), loop.location("a", -1, 300.0), speed=12.0, desired_speed=12.0)
+    assert before.teleport
+    for _ in range(100):
+        (after,) = fleet.step(None, DT).values()
+        assert math.hypot(after.x - before.x, after.y - before.y) == pytest.approx(after.speed * DT, rel=0.01)
+        assert math.hypot(after.x, after.y) == pytest.approx(RADIUS + 2.0)
+        before = after
+
+
+def test_cars_slow_down_before_a_bend(crossing: RoadNetwork) -> None:
+    fleet = Fleet(crossing, seed=1, driver=IntelligentDriver(lateral_acceleration=2.0))
+    for k in range(6):
+        fleet.add(spec(f"car{k}"), crossing.location("3", 1, 80.0 - 14.0 * k), desired_speed=13.0)
+    turned = False
+    heading: dict[str, float] = {}
+    for _ in range(1200):
+        placements = fleet.step(None, DT)
+        for name, place in placements.items():
+            rate = math.remainder(place.yaw - heading.get(name, place.yaw), 2 * math.pi) / DT
+            turned |= abs(rate) > 0.3
+            assert abs(rate) * place.speed < 2.0 * 1.4
+            heading[name] = place.yaw
+    assert turned
+
+
+def crossing_fleet(crossing: RoadNetwork, seed: int) -> Fleet:
+    fleet = Fleet(crossing, seed=seed)
+    lanes = [(road, n) for road, lanes in {"1": (-1, -2), "2": (2, 3), "3": (1,), "4": (-1,)}.items() for n in lanes]
+    for road, n in lanes:
+        for k in range(4):
+            length = crossing.roads[road].length
+            s = length - 12.0 - 16.0 * k if n < 0 else 12.0 + 16.0 * k
+            if road in ("1", "4"):
+                s = length - 12.0 - 16.0 * k
+            fleet.add(spec(f"{road}/{n}/{k}"), crossing.location(road, n, s), speed=5.0)
+    return fleet
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nobody_touches_anybody_on_a_crossing_and_all_get_through(crossing: RoadNetwork, seed: int) -> None:
+    fleet = crossing_fleet(crossing, seed)
+    gone: set[str] = set()
+    for tick in range(4000):
+        placements = fleet.step(None, DT)
+        gone |= fleet.departed
+        if tick % 5 == 0 and len(placements) > 1:
+            boxes = view(placements).boxes
+            near = np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < LENGTH + WIDTH
+            for i, j in zip(*np.nonzero(np.triu(near, 1)), strict=True):
+                assert not overlap(boxes[i], boxes[j]), (list(placements)[i], list(placements)[j])
+        if not placements:
+            break
+    assert len(gone) == 24
+
+
+def test_a_crossing_is_left_to_a_foreign_car_that_moves_through_it(crossing: RoadNetwork) -> None:
+    fleet = Fleet(crossing)
+    fleet.add(spec("car"), crossing.location("3", 1, 8.0), speed=8.0)
+    route = crossing.route(crossing.location("1", -1, 90.0), crossing.location("2", -1, 40.0))
+    for tick in range(200):
+        pose = route.pose_at(min(4.0 * tick * DT, route.length))
+        ego = Placement(pose.x, pose.y, yaw=pose.h, speed=4.0)
+        placements = fleet.step(view({"ego": ego}), DT)
+        boxes = view({"ego": ego} | placements).boxes
+        assert len(boxes) == 1 or not overlap(boxes[0], boxes[1])
+
+
+def test_the_seed_decides_about_the_branches(crossing: RoadNetwork) -> None:
+    def traces(seed: int) -> list[Placement]:
+        fleet = crossing_fleet(crossing, seed)
+        for _ in range(300):
+            placements = fleet.step(None, DT)
+        return list(placements.values())
+
+    same, again, other = traces(1), traces(1), traces(2)
+    assert same == again
+    assert same != other
+
+
+def test_names_are_unique_and_can_be_used_again(loop: RoadNetwork) -> None:
+    fleet = Fleet(loop)
+    fleet.add(spec("car"), loop.location("a", -1, 10.0))
+    with pytest.raises(ValueError, match="'car' is in the fleet already"):
+        fleet.add(spec("car"), loop.location("a", -1, 30.0))
+    fleet.remove("car")
+    assert fleet.step(None, DT) == {}
+    fleet.add(spec("car"), loop.location("a", -1, 30.0))
+    assert fleet.names == ("car",)
+
+
+def test_neighbours_stay_in_order_over_a_long_run(loop: RoadNetwork) -> None:
+    fleet = Fleet(loop)
+    wishes = (6.0, 14.0, 9.0, 12.0)
+    for k, wish in enumerate(wishes):
+        fleet.add(spec(f"car{k}"), loop.location("a", -1, 280.0 - 30.0 * k), desired_speed=wish)
+    for _ in range(3000):
+        placements = fleet.step(None, DT)
+        ahead = sorted(placements, key=lambda name: math.atan2(placements[name].y, placements[name].x))
+        start = ahead.index("car0")
+        assert ahead[start:] + ahead[:start] == ["car0", "car3", "car2", "car1"]
+    assert min(gaps(placements)) > 1.0
+    assert max(fleet.speeds.values()) < 6.5

@@ -1,0 +1,44 @@
+"""The car-following model against its closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.traffic import IntelligentDriver
+from eidrive_scenario.traffic.idm import ballistic
+
+DRIVER = IntelligentDriver(time_gap=1.5, standstill_gap=2.0, acceleration=1.2, deceleration=2.0, exponent=4.0)
+
+
+def response(speed: float, desired: float, gap: float = math.inf, approach: float = 0.0) -> float:
+    return float(DRIVER.response(*(np.array([value]) for value in (speed, desired, gap, approach)))[0])
+
+
+def test_on_a_free_road_it_speeds_up_to_the_desired_speed() -> None:
+    assert response(0.0, 20.0) == pytest.approx(1.2)
+    assert response(10.0, 20.0) == pytest.approx(1.2 * (1 - 0.5**4))
+    assert response(20.0, 20.0) == pytest.approx(0.0)
+
+
+def test_a_standing_queue_stands_at_the_standstill_gap() -> None:
+    assert response(0.0, 20.0, gap=2.0) == pytest.approx(0.0)
+
+
+def test_in_equilibrium_nobody_accelerates() -> None:
+    for speed in (1.0, 8.0, 15.0):
+        gap = DRIVER.equilibrium_gap(speed, 20.0)
+        assert gap == pytest.approx((2.0 + 1.5 * speed) / math.sqrt(1.0 - (speed / 20.0) ** 4))
+        assert response(speed, 20.0, gap) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_gap_wanted_grows_with_the_approach_and_braking_has_a_limit() -> None:
+    wanted = 2.0 + 10.0 * 1.5 + 10.0 * 4.0 / (2.0 * math.sqrt(1.2 * 2.0))
+    assert response(10.0, 20.0, 40.0, 4.0) == pytest.approx(1.2 * (1 - 0.5**4 - (wanted / 40.0) ** 2))
+    assert response(10.0, 20.0, 0.0, 10.0) == -DRIVER.emergency
+
+
+def test_a_braking_car_stops_and_does_not_back_up() -> None:
+    covered, after = ballistic(np.array([10.0, 1.0]), np.array([-2.0, -2.0]), 1.0)
+    assert covered == pytest.approx([9.0, 0.25])
+    assert after == pytest.approx([8.0, 0.0])
