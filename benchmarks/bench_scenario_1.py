@@ -91,7 +91,7 @@ def listening(trace: Trace) -> Iterator[None]:
 
 def bare_loop(trace: Trace, kinds: frozenset[str]) -> float:
     """Seconds for the calls of these kinds in the ticks of the trace, in pybullet alone."""
-    chosen = [[call for call in calls if call[0].__name__ in kinds] for calls in trace.ticks]
+    chosen = [[call for call in calls if call[0].__name__ in kinds | SETUP] for calls in trace.ticks]
     client = bullet.connect(bullet.DIRECT)
     for function, given, options in trace.setup:
         function(*given, **options, physicsClientId=client)
