@@ -8,13 +8,15 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import networkx as nx
+import numpy as np
 
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.movement import driving_direction
-from eidrive_scenario.roads.poses import lane_at, lane_pose_at
+from eidrive_scenario.roads.poses import lane_at
+from eidrive_scenario.roads.tables import RoadTables
 
 if TYPE_CHECKING:
     LaneGraph = nx.DiGraph[LaneKey]
@@ -33,24 +35,25 @@ class RouteError(InputError):
     """There is no way over the lanes from one place to another."""
 
 
-def build_graph(roads: Mapping[str, Road], links: LaneLinks) -> LaneGraph:
-    """Nodes LaneKey with `length` [m] and `drivable`; edges with `weight` [m] and `kind` 'successor' or 'change'.
+def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
+    """Nodes LaneKey with `length` [m], `end` (x, y) and `drivable`; edges with `weight` [m] and `kind`.
+
+    The kind of an edge is 'successor' or 'change'; lengths and ends are those of the lanes' centre lines.
 
     An edge leads from a lane to the lanes that traffic enters at its end, and to its neighbours of the same direction.
     """
     graph: LaneGraph = LaneGraph()
+    roads = {road.id: road for road in tables.roads}
     directions = {
         (road.id, number): driving_direction(road, number)
         for road in roads.values()
         for section in road.sections
         for number in section.lanes
     }
-    for road in roads.values():
-        for section in road.sections:
-            for number, lane in section.lanes.items():
-                if number:
-                    key = LaneKey(road.id, section.index, number)
-                    graph.add_node(key, length=section.length, drivable=lane.drivable)
+    for key, row in tables.lane_keys():
+        if key.lane:
+            graph.add_node(key, drivable=bool(tables.lane_drivable[row]), row=row)
+    _measure(graph, tables, directions)
     for key in list(graph):
         length = graph.nodes[key]["length"]
         for other, direction in links.beyond(key, directions[key.road, key.lane]):
@@ -65,6 +68,22 @@ def build_graph(roads: Mapping[str, Road], links: LaneLinks) -> LaneGraph:
                     graph.add_edge(*keys, weight=cost, kind="change")
                     graph.add_edge(*reversed(keys), weight=cost, kind="change")
     return graph
+
+
+def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str, int], int]) -> None:
+    """Give each node the length of its centre line, by Gauss-Legendre quadrature, and where traffic leaves it."""
+    keys = list(graph)
+    row = np.array([graph.nodes[key].pop("row") for key in keys], dtype=np.int64)
+    section = tables.lane_section[row]
+    start, span = tables.section_start[section], tables.section_length[section]
+    nodes, weights = np.polynomial.legendre.leggauss(7)
+    length = np.zeros(len(row))
+    for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
+        length += 0.5 * weight * span * tables.stretch(row, start + 0.5 * (1.0 + node) * span)
+    forward = np.array([directions[key.road, key.lane] > 0 for key in keys], dtype=bool)
+    ends = tables.lane_poses(row, np.where(forward, start + span, start), np.zeros(len(row)))
+    for key, metres, x, y in zip(keys, length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True):
+        graph.nodes[key].update(length=metres, end=(x, y))
 
 
 def _neighbours(section: LaneSection) -> Iterator[tuple[int, int]]:
@@ -84,19 +103,13 @@ def find_lanes(
 ) -> tuple[LaneKey, ...]:
     """The lanes of the cheapest way by A*, the straight line to the end as the bound. Raises RouteError."""
     source, target = _key(roads, start), _key(roads, end)
-    goal = lane_pose_at(roads[end.road], end.lane, end.s)
-    section = roads[end.road].sections[target.section]
+    goal = graph.nodes[target]["end"] if target in graph else (0.0, 0.0)
+    last = graph.nodes[target]["length"] if target in graph else 0.0
 
     def bound(key: LaneKey, _: LaneKey) -> float:
-        if key == target:
-            return 0.0
-        road = roads[key.road]
-        part = road.sections[key.section]
-        s = part.end if driving_direction(road, key.lane) > 0 else part.s
-        x, y, *_rest = road.reference.at(s)
-        # The reference line may run up to the road's width beside the lane; the way counts from this lane's end.
-        beside = max(lane.outer.value(s - part.s) for lane in part.lanes.values())
-        return max(math.hypot(goal.x - x, goal.y - y) - 2.0 * beside - section.length, 0.0)
+        # The way counts up to where the target begins; lanes of real maps meet to within a few centimetres.
+        x, y = graph.nodes[LaneKey(*key[:3])]["end"]
+        return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 
     behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < 0.0
     if source[:2] == target[:2] and behind and source in graph:

@@ -119,7 +119,7 @@ class Locator:
             dx, dy = x[open_] - px, y[open_] - py
             along, left = cos * dx + sin * dy, cos * dy - sin * dx
             across[open_] = left
-            step = along / (speed * np.maximum(1.0 - curvature * left, 0.2))
+            step = along / (np.maximum(speed, 1e-3) * np.maximum(1.0 - curvature * left, 0.2))
             moved = np.clip(s[open_] + step, 0.0, length[open_])
             change = np.abs(moved - s[open_])
             s[open_] = moved

@@ -69,7 +69,7 @@ class RoadNetwork:
     @cached_property
     def graph(self) -> LaneGraph:
         """The lanes as a directed graph over LaneKey(road, section, lane)."""
-        return build_graph(self.roads, self.links)
+        return build_graph(self.tables, self.links)
 
     @cached_property
     def _locator(self) -> Locator:

@@ -124,7 +124,7 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
         px, py, h, curvature, speed = road.reference.at(s)
         cos, sin = math.cos(h), math.sin(h)
         along, across = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)
-        step = along / (speed * max(1.0 - curvature * across, 0.2))
+        step = along / (max(speed, 1e-3) * max(1.0 - curvature * across, 0.2))
         before, s = s, min(max(s + step, 0.0), length)
         if abs(s - before) < 1e-7:
             break

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.roads.curves import CurveTable
-from eidrive_scenario.roads.location import Array, Integers, Poses, PositionError
+from eidrive_scenario.roads.location import Array, Integers, LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.polynomials import PolynomialTable
 from eidrive_scenario.roads.poses import BEYOND, lane_height, off_road
@@ -119,6 +119,18 @@ class RoadTables:
             -np.arctan2(climb, np.hypot(along, sideways)),
             roll,
         )
+
+    def stretch(self, row: Integers, s: Array) -> Array:
+        """Metres of path per metre of s along lanes' centre lines, in plan view."""
+        t, slope = self.lane_t(row, s)
+        _, _, _, curvature, speed = self.curves.at(self.section_road[self.lane_section[row]], s)
+        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), 0.05))
+
+    def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
+        """All lanes with their running numbers."""
+        for row, (section, lane) in enumerate(zip(self.lane_section.tolist(), self.lane_id.tolist(), strict=True)):
+            road = int(self.section_road[section])
+            yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
         """t of lanes' centre lines and its derivative."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,11 +27,8 @@ class TrafficLanes:
         section = tables.lane_section
         self.road = tables.section_road[section]
         self.length = tables.section_length[section]
-        self.keys = [
-            LaneKey(tables.ids[road], int(number - tables.first_section[road]), int(lane))
-            for road, number, lane in zip(self.road, section, tables.lane_id, strict=True)
-        ]
-        self.row = {key: row for row, key in enumerate(self.keys)}
+        self.row = dict(tables.lane_keys())
+        self.keys = list(self.row)
         self.direction = np.array([roads.driving_direction(key.road, key.lane) for key in self.keys], dtype=np.int64)
         start = tables.section_start[section]
         self._origin = np.where(self.direction > 0, start, start + self.length)
@@ -65,10 +62,7 @@ class TrafficLanes:
 
     def stretch(self, row: Integers, progress: Array) -> Array:
         """Metres of path per metre of progress, at the lanes' centre lines."""
-        s = self.s(row, progress)
-        t, slope = self.tables.lane_t(row, s)
-        _, _, _, curvature, speed = self.tables.curves.at(self.road[row], s)
-        return np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), 0.05)
+        return self.tables.stretch(row, self.s(row, progress))
 
     def bend_speed(self, row: int, lateral: float) -> float:
         """The speed at which the sharpest bend of a lane asks for a lateral acceleration [m/s]."""

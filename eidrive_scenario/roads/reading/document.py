@@ -23,7 +23,7 @@ from eidrive_scenario.roads.polynomials import Polynomials
 from eidrive_scenario.roads.reading.findings import Findings, line_of
 from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
-from eidrive_scenario.roads.reading.plan_view import read_reference_line
+from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
 
 LARGEST = 256 * 1024 * 1024
 """Bytes of a file that is read at all."""
@@ -98,7 +98,7 @@ def _read_header(root: etree._Element) -> Header:
     if header is None:
         return Header()
     revision = tuple(
-        int(text) if text.isdigit() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
+        int(text) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
     )
     return Header(
         name=header.get("name", ""),
@@ -113,6 +113,9 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
     length = findings.number(element, "length")
     if length <= 0.0 and element.get("length") is not None:
         findings.add(element, f"road {number!r} has length {length:g} m", "give a positive length")
+    if length > LONGEST:
+        findings.add(element, f"road {number!r} has length {length:g} m", f"at most {LONGEST:g} m are read")
+        length = 1.0
     rule = element.get("rule", "RHT")
     if rule not in ("RHT", "LHT"):
         findings.add(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from copy import deepcopy
 
 from lxml import etree
 
@@ -13,6 +14,8 @@ from eidrive_scenario.roads.reading.findings import Findings
 
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
+ORIGIN = "{eidrive-scenario}origin"
+"""Where the section in which a lane stands in the file begins, seen from the section that it was moved to [m]."""
 ZERO = Polynomials()
 CENTRE = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, centre=ZERO)
 
@@ -38,7 +41,7 @@ def read_sections(
 ) -> tuple[LaneSection, ...]:
     """The lane sections of a road in the order of s; a section of no length is left out."""
     found = sorted(
-        ((findings.number(element, "s"), element) for element in lanes.iterfind("laneSection")),
+        ((min(max(findings.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
         key=lambda pair: pair[0],
     )
     if not found:
@@ -53,6 +56,8 @@ def read_sections(
             continue
         read = _read_section(element, 0.0 if not sections else s, lane_offset, findings)
         sections.append(LaneSection(len(sections), 0.0 if not sections else s, max(end - s, 0.0), read))
+    if not sections:
+        findings.add(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
     return tuple(sections)
 
 
@@ -71,21 +76,21 @@ def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, 
         for side, (start, element) in current.items():
             part = element.find(side)
             if part is not None:
-                copy = etree.fromstring(etree.tostring(part))
+                copy = deepcopy(part)
                 for lane in copy.iterfind("lane"):
-                    lane.set("from", repr(start - s))
+                    lane.set(ORIGIN, repr(start - s))
                     if start < s:
                         _continue_link(lane, "predecessor")
-                        _continue_link(joined[-1][1].find(f"{side}/lane[@id='{lane.get('id')}']"), "successor")
+                        for before in joined[-1][1].iterfind(f"{side}/lane"):
+                            if before.get("id") == lane.get("id"):
+                                _continue_link(before, "successor")
                 merged.append(copy)
         joined.append((s, merged))
     return joined
 
 
-def _continue_link(lane: etree._Element | None, name: str) -> None:
+def _continue_link(lane: etree._Element, name: str) -> None:
     """Link a lane to the lane of its own id."""
-    if lane is None:
-        return
     link = lane.find("link")
     if link is None:
         link = etree.SubElement(lane, "link")
@@ -126,7 +131,7 @@ def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, f
 def _lane(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
 ) -> Lane:
-    begin = float(element.get("from", "0"))
+    begin = float(element.get(ORIGIN, "0"))
     width = ZERO
     if number:
         width = _read_width(element, number, inner, lane_offset, findings)
@@ -158,7 +163,7 @@ def _read_width(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
 ) -> Polynomials:
     """Width over ds. A <border> counts from the reference line; <width> wins where both are given (clause 11.7)."""
-    begin = float(element.get("from", "0"))
+    begin = float(element.get(ORIGIN, "0"))
     widths = [findings.polynomial(e, "sOffset") for e in element.iterfind("width")]
     borders = [findings.polynomial(e, "sOffset") for e in element.iterfind("border")]
     given = Polynomials(widths or borders)

@@ -12,6 +12,8 @@ from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
 from eidrive_scenario.roads.reading.findings import Findings
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
+LONGEST = 1e6
+"""Length of a road or geometry that is read at all [m]."""
 SHORTEST = 1e-9
 """Geometries of no length occur in real maps and are left out [m]."""
 
@@ -44,6 +46,9 @@ def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Cur
     if length <= SHORTEST:
         if length < 0.0:
             findings.add(geometry, f"<geometry> has length={length:g}", "give a positive length")
+        return []
+    if length > LONGEST:
+        findings.add(geometry, f"<geometry> has length={length:g}", f"at most {LONGEST:g} m are read")
         return []
     shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
     if shape is None:

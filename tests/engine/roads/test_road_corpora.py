@@ -9,6 +9,7 @@ from time import perf_counter
 from types import ModuleType
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import pytest
 from lxml import etree
@@ -94,6 +95,29 @@ def test_a_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     assert np.abs(back.z - poses.z).max() < 0.5, "another storey"
 
 
+def test_routes_over_a_town_are_the_cheapest(corpora: Path) -> None:
+    network = RoadNetwork.load(corpora / "carla_towns" / "Town03.xodr")
+    keys = [key for key, data in network.graph.nodes(data=True) if data["drivable"] and data["length"] > 20.0]
+    rng = np.random.default_rng(7)
+    found = 0
+    for source in (keys[i] for i in rng.integers(len(keys), size=15)):
+        costs = nx.single_source_dijkstra_path_length(network.graph, source)
+        for target in (keys[i] for i in rng.integers(len(keys), size=8)):
+            a, b = (
+                network.location(k.road, k.lane, network.roads[k.road].sections[k.section].s + 10.0)
+                for k in (source, target)
+            )
+            if target not in costs or source[:2] == target[:2]:
+                continue
+            route = network.route(a, b)
+            assert nx.path_weight(network.graph, route.lanes, "weight") == pytest.approx(costs[target])
+            line = route.polyline(1.0)
+            steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+            assert steps.max() < 1.01
+            found += 1
+    assert found > 50
+
+
 @pytest.mark.parametrize(
     ("scenario", "road_file"),
     [
@@ -113,7 +137,7 @@ def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str,
 
     def value(element: Any, name: str, default: str = "0") -> str:
         text = element.get(name, default)
-        return known[text[1:]] if text.startswith("$") else text
+        return str(known[text[1:]] if text.startswith("$") else text)
 
     with gzip.open(corpora / "reference" / f"esmini__{scenario}.csv.gz", "rt") as file:
         first = {row["name"]: row for row in csv.DictReader(file) if float(row["time"]) == 0.0}

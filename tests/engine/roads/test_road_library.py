@@ -59,7 +59,7 @@ def test_cars_of_the_paper_start_on_a_lane_centre(
 @pytest.mark.parametrize("name", NAMES)
 def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: str) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
-    reached = {}
+    reached: dict[str, set[str]] = {}
     for connection in network.junctions["100"].connections:
         target = network.roads[connection.connecting_road].successor
         assert target is not None

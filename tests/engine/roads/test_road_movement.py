@@ -1,7 +1,7 @@
 """Along lanes, through links and junctions."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
@@ -129,10 +129,9 @@ def test_at_a_junction_the_straightest_way_is_taken_unless_told_otherwise(road: 
     assert default.road == "ahead"
     seen: list[Branch] = []
 
-    def leftmost(branches: object) -> Branch:
-        assert isinstance(branches, list)
+    def leftmost(branches: Sequence[Branch]) -> Branch:
         seen.extend(branches)
-        return max(branches, key=lambda branch: branch.turn)
+        return branches[int(branches[1].turn > branches[0].turn)]
 
     chosen = network.advance(start, 10.0, choose=leftmost)
     assert chosen is not None

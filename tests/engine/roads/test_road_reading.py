@@ -5,6 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from lxml import etree
 
 from eidrive_scenario.errors import RoadError
 from eidrive_scenario.roads import RoadNetwork
@@ -166,3 +169,31 @@ def test_a_reference_to_a_signal_that_does_not_exist(road: Text, map_of: Text) -
 def test_signals_that_share_an_id_keep_apart(road: Text, map_of: Text) -> None:
     network = RoadNetwork.parse(map_of(road(extra=SIGNALS), road("2", y=50.0, extra=SIGNALS)))
     assert {key: signal.place.road for key, signal in network.signals.items()} == {"7": "1", "7#2": "2"}
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, data: st.DataObject) -> None:
+    root = etree.parse(str(library / "coop_2.xodr")).getroot()
+    elements = [element for element in root.iter() if element.attrib]
+    for _ in range(data.draw(st.integers(1, 4))):
+        element = elements[data.draw(st.integers(0, len(elements) - 1))]
+        if not element.attrib:
+            continue
+        name = data.draw(st.sampled_from(sorted(map(str, element.attrib))))
+        text = data.draw(
+            st.sampled_from([None, "", "x", "-1", "0", "nan", "1e400", "99999999999", "0.5", "a'b", "end"])
+        )
+        if text is None:
+            del element.attrib[name]
+        else:
+            element.set(name, text)
+    try:
+        network = RoadNetwork.parse(etree.tostring(root))
+    except RoadError as error:
+        assert all(problem.message and problem.remedy for problem in error.problems)
+        return
+    network.locate([0.0, 30.0], [0.0, 5.0])
+    for key in list(network.graph)[:8]:
+        start = network.roads[key.road].sections[key.section].s
+        network.advance(network.location(key.road, key.lane, start), 30.0)
