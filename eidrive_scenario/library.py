@@ -53,6 +53,14 @@ def resolve_scenario(name: str | Path) -> Path:
     raise SettingError(Problem(f"no scenario {str(name)!r}: neither a file nor in the library", remedy))
 
 
+def name_of(path: Path) -> str:
+    """The library's name of a scenario file, such as `coop/scenario_1`; the file's own name for any other."""
+    try:
+        return path.resolve().relative_to(library_path().resolve()).with_suffix("").as_posix()
+    except ValueError:
+        return path.stem
+
+
 def names(kind: Kind) -> list[str]:
     """Names of the library's channel profiles or weather presets, sorted."""
     return sorted(path.stem for path in (library_path() / kind).glob("*.yaml"))

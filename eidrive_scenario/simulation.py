@@ -12,6 +12,7 @@ from lxml import etree
 
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.recording.criteria_text import (
@@ -263,7 +264,7 @@ class Simulation:
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(
-            scenario=self.scenario.name,
+            scenario=name_of(self.scenario.path) if self.scenario.path is not None else self.scenario.name,
             seed=self.seed,
             channel=self.stations.channel_name,
             passed=passed and not timed_out,

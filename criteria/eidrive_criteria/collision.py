@@ -53,14 +53,14 @@ class Collision(Criterion):
             other = contact.second if contact.first == self._of else contact.first
             if self._others is None or other in self._others:
                 x, y, _ = contact.position
-                self._impacts.append(Impact(view.time, other, x, y, contact.closing_speed))
+                self._impacts.append(Impact(view.time, other, x, y, contact.impact_speed))
 
     def verdict(self) -> Verdict:
         first = self._impacts[0] if self._impacts else None
         if first is not None:
             reason = (
                 f"{self._of} and {first.other} hit each other at {first.time:.2f} s at "
-                f"({first.x:.1f}, {first.y:.1f}) m with {first.speed:.1f} m/s"
+                f"({first.x:.1f}, {first.y:.1f}) m at a relative speed of {first.speed:.1f} m/s"
             )
         elif self._missing:
             reason = never_appeared(self._missing)
@@ -79,7 +79,7 @@ class Collision(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Number of touches; time [s] and speed of approach [m/s] of the first one, where there was one."""
+        """Number of touches; time [s] and relative speed [m/s] of the first one, where there was one."""
         found = {f"{self.name}.count": float(len(self._impacts))}
         if self._impacts:
             found[f"{self.name}.time"] = self._impacts[0].time

@@ -48,7 +48,10 @@ class MinDistance(Criterion):
         if of is None or to is None:
             return
         a, b = view.boxes[of].tolist(), view.boxes[to].tolist()
-        centre, box = math.hypot(b[0] - a[0], b[1] - a[1]), box_distance(a, b)
+        pair = {self._settings.of, self._settings.to}
+        # Bodies that touched within the step may stand apart again at its end.
+        touched = any({contact.first, contact.second} == pair for contact in view.contacts)
+        centre, box = math.hypot(b[0] - a[0], b[1] - a[1]), 0.0 if touched else box_distance(a, b)
         self._centre, self._box = min(self._centre, centre), min(self._box, box)
         judged = centre if self._settings.measure == "centre" else box
         if judged < self._judged:

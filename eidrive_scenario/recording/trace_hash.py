@@ -31,7 +31,7 @@ class TraceHash:
         self._sha.update(kinematics.astype("<f8", copy=False).tobytes())
         for contact in view.contacts:
             self._texts("contact", contact.first, contact.second)
-            self._floats(*contact.position, contact.closing_speed)
+            self._floats(*contact.position, contact.impact_speed)
         for change in frame.changes:
             transition = change.transition.value if change.transition is not None else ""
             self._texts("change", change.path, change.kind, change.before.value, transition, change.after.value)

@@ -24,7 +24,7 @@ class Touch(NamedTuple):
     """What pybullet said about a contact within the step."""
 
     position: Vector3
-    closing_speed: float
+    impact_speed: float
 
 
 class ContactTracker:
@@ -53,11 +53,15 @@ class ContactTracker:
             if pair in self._touching or pair in touches or not overlap(first.box, second.box):
                 continue
             self._touching[pair] = None
-            begun.append(Contact(*pair, _shared_point(first, second), _closing_speed(first, second)))
+            begun.append(
+                Contact(
+                    *pair, _shared_point(first, second), relative_speed(first.velocity_before, second.velocity_before)
+                )
+            )
         for pair, touch in touches.items():
             if pair not in self._touching:
                 self._touching[pair] = None
-                begun.append(Contact(*pair, touch.position, touch.closing_speed))
+                begun.append(Contact(*pair, touch.position, touch.impact_speed))
         return tuple(begun)
 
 
@@ -105,18 +109,6 @@ def _shared_point(first: Body, second: Body) -> Vector3:
     return float(middle[0]), float(middle[1]), float((bottom + top) / 2)
 
 
-def _closing_speed(first: Body, second: Body) -> float:
-    dx, dy, dz = (
-        second.centre_x - first.centre_x,
-        second.centre_y - first.centre_y,
-        second.centre_z - first.centre_z,
-    )
-    return closing_speed(first.velocity_before, second.velocity_before, (dx, dy, dz))
-
-
-def closing_speed(first: Vector3, second: Vector3, apart: Vector3) -> float:
-    """Speed at which two bodies with these velocities approach along the line of their centres, at least 0 [m/s]."""
-    length = math.hypot(*apart)
-    if length == 0.0:
-        return 0.0
-    return max(sum((a - b) * d for a, b, d in zip(first, second, apart, strict=True)) / length, 0.0)
+def relative_speed(first: Vector3, second: Vector3) -> float:
+    """Magnitude of the difference of two velocities [m/s]."""
+    return math.dist(first, second)

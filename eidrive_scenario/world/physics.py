@@ -8,7 +8,7 @@ from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.contacts import Touch, closing_speed
+from eidrive_scenario.world.contacts import Touch, relative_speed
 from eidrive_scenario.world.scenery import Scenery
 
 Touches = dict[tuple[str, str], Touch]
@@ -104,21 +104,18 @@ class Physics:
         touches: Touches,
     ) -> None:
         """Add what pybullet resolved between this body and others in the last step."""
-        for _, first, second, _, _, position, _, normal, gap, force, *_ in bullet.getContactPoints(
+        for _, first, second, _, _, position, _, _, gap, force, *_ in bullet.getContactPoints(
             body.handle, physicsClientId=self._client
         ):
             if gap > 0.0 and force <= 0.0:
                 continue
-            handle, side = (second, 1.0) if first == body.handle else (first, -1.0)
+            handle = second if first == body.handle else first
             if handle not in owners:
-                # A wall has no centre that matters: what counts is the speed towards it.
-                towards = (-side * normal[0], -side * normal[1], -side * normal[2])
-                speed = closing_speed(before[body.handle], (0.0, 0.0, 0.0), towards)
+                speed = relative_speed(before[body.handle], (0.0, 0.0, 0.0))
                 touches.setdefault((body.name, self._scenery.name_of(handle)), Touch(position, speed))
                 continue
             row, other = owners[handle]
             pair = (body.name, other.name) if owners[body.handle][0] < row else (other.name, body.name)
             if pair not in touches:
-                apart = (other.centre_x - body.centre_x, other.centre_y - body.centre_y, other.centre_z - body.centre_z)
-                speed = closing_speed(before[body.handle], before.get(handle, other.velocity), apart)
+                speed = relative_speed(before[body.handle], before.get(handle, other.velocity))
                 touches[pair] = Touch(position, speed)

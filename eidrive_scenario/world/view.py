@@ -20,8 +20,8 @@ class Contact:
     second: str
     position: tuple[float, float, float]
     """Point of touch in the world frame [m]."""
-    closing_speed: float
-    """Speed of approach at the first touch, along the line of centres, at least 0 [m/s]."""
+    impact_speed: float
+    """Speed of one relative to the other at the first touch [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -262,7 +262,7 @@ class World:
         offset = np.array([spec.offset for spec in specs], dtype=float).reshape(-1, 3)
         size.flags.writeable = offset.flags.writeable = False
         names, categories = tuple(self._bodies), tuple(spec.category for spec in specs)
-        self._cast = _Cast(names, categories, MappingProxyType(self._rows), size, offset)
+        self._cast = _Cast(names, categories, dict(self._rows), size, offset)
         return self._cast
 
     def _refresh(self) -> None:

@@ -31,7 +31,7 @@ def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
     tick, contact = found[0]
     assert tick in (31, 32)
     assert (contact.first, contact.second) == ("A", "B")
-    assert contact.closing_speed == pytest.approx(10.0, rel=0.01)
+    assert contact.impact_speed == pytest.approx(10.0, rel=0.01)
     assert contact.position[0] == pytest.approx(19.1, abs=0.3)
     assert contact.position[1] == pytest.approx(0.25, abs=0.7)
     assert contact.position[2] == pytest.approx(0.75)
@@ -82,7 +82,7 @@ def test_standing_car_is_pushed_by_a_scripted_one(world: World, car: CarFactory)
         contacts += view.contacts
         fastest = max(fastest, float(view.speed[1]))
     assert [(contact.first, contact.second) for contact in contacts] == [("A", "B")]
-    assert contacts[0].closing_speed == pytest.approx(8.0, rel=0.02)
+    assert contacts[0].impact_speed == pytest.approx(8.0, rel=0.02)
     assert 8.0 <= fastest <= 8.0 * 1.2
 
 
@@ -102,7 +102,7 @@ def test_two_driven_cars_share_the_momentum(world: World, car: CarFactory) -> No
     assert after.speed.sum() == pytest.approx(before.speed.sum(), rel=0.02)
     # Equal masses and a restitution of 0.3² leave 45 % and 55 % of the speed.
     assert after.speed[1] == pytest.approx(0.545 * before.speed[0], rel=0.05)
-    assert after.contacts[0].closing_speed == pytest.approx(before.speed[0], rel=0.02)
+    assert after.contacts[0].impact_speed == pytest.approx(before.speed[0], rel=0.02)
 
 
 def test_a_blow_off_centre_spins_the_car(world: World, car: CarFactory) -> None:
@@ -134,6 +134,6 @@ def test_a_building_stops_a_car(world: World, car: CarFactory) -> None:
         world.step({}, {"Ego": Control()})
         contacts += world.view().contacts
     assert [(contact.first, contact.second) for contact in contacts] == [("Ego", "Town hall")]
-    assert contacts[0].closing_speed == pytest.approx(10.0, rel=0.05)
+    assert contacts[0].impact_speed == pytest.approx(10.0, rel=0.05)
     # The front, 3.6 m ahead of the rear axle, does not get past the wall at 20 m.
     assert world.view().position[0, 0] + 3.6 <= 20.05
