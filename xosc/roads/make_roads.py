@@ -24,6 +24,10 @@ CLOTHOID = math.radians(25.0)
 """Part of a quarter turn that each of the two clothoids takes."""
 CORNER_MARGIN = 2.6
 """Width between a right turn's lane and the kerb in the middle of the turn."""
+HOUSES = ((14.0, 10.0, 9.5), (11.0, 9.0, 6.5), (18.0, 12.0, 13.0))
+"""Length along the street, depth and height of the houses of a row."""
+HOUSE_GAP, SETBACK, CORNER_CLEARANCE = 5.0, 3.0, 14.0
+"""Between houses, from the sidewalk, and from where the street meets the junction."""
 SPEED_LIMIT = "50"
 PROJECTION = "+proj=tmerc +lat_0=49 +lon_0=8 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
 """The places are not tied to the globe; a projection lets V2X messages carry latitude and longitude."""
@@ -322,6 +326,7 @@ def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
     objects = add(road, "objects")
     write_area(objects, "0", "crosswalk", end + back * 0.8, end + back * 3.8, kerbs[0], kerbs[1])
     write_area(objects, "1", "roadMark", end + back * 5.0, end + back * 5.4, sign * inner, sign * arm.street.edge(sign))
+    write_buildings(objects, arm)
     kind = ("1000001", "-1", "yes", 0.86, 0.3, "light") if crossing.lights else ("206", "-1", "no", 0.75, 0.75, "stop")
     signal = add(
         add(road, "signals"),
@@ -343,6 +348,33 @@ def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
         roll=0.0,
     )
     add(signal, "validity", fromLane=min(lanes), toLane=max(lanes))
+
+
+def write_buildings(objects: Element, arm: Arm) -> None:
+    """A row of houses on each side, set back from the sidewalk and well away from the junction's corners."""
+    for side in (-1, 1):
+        kerb = sum(spec.width for spec in arm.street.side(side))
+        from_junction = CORNER_CLEARANCE
+        for number, (length, depth, height) in enumerate(HOUSES if side > 0 else reversed(HOUSES)):
+            middle = from_junction + length / 2
+            add(
+                objects,
+                "object",
+                id=f"{2 if side > 0 else 3}{number}",
+                name=f"house {arm.name} {'left' if side > 0 else 'right'} {number + 1}",
+                type="building",
+                s=arm.length - middle if arm.contact == "end" else middle,
+                t=side * (kerb + SETBACK + depth / 2),
+                zOffset=0.0,
+                orientation="none",
+                length=length,
+                width=depth,
+                height=height,
+                hdg=0.0,
+                pitch=0.0,
+                roll=0.0,
+            )
+            from_junction += length + HOUSE_GAP
 
 
 def write_area(objects: Element, number: str, kind: str, s: float, s_end: float, t: float, t_end: float) -> None:
@@ -390,6 +422,11 @@ def write_way(root: Element, number: str, way: Way) -> None:
     centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
     add(centre, "link")
     add_mark(centre, ("none", "white"))
+    if way.turn == "ahead" and way.start.street.left[0].type == "bidirectional":
+        # The two ways straight on cover half of the middle lane each, which itself ends at the junction.
+        left = etree.Element("left")
+        section.insert(0, left)
+        add_lane(left, 1, LaneSpec("bidirectional", LANE / 2))
     right = add(section, "right")
     for i, (before, after) in enumerate(way.lanes, start=1):
         lane = add_lane(right, -i, replace(DRIVING_INNER, mark=("none", "white")))

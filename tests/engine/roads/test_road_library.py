@@ -67,7 +67,7 @@ def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: st
     arms = {"1", "2", "3", "4"}
     assert reached == {arm: arms - {arm} for arm in arms}
     assert len(network.signals) == 4
-    assert sorted(item.type for item in network.objects) == ["crosswalk"] * 4 + ["roadMark"] * 4
+    assert sorted(item.type for item in network.objects) == ["building"] * 24 + ["crosswalk"] * 4 + ["roadMark"] * 4
 
 
 def test_straight_roads_of_sixty_metres_each_way(library: Path) -> None:
