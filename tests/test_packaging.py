@@ -1,0 +1,26 @@
+"""What the wheel carries."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_wheel_carries_the_whole_library_and_no_scripts() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    included = settings["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    carried = set()
+    for source, target in included.items():
+        place = ROOT / source
+        for path in place.rglob("*") if place.is_dir() else [place]:
+            if path.is_file():
+                inside = Path(target, path.relative_to(place)) if place.is_dir() else Path(target)
+                carried.add(inside.relative_to("eidrive_scenario/library").as_posix())
+    data = {
+        path.relative_to(ROOT / "xosc").as_posix()
+        for path in (ROOT / "xosc").rglob("*")
+        if path.suffix in (".xosc", ".xodr", ".yaml")
+    }
+    assert carried == data
