@@ -44,6 +44,8 @@ class Actor:
         self.lateral = self.longitudinal = any(is_ours(controller) for controller in controllers)
         """Whether its own controller is active in the domain."""
         self.goal: Goal | None = None
+        self.trailer: str | None = None
+        """What it draws."""
         self.traveled = 0.0
         """Distance covered since it entered the world, jumps left out [m]."""
         self.standing_since: float | None = None

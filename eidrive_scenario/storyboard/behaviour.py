@@ -34,6 +34,8 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     """
 
     domains: ClassVar[Domain] = Domain.NONE
+    immediate: ClassVar[bool] = False
+    """True for an action that is done as soon as it starts, so that triggers judged after it see what it set."""
 
     def __init__(
         self,
@@ -54,6 +56,11 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def controls(self) -> Domain:
         """The domains of this action as it is configured."""
         return self.domains
+
+    @property
+    def resource(self) -> str:
+        """What of a domain it controls, where not all of it: the name of a light. Others do not get in its way."""
+        return ""
 
     @property
     def actor(self) -> Actor:

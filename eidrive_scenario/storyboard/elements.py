@@ -253,7 +253,10 @@ class ActionElement(StoryElement):
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
-        if not self.running:
+            if behaviour.immediate:
+                behaviour.tick_once()
+        self.running = [behaviour for behaviour in self.running if behaviour.status is not Status.SUCCESS]
+        if not self.running and not actors:
             self._change(Transition.END, State.COMPLETE)
 
     def displace(self, behaviour: Holder, why: str) -> None:

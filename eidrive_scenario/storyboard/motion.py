@@ -17,6 +17,10 @@ ACROSS = math.cos(math.radians(50.0))
 """An actor that points further away from its lane than 50° crosses the road instead of following the lane."""
 
 
+APART = 0.01
+"""A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
+
+
 class Place(NamedTuple):
     """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
 
@@ -54,17 +58,23 @@ class Motion:
         self._steering: Steering | None = None
         self._next_pose: Pose | None = None
         self._landing = False
-        self._shift = 0.0
+        self._carried: float | None = None
+        self._lift = 0.0
         self._teleport = False
         self.jumped = False
         """True from a teleport until the view that shows it."""
 
     def put(self, place: Place) -> None:
-        """Place it there, at once; its speed stays."""
+        """Place it there, at once; its speed stays. The next view shows it there, so the step that begins is used up."""
         self.pose = place.pose
         self._adopt(place.location)
         self.end_of_road = False
         self._teleport = self.jumped = True
+
+    def settle(self) -> None:
+        """Come to rest at the place before the first view, which shows it there: the next step moves it."""
+        self._teleport = False
+        self.step(0.0)
 
     def steer(self, steering: Steering) -> None:
         """Lateral motion of the step that begins now."""
@@ -78,9 +88,9 @@ class Motion:
         self._next_pose = pose
         self._landing = land
 
-    def shift(self, distance: float) -> None:
-        """Move by a distance along the lane in this step, beside what the speed covers [m]."""
-        self._shift += distance
+    def carry(self, distance: float) -> None:
+        """Move by a distance along the lane in this step, whatever speed and heading say [m]."""
+        self._carried = distance
 
     def relate_to_lane(self, lane: int) -> LaneLocation | None:
         """Express the place on the road by another lane of the same road; the answer has its offset."""
@@ -113,19 +123,24 @@ class Motion:
         """Move for dt seconds by what was asked since the last step; where it then is."""
         steering, self._steering = self._steering, None
         target, self._next_pose = self._next_pose, None
-        distance, self._shift = self.speed * dt + self._shift, 0.0
+        carried, self._carried = self._carried, None
+        distance = self.speed * dt if carried is None else carried
+        if self._teleport:
+            self._teleport = False
+            return self.placement()
         if target is not None:
             self.pose = target
             self.location = None
             if self._landing:
                 self.land()
-        elif self.location is not None and abs(math.cos(self.heading)) >= ACROSS:
+        elif distance == 0.0 and steering is None:
+            pass
+        elif self.location is not None and (carried is not None or abs(math.cos(self.heading)) >= ACROSS):
             self._along_lane(distance, steering)
         else:
             self._freely(distance)
         x, y, z, h, p, r = self.pose
-        teleport, self._teleport = self._teleport, False
-        return Placement(x, y, z, h, p, r, self.speed, teleport)
+        return Placement(x, y, z, h, p, r, self.speed)
 
     def placement(self) -> Placement:
         """Where it is now."""
@@ -146,13 +161,15 @@ class Motion:
             there = self.roads.advance(here, distance * self.direction, route=self.route)
             if there is None:
                 there = self._last_place(here, distance * self.direction * way)
-                self.speed = 0.0
+                if self.end_of_road:
+                    self.speed = 0.0
                 self.end_of_road = True
             here = there
         if steering is not None:
             self.heading = wrap_angle((0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance))
         self.location = here
-        self.pose = self.pose_on(here, self.heading)
+        pose = self.pose_on(here, self.heading)
+        self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
 
     def _turn(self, steering: Steering, left: float, distance: float) -> float:
         if steering.heading is not None:
@@ -166,7 +183,8 @@ class Motion:
         assert self.roads is not None
         pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
-        return pose.turned(turn)
+        pose = pose.turned(turn)
+        return pose._replace(h=wrap_angle(pose.h))
 
     def _last_place(self, here: LaneLocation, along: float) -> LaneLocation:
         assert self.roads is not None
@@ -184,9 +202,15 @@ class Motion:
         self.pose = Pose(x, y, z, h, p, r)
 
     def _adopt(self, location: LaneLocation | None) -> None:
-        self.location = location
-        if location is not None:
-            self.heading = self._heading_at(location, self.pose.h)
+        """Refer to a place on the road from now on, if that is where the actor stands (and not beyond a road's end)."""
+        self.location, self._lift = None, 0.0
+        if location is None or self.roads is None:
+            return
+        ground = self.roads.lane_pose_at(*location[:4])
+        if math.hypot(ground.x - self.pose.x, ground.y - self.pose.y) > APART:
+            return
+        self.location, self._lift = location, self.pose.z - ground.z
+        self.heading = self._heading_at(location, self.pose.h)
 
     def _heading_at(self, location: LaneLocation, yaw: float) -> float:
         assert self.roads is not None

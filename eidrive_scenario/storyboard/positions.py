@@ -94,7 +94,10 @@ def _relative_lane(frame: model.RelativeLanePosition, stage: Stage, actor: str |
     lane = count_lanes(there.lane, frame.d_lane * sign)
     if lane not in roads.lane_ids(there.road, there.s):
         raise _missing(frame, f"names lane {lane} of road {there.road!r}, which it does not have at s = {there.s:.1f}")
-    return _in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
+    place = _in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
+    if frame.orientation is None and ahead < 0:
+        return place._replace(pose=place.pose.turned(math.pi))
+    return place
 
 
 def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place:

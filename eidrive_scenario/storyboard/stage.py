@@ -35,6 +35,10 @@ class Holder(Protocol):
     def name(self) -> str:
         """What it is called."""
 
+    @property
+    def resource(self) -> str:
+        """What of a domain it holds; empty for all of it."""
+
 
 class Stage:
     """What actions and conditions see of the run at one instant.
@@ -153,7 +157,7 @@ class Stage:
         if actor is None or not domains:
             return
         for held, other_domains, other, behaviour in list(self._holders):
-            if held == actor and other_domains & domains:  # type: ignore[operator]
+            if held == actor and other_domains & domains and behaviour.resource == holder.resource:  # type: ignore[operator]
                 self._holders = [entry for entry in self._holders if entry[3] is not behaviour]
                 other.displace(behaviour, f"{holder.name} took over")
         self._holders.append((actor, domains, occupant, holder))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from eidrive_scenario.openscenario import Scenario
@@ -9,8 +11,10 @@ from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.builder import Builder
 from eidrive_scenario.storyboard.commands import Commands
+from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind
 from eidrive_scenario.world.view import WorldView
 
 STOPPED = "stop trigger"
@@ -38,6 +42,8 @@ class Storyboard:
         self.stage = Stage(scenario, roads, dt=dt, seed=seed, nobody=_empty_view())
         builder = Builder(scenario, self.stage, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
+        for name, actor in self.stage.actors.items():
+            actor.trailer = declared_trailer(scenario.entities[name])
         self.ended: str | None = None
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 
@@ -49,6 +55,9 @@ class Storyboard:
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
         self.init.start()
+        self._bring_trailers()
+        for actor in self.stage.actors.values():
+            actor.motion.settle()
         self._refresh(self.stage.commands)
         return self._finished(self.stage.commands)
 
@@ -65,15 +74,28 @@ class Storyboard:
         if self.root.state is State.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
         commands = self.stage.commands
+        self._bring_trailers()
         self._refresh(commands)
+        drawn = {back.name for _, back in pairs(self.stage.actors)}
         for name, actor in self.stage.actors.items():
-            if not actor.present:
+            if not actor.present or name in drawn:
                 continue
             if not actor.driven:
                 commands.placements[name] = actor.motion.step(self.dt)
             elif actor.motion.jumped:
                 commands.placements[name] = actor.motion.placement()
+        for front, back in pairs(self.stage.actors):
+            if front.present and back.present:
+                back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
+                back.motion.jumped, back.motion.speed = front.motion.jumped, front.motion.speed
+                commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.jumped)
         return self._finished(commands)
+
+    def _bring_trailers(self) -> None:
+        """Trailers enter with what draws them, in line."""
+        for front, back in pairs(self.stage.actors):
+            if front.present and not back.present:
+                self.stage.enter(back.name, Place(pose_behind(front, back, straight=True)))
 
     def _refresh(self, commands: Commands) -> None:
         """Who enters has the speed that later actions of the same tick gave it."""

@@ -109,15 +109,18 @@ class Layout:
         return index, min(1.0, max(0.0, (value - grid[index]) / span)) if span > 0.0 else 1.0
 
 
-def lay_out(trajectory: model.Trajectory, resolve: Resolve) -> Layout:
-    """A trajectory in the world. `resolve` gives the pose that a position means now."""
+def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> Layout:
+    """A trajectory in the world. `resolve` gives the pose that a position means now.
+
+    A clothoid spline that does not say where it starts begins at `start`.
+    """
     shape = trajectory.shape.chosen()
     if isinstance(shape, model.Polyline):
         return _polyline(shape, trajectory.closed, resolve)
     if isinstance(shape, model.Clothoid):
         return _clothoid(shape, trajectory.closed, resolve)
     if isinstance(shape, model.ClothoidSpline):
-        return _clothoid_spline(shape, trajectory.closed, resolve)
+        return _clothoid_spline(shape, trajectory.closed, resolve, start)
     assert isinstance(shape, model.Nurbs)
     return _nurbs(shape, trajectory.closed, resolve)
 
@@ -159,11 +162,10 @@ def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
     return Layout(tuple(s), tuple(poses), times, closed)
 
 
-def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve) -> Layout:
+def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve, here: Pose | None) -> Layout:
     s: list[float] = [0.0]
     poses: list[Pose] = []
     clock: list[float] = []
-    here: Pose | None = None
     segments = shape.clothoid_spline_segment
     for index, segment in enumerate(segments):
         if segment.position_start is not None:

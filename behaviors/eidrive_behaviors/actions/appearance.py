@@ -30,6 +30,11 @@ class LightStateAction(ActionBehaviour):
     domains = Domain.LIGHTING
     action: model.LightStateAction
 
+    @property
+    def resource(self) -> str:
+        """Its light."""
+        return self._light(self.action.light_type)
+
     def initialise(self) -> None:
         """Switch it."""
         state, kind = self.action.light_state, self.action.light_type

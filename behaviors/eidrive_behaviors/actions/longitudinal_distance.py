@@ -28,7 +28,6 @@ class LongitudinalDistanceAction(ActionBehaviour):
     def initialise(self) -> None:
         """Begin without acceleration; decide on which side of the other to be."""
         self._acceleration = 0.0
-        self._first = True
         displacement = self.action.displacement
         self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
         if displacement is model.LongitudinalDisplacement.ANY:
@@ -36,7 +35,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     def update(self) -> Status:
         """The speed for the step."""
-        if self.action.entity_ref not in self.stage.view or self.actor.driven:
+        if not self.stage.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()
         if math.isnan(error):
@@ -50,24 +49,17 @@ class LongitudinalDistanceAction(ActionBehaviour):
         slower = _or_infinite(limits.max_deceleration if limits is not None else None)
         other = self.stage.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
-            motion.shift(error)
+            motion.carry(error + other * self.stage.dt)
             motion.speed = other
             return
         assert limits is not None
         wanted = self._spring(error, motion.speed - other, faster if error < 0.0 else slower)
         wanted = min(max(wanted, -slower), faster)
-        dt = 0.0 if self._first else self.stage.dt
-        self._first = False
+        dt = self.stage.dt
         if wanted < min(self._acceleration, 0.0):
-            wanted = max(
-                wanted,
-                self._acceleration - _or_infinite(limits.max_deceleration_rate) * dt if dt else self._acceleration,
-            )
+            wanted = max(wanted, self._acceleration - _change(limits.max_deceleration_rate, dt))
         elif wanted > max(self._acceleration, 0.0):
-            wanted = min(
-                wanted,
-                self._acceleration + _or_infinite(limits.max_acceleration_rate) * dt if dt else self._acceleration,
-            )
+            wanted = min(wanted, self._acceleration + _change(limits.max_acceleration_rate, dt))
         self._acceleration = wanted
         top = _or_infinite(limits.max_speed)
         motion.speed = min(max(motion.speed + wanted * dt, -top), top)
@@ -99,6 +91,11 @@ class LongitudinalDistanceAction(ActionBehaviour):
         )
         held = "keep" if self.action.continuous else "reach"
         return f"{held} {gap} to {self.action.entity_ref}"
+
+
+def _change(rate: float | None, dt: float) -> float:
+    """By how much an acceleration may change in a step [m/s²]."""
+    return math.inf if rate is None else rate * dt
 
 
 def _or_infinite(value: float | None) -> float:

@@ -10,6 +10,7 @@ from eidrive_scenario.api import ActionBehaviour, model
 class TrafficSignalStateAction(ActionBehaviour):
     """Sets the state of one signal; the text means what the signal's type makes of it."""
 
+    immediate = True
     action: model.TrafficSignalStateAction
 
     def update(self) -> Status:

@@ -43,7 +43,7 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Lay the trajectory out; positions relative to entities mean where those are now."""
-        self._layout: Layout = lay_out(self._trajectory, lambda position: self._resolved(position))
+        self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)
         if self._timing is not None and self._layout.times is None:
             raise self.problem("has a Timing, but the trajectory has no times", "give each vertex a time, or say None")
         self._s = self.action.initial_distance_offset or 0.0

@@ -10,6 +10,7 @@ from eidrive_scenario.api import ActionBehaviour, model
 class ParameterSetAction(ActionBehaviour):
     """Sets a parameter for the conditions that come; what the file took from it when it was read stays."""
 
+    immediate = True
     action: model.ParameterSetAction
     parent_element: model.ParameterAction
 
@@ -26,6 +27,7 @@ class ParameterSetAction(ActionBehaviour):
 class ParameterModifyAction(ActionBehaviour):
     """Adds to a parameter, or multiplies it."""
 
+    immediate = True
     action: model.ParameterModifyAction
     parent_element: model.ParameterAction
 
@@ -43,6 +45,7 @@ class ParameterModifyAction(ActionBehaviour):
 class VariableSetAction(ActionBehaviour):
     """Sets a variable."""
 
+    immediate = True
     action: model.VariableSetAction
     parent_element: model.VariableAction
 
@@ -59,6 +62,7 @@ class VariableSetAction(ActionBehaviour):
 class VariableModifyAction(ActionBehaviour):
     """Adds to a variable, or multiplies it."""
 
+    immediate = True
     action: model.VariableModifyAction
     parent_element: model.VariableAction
 

@@ -27,20 +27,21 @@ def measured(
     | model.RelativeDistanceCondition
     | model.TimeHeadwayCondition
     | model.TimeToCollisionCondition,
-    *,
-    kind: str | None = None,
 ) -> float:
-    """The distance as an element of the standard asks for it [m], signed; NaN where there is none."""
-    frame = frame_of(element.coordinate_system)
+    """The distance as an element of the standard asks for it [m], signed; NaN where there is none.
+
+    The `alongRoute` of 1.0 asks for the distance along the road; without it and without a word a distance is straight.
+    """
+    frame, kind = frame_of(element.coordinate_system), kind_of(element.relative_distance_type)
     if getattr(element, "along_route", None):
-        frame = "road"
+        frame, kind = "road", "longitudinal"
     try:
         return distance(
             stage,
             entity,
             target,
             frame=frame,
-            kind=kind or kind_of(element.relative_distance_type),
+            kind=kind,
             freespace=element.freespace,
         )
     except Absent:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from eidrive_behaviors.conditions.motion import lasted, since
-from eidrive_scenario.api import EntityCondition, Stage, model
+from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, model
 
 
 class EndOfRoadCondition(EntityCondition):
-    """Has been at the end of its road for longer than a duration [s]."""
+    """Has been at the end of its road for a duration [s]."""
 
     element: model.EndOfRoadCondition
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare how long."""
-        return lasted(stage, stage.actors[entity].end_of_road_since, self.element.duration)
+        start = stage.actors[entity].end_of_road_since
+        return start is not None and stage.time - start >= self.element.duration - 1e-6
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long."""
@@ -27,7 +28,7 @@ class EndOfRoadCondition(EntityCondition):
 
 
 class OffroadCondition(EntityCondition):
-    """Has been off the road with its reference point for longer than a duration [s]."""
+    """Has been off the road with its reference point for longer than a duration [s]. Lanes of type `none` are no road."""
 
     element: model.OffroadCondition
 
@@ -35,7 +36,7 @@ class OffroadCondition(EntityCondition):
         """Compare how long. The state is looked at here, so that runs without this condition need not pay for it."""
         actor = stage.actors[entity]
         here = stage.location(entity)
-        if here is not None and stage.roads is not None and stage.roads.on_road(here):
+        if here is not None and self._on_road(stage, here):
             actor.off_road_since = None
         elif actor.off_road_since is None:
             actor.off_road_since = stage.time
@@ -44,6 +45,13 @@ class OffroadCondition(EntityCondition):
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long."""
         return f"{entity}: {since(stage, stage.actors[entity].off_road_since, 'off the road', 'on the road')}"
+
+    @staticmethod
+    def _on_road(stage: Stage, here: LaneLocation) -> bool:
+        roads = stage.roads
+        if roads is None or roads.lane_type(here.road, here.lane, here.s) == "none":
+            return False
+        return roads.on_road(here)
 
     def describe_for(self) -> str:
         """The duration."""

@@ -11,10 +11,7 @@ STANDING = 1e-6
 
 
 class TimeHeadwayCondition(EntityCondition):
-    """Distance to another entity over the own speed [s]; a standing entity has none.
-
-    Longitudinal where the file does not say which distance (before 1.1 there was no choice).
-    """
+    """Distance to another entity over the own speed [s]; that of a standing entity is without end."""
 
     element: model.TimeHeadwayCondition
 
@@ -33,11 +30,8 @@ class TimeHeadwayCondition(EntityCondition):
         return f"time headway to {self.element.entity_ref} {in_words(self.element.rule)} {self.element.value:g} s"
 
     def _headway(self, stage: Stage, entity: str) -> float:
-        speed = abs(stage.speed(entity))
-        if speed < STANDING:
-            return math.nan
-        kind = "longitudinal" if self.element.relative_distance_type is None else None
-        return abs(measured(stage, entity, self.element.entity_ref, self.element, kind=kind)) / speed
+        speed, gap = abs(stage.speed(entity)), abs(measured(stage, entity, self.element.entity_ref, self.element))
+        return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
 
 
 class TimeToCollisionCondition(EntityCondition):
@@ -64,7 +58,7 @@ class TimeToCollisionCondition(EntityCondition):
 
     def _time(self, stage: Stage, entity: str) -> float:
         target = self.element.time_to_collision_condition_target
-        kind = kind_of(self.element.relative_distance_type)
+        kind = "longitudinal" if self.element.along_route else kind_of(self.element.relative_distance_type)
         row = stage.view.row(entity)
         vx, vy = stage.view.velocity[row, :2].tolist()
         if target.entity_ref is not None:
