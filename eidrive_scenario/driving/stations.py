@@ -180,13 +180,16 @@ def _all_settings(
 
 
 def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Problem]:
-    controller = controllers[name]
+    properties = controllers[name].properties
+    entries = properties.property if properties is not None else ()
+    line = next((entry.line for entry in entries if entry.name == "cooperates_with"), controllers[name].line)
+    others = [other for other in controllers if other != name]
     return [
         Problem(
             f"{name!r} cooperates with {sender!r}, which is no station",
-            suggestion(sender, [other for other in controllers if other != name]),
-            controller.source,
-            controller.line,
+            suggestion(sender, others),
+            controllers[name].source,
+            line,
         )
         for sender in settings.cooperates_with or ()
         if sender not in controllers

@@ -1,0 +1,189 @@
+"""Whole runs: the paper's scenarios, determinism, commands, ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed, run_file
+
+ONE = "coop/scenario_1"
+
+
+class Frames:
+    """Keeps all frames of a run."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.closed = 0
+
+    def observe(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def play(name: str = ONE, seed: int = 1, *observers: Frames, channel: str | None = None, **more: object) -> RunResult:
+    settings = RunSettings(channel=channel, **more)  # type: ignore[arg-type]
+    return run_file(resolve_scenario(name), seed=seed, settings=settings, observers=observers)
+
+
+def edited(old: str, new: str, tmp_path: Path) -> Path:
+    """Scenario 1 with one place of its text changed, its references still leading to the library."""
+    source = resolve_scenario(ONE)
+    text = source.read_text()
+    assert old in text
+    path = tmp_path / "edited.xosc"
+    path.write_text(text.replace(old, new).replace('"../', f'"{source.parent.parent}/'))
+    return path
+
+
+@pytest.mark.parametrize("name", ["coop/scenario_1", "coop/scenario_2"])
+def test_the_hidden_car_is_hit_without_cooperation_and_missed_with_it(name: str) -> None:
+    alone, helped = play(name, channel="none"), play(name, channel="ideal")
+    assert (alone.passed, alone.exit_code) == (False, 1)
+    collision = next(verdict for verdict in alone.criteria if verdict.name == "collision")
+    assert "Ego and Incoming hit each other at" in collision.reason
+    assert (helped.passed, helped.exit_code, helped.end) == (True, 0, "stop trigger")
+    centre = "min_distance.Ego.Incoming.centre"
+    assert helped.metrics[centre] > alone.metrics[centre]
+    assert alone.metrics["min_distance.Ego.Incoming.box"] == 0.0
+
+
+def test_the_ego_hears_of_the_car_before_it_can_see_it() -> None:
+    watch = Frames()
+    play(ONE, 1, watch, channel="ideal")
+
+    def first(kind: str) -> float:
+        for frame in watch.frames:
+            step = frame.steps["Ego"]
+            truth = frame.view.boxes[frame.view.rows["Incoming"], :2]
+            boxes = getattr(step, kind).boxes[:, :2]
+            if len(boxes) and min(abs(boxes - truth).sum(axis=1)) < 3.0:
+                return frame.view.time
+        raise AssertionError(f"never in {kind}")
+
+    assert first("fused") < 0.2
+    assert first("detections") > 3.0
+
+
+def test_one_seed_gives_one_trace_in_any_order_and_in_another_process() -> None:
+    first, other, again = play(seed=3).trace_hash, play(seed=4).trace_hash, play(seed=3).trace_hash
+    assert first == again
+    assert first != other
+    code = (
+        "from eidrive_scenario.simulation import run_file; from eidrive_scenario.library import resolve_scenario;"
+        f"import sys; sys.stdout.write(run_file(resolve_scenario('{ONE}'), seed=3).trace_hash)"
+    )
+    elsewhere = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert elsewhere.stdout == first
+
+
+def test_a_channel_that_loses_all_is_no_cooperation_and_one_that_loses_nothing_is_ideal(tmp_path: Path) -> None:
+    def trace(channel: str) -> list[tuple[float, ...]]:
+        watch = Frames()
+        play(ONE, 2, watch, channel=channel)
+        return [tuple(frame.view.position[frame.view.rows["Ego"]].tolist()) for frame in watch.frames]
+
+    deaf = tmp_path / "deaf.yaml"
+    deaf.write_text("model: composed\nloss: {kind: bernoulli, probability: 1.0}\n")
+    clear = tmp_path / "clear.yaml"
+    clear.write_text("loss: {kind: bernoulli, probability: 0.0}\ndelay: {kind: constant, seconds: 0}\n")
+    assert trace(str(deaf)) == trace("none")
+    assert trace(str(clear)) == trace("ideal")
+
+
+def test_cooperation_can_be_taken_away_by_option() -> None:
+    assert play(channel="ideal", cooperate=()).passed is False
+    assert play(channel="ideal", cooperate=("RSU",)).passed is True
+
+
+def test_the_roadside_unit_enters_during_the_run() -> None:
+    watch = Frames()
+    result = play("coop/scenario_1_late_rsu", 1, watch)
+    assert "RSU" not in watch.frames[0].view
+    assert "RSU" in watch.frames[-1].view
+    assert result.passed
+
+
+def test_a_jammer_on_a_trigger_silences_the_unit(tmp_path: Path) -> None:
+    jammer = """<Action name="Jam"><UserDefinedAction><CustomCommandAction type="eidrive.channel">
+        {loss: {kind: bernoulli, probability: 1.0}}</CustomCommandAction></UserDefinedAction></Action>
+        <Action name="EgoSpeedsUp">"""
+    path = edited('<Action name="EgoSpeedsUp">', jammer, tmp_path)
+    result = run_file(path, seed=1)
+    assert result.passed is False
+    # The message of the first tick was on the air before the event took place.
+    assert result.metrics["messages.received"] == 1
+    assert result.metrics["messages.lost"] == result.metrics["messages.sent"] - 1 > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('type="eidrive.channel">ideal<', 'type="eidrive.channel">idael<', "did you mean 'ideal'"),
+        ('type="eidrive.channel">', 'type="eidrive.chanel">', "did you mean 'eidrive.channel'"),
+        ("min_distance: {of: Ego", "min_distance: {of: Egoo", "did you mean 'Ego'"),
+        ("min_distance: {of: Ego", "min_distanse: {of: Ego", "did you mean 'min_distance'"),
+        ('name="planner" value="conflict_area"', 'name="planer" value="conflict_area"', "did you mean 'planner'"),
+        ('name="detector" value="oracle"', 'name="detector" value="orakle"', "did you mean 'oracle'"),
+        ("[RSU]", "[RUS]", "'RUS', which is no station"),
+        ("{EgoOffset: {uniform", "{EgoOfset: {uniform", "did you mean 'EgoOffset'"),
+        ("{uniform: [-0.15, 0.15]}", "{uniform: [0.15, -0.15]}", "lower bound"),
+        ("{uniform: [-0.15, 0.15]}", "{unifrom: [-0.15, 0.15]}", "did you mean 'uniform'"),
+    ],
+)
+def test_a_wrong_setting_is_told_by_file_and_line_before_the_run(
+    old: str, new: str, expected: str, tmp_path: Path
+) -> None:
+    path = edited(old, new, tmp_path)
+    with pytest.raises(InputError) as caught:
+        Simulation(load_for_seed(path, 1, {}))
+    problem = caught.value.problems[0]
+    assert expected in str(problem)
+    assert problem.source == str(path)
+    line = path.read_text().splitlines()[(problem.line or 0) - 1]
+    assert new.strip('"')[:8] in line or "eidrive" in line
+
+
+def test_an_unknown_detector_and_sender_are_told_with_their_option() -> None:
+    with pytest.raises(InputError, match="--detector: unknown detector 'yolo'"):
+        play(detector="yolo")
+    with pytest.raises(InputError, match="--cooperate: no station 'RSU2'; did you mean 'RSU'"):
+        play(cooperate=("RSU2",))
+    with pytest.raises(InputError, match="--channel: no channel profile 'latency'"):
+        play(channel="latency")
+
+
+def test_a_run_that_does_not_end_by_itself_runs_out_of_its_time_limit() -> None:
+    result = play(channel="ideal", time_limit=2.0)
+    assert (result.end, result.exit_code, result.passed) == ("time limit", 3, False)
+    assert result.simulated_s == pytest.approx(2.0)
+
+
+def test_draws_differ_by_seed_and_given_parameters_win() -> None:
+    path = resolve_scenario(ONE)
+    one, two = load_for_seed(path, 1, {}), load_for_seed(path, 2, {})
+    assert one.parameters["EgoOffset"] != two.parameters["EgoOffset"]
+    assert abs(float(one.parameters["EgoOffset"])) <= 0.15
+    assert load_for_seed(path, 1, {"EgoOffset": "0.5"}).parameters["EgoOffset"] == "0.5"
+    assert load_scenario(path).parameters["EgoOffset"] == "0"
+
+
+def test_observers_are_closed_once_even_when_the_run_breaks() -> None:
+    class Breaks(Frames):
+        def observe(self, frame: Frame) -> None:
+            raise RuntimeError("full disk")
+
+    watch = Breaks()
+    with pytest.raises(RuntimeError, match="full disk"):
+        play(ONE, 1, watch)
+    assert watch.closed == 1
