@@ -20,7 +20,9 @@ def test_the_first_touch_is_the_verdict(frame: Any, car: Any) -> None:
     (verdict,) = judge(frames, [collision])
     assert not verdict.passed
     assert (verdict.value, verdict.limit, verdict.first_violation) == (2.0, 0.0, 6.35)
-    assert verdict.reason == "Ego and Incoming hit each other at 6.35 s at (29.8, 7.1) m at a relative speed of 11.2 m/s"
+    assert verdict.reason == (
+        "Ego and Incoming hit each other at 6.35 s at (29.8, 7.1) m at a relative speed of 11.2 m/s"
+    )
     assert collision.metrics() == {"collision.count": 2.0, "collision.time": 6.35, "collision.impact_speed": 11.24}
 
 
