@@ -3,6 +3,7 @@
 EidriveError
 ├── InputError           what a person typed is wrong: one or many Problems, each with file, line and remedy
 │   ├── ScenarioError    an OpenSCENARIO file
+│   │   └── ConstraintError  a parameter's value is one that the file itself rules out
 │   ├── RoadError        an OpenDRIVE file
 │   └── SettingError     an option, a controller's property, a channel profile
 ├── RegistryError        two extensions claim one name, or one does not load
@@ -24,6 +25,8 @@ class Problem:
     remedy: str = ""
     source: str = ""
     line: int | None = None
+    rule: str = ""
+    """Which rule of `eidrive check` found it, where one did; docs/checks.md says more about it."""
 
     def __str__(self) -> str:
         place = f"{self.source}:{self.line}" if self.line is not None else self.source
@@ -50,6 +53,13 @@ class ScenarioError(InputError):
     """An OpenSCENARIO file is wrong."""
 
 
+class ConstraintError(ScenarioError):
+    """Parameters have values that their constraints rule out, and nothing else is wrong.
+
+    The standard has such a scenario not evaluated: one run of many is left out, not failed.
+    """
+
+
 class RoadError(InputError):
     """An OpenDRIVE file is wrong."""
 
@@ -64,6 +74,30 @@ class RegistryError(EidriveError):
 
 class SimulationError(EidriveError):
     """The run itself broke."""
+
+
+class Together:
+    """Runs several checks to tell all that they find at once.
+
+    Within `with together:` an InputError ends the block and is kept; `settle` raises one with all problems, if any.
+    """
+
+    def __init__(self) -> None:
+        self._problems: list[Problem] = []
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
+        if not isinstance(error, InputError):
+            return False
+        self._problems += error.problems
+        return True
+
+    def settle(self) -> None:
+        """Raise InputError with every problem found, each once."""
+        if self._problems:
+            raise InputError(list(dict.fromkeys(self._problems)))
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

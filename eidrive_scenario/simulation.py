@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, Self
 
-from lxml import etree
-
+from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.errors import Together
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario, load_scenario
+from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.openscenario.parsing import Source
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.recording.criteria_text import (
     exit_verdict,
@@ -41,6 +42,7 @@ class RunSettings:
     channel         profile name or file; 'none' is no cooperation
     detector        for all stations
     cooperate       the senders whom driven stations hear; () is nobody
+    parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
     dt              step [s]
     time_limit      [s] of simulated time, for files that do not end by themselves
     """
@@ -48,7 +50,7 @@ class RunSettings:
     channel: str | Path | None = None
     detector: str | None = None
     cooperate: tuple[str, ...] | None = None
-    parameters: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str | Assignment] = field(default_factory=dict)
     dt: float = 0.05
     time_limit: float = 120.0
     weather: str | None = None
@@ -71,11 +73,17 @@ class RunResult:
     simulated_s: float
     wall_s: float
     warnings: tuple[str, ...] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Of the scenario as a whole, with the values that counted."""
+    run: int | None = None
+    """Its number among the runs of a parameter value distribution, from 0 on."""
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         return {
             "scenario": self.scenario,
+            **({} if self.run is None else {"run": self.run}),
+            "parameters": dict(self.parameters),
             "seed": self.seed,
             "channel": self.channel,
             "passed": self.passed,
@@ -126,24 +134,34 @@ class Simulation:
         self.seed = seed
         self.settings = settings or RunSettings()
         self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+        together = Together()
+        with together:
+            check_commands(scenario)
+        with together:
+            self.storyboard = Storyboard(scenario, self.roads, dt=self.settings.dt, seed=seed)
+        with together:
+            self.stations = Stations(
+                scenario,
+                self.roads,
+                seed=seed,
+                dt=self.settings.dt,
+                channel=self.settings.channel,
+                detector=self.settings.detector,
+                cooperate=self.settings.cooperate,
+            )
+        with together:
+            self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
+        together.settle()
         self.world = World(self.roads, dt=self.settings.dt)
-        self.storyboard = Storyboard(scenario, self.roads, dt=self.settings.dt, seed=seed)
-        self.stations = Stations(
-            scenario,
-            self.roads,
-            seed=seed,
-            dt=self.settings.dt,
-            channel=self.settings.channel,
-            detector=self.settings.detector,
-            cooperate=self.settings.cooperate,
-        )
-        self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
         self._observers = tuple(observers)
         self._trace = TraceHash()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario))]
         self._exit: Verdict | None = None
-        self._initial = self.storyboard.initial()
-        self._apply(self._initial)
+        try:
+            self._apply(self.storyboard.initial())
+        except BaseException:
+            self.world.close()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -213,25 +231,14 @@ class Simulation:
     def _command(self, command: CustomCommand) -> None:
         """A CustomCommandAction; one that is not ours is recorded and does nothing: it never starts a program."""
         run = {
-            "eidrive.channel": self._command_channel,
-            "eidrive.criterion": self._command_criterion,
-            "eidrive.variation": _already_done,
+            CHANNEL: self._command_channel,
+            CRITERION: self._command_criterion,
             "exitSuccess": self._command_exit,
             "exitFailure": self._command_exit,
         }.get(command.type)
         if run is not None:
             run(command)
-        elif command.type.startswith("eidrive."):
-            known = ["eidrive.channel", "eidrive.criterion", "eidrive.variation"]
-            raise ScenarioError(
-                Problem(
-                    f"unknown command type {command.type!r}",
-                    suggestion(command.type, known),
-                    command.source,
-                    command.line,
-                )
-            )
-        else:
+        elif not command.type.startswith(PREFIX):
             self._warnings.append(
                 f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
             )
@@ -276,15 +283,12 @@ class Simulation:
             simulated_s=frame.view.time,
             wall_s=wall_s,
             warnings=tuple(self._warnings),
+            parameters=dict(self.scenario.parameters),
         )
 
 
-def _already_done(_: CustomCommand) -> None:
-    """`eidrive.variation` is read before the scenario's parameters are resolved."""
-
-
 def run_file(
-    source: str | Path | bytes | etree._Element,
+    source: Source,
     *,
     seed: int = 0,
     settings: RunSettings | None = None,
@@ -299,7 +303,7 @@ def run_file(
     return Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
 
 
-def load_for_seed(source: str | Path | bytes | etree._Element, seed: int, parameters: Mapping[str, str]) -> Scenario:
+def load_for_seed(source: Source, seed: int, parameters: Mapping[str, str | Assignment]) -> Scenario:
     """The scenario as this seed has it: parameters of `eidrive.variation` drawn, those of the caller kept."""
     scenario = load_scenario(source, parameters)
     drawn = {name: value for name, value in drawn_parameters(scenario, seed).items() if name not in parameters}

@@ -1,6 +1,15 @@
-"""OpenSCENARIO XML 1.0 to 1.3: files into a frozen, checked Scenario."""
+"""OpenSCENARIO XML 1.0 to 1.3: files into a frozen, checked Scenario; distributions of parameter values into runs."""
 
+from eidrive_scenario.openscenario.distributions import ConcreteRun, Unfolding, load_distribution
 from eidrive_scenario.openscenario.document import read_document
 from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
 
-__all__ = ["EntityObject", "Scenario", "load_scenario", "read_document"]
+__all__ = [
+    "ConcreteRun",
+    "EntityObject",
+    "Scenario",
+    "Unfolding",
+    "load_distribution",
+    "load_scenario",
+    "read_document",
+]

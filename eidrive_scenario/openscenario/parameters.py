@@ -163,7 +163,7 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
         allowed = " or ".join(
             " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
         )
-        findings.error(
+        findings.rule_out(
             f"the parameter {name!r} is {text!r}, outside its constraints",
             f"it has to be {allowed}",
             source=place.source,

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias, cast
+from typing import Any, Protocol, TypeAlias, cast
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, ScenarioError
 
-Source: TypeAlias = "Path | str | bytes | etree._Element"
+
+class WrittenInPython(Protocol):
+    """What scenariogeneration calls a Scenario, and whatever else gives its XML on demand."""
+
+    def get_element(self) -> Any:
+        """The root element."""
+
+
+Source: TypeAlias = (
+    "Path | str | bytes | etree._Element | etree._ElementTree | ElementTree.Element | ElementTree.ElementTree | "
+    "WrittenInPython"
+)
 
 MAX_BYTES = 64 * 2**20
 """Size of a file."""
@@ -40,11 +53,10 @@ class _PrologEnds(Exception):
 
 def open_document(source: Source) -> Document:
     """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
-    if isinstance(source, etree._Element):
-        base = Path(source.base) if source.base else None
-        return Document(source, str(base or "<element>"), base, base.parent if base else Path())
     if isinstance(source, bytes):
         return Document(parse(source, "<bytes>"), "<bytes>", None, Path())
+    if not isinstance(source, str | Path):
+        return _from_tree(source)
     path = Path(source)
     try:
         if path.stat().st_size > MAX_BYTES:
@@ -54,6 +66,39 @@ def open_document(source: Source) -> Document:
         reason = getattr(error, "strerror", None) or str(error)
         raise ScenarioError(Problem(f"cannot be read: {reason}", "check the path", str(source))) from error
     return Document(parse(content, str(source)), str(source), path, path.parent)
+
+
+def _from_tree(source: Any) -> Document:
+    """The tree as it is where lxml made it, as then it knows its lines."""
+    name = f"<{type(source).__name__}>"
+    root = source
+    if hasattr(root, "get_element"):
+        root = root.get_element()
+    if hasattr(root, "getroot"):
+        root = root.getroot()
+    if isinstance(root, etree._Element):
+        base = Path(root.base) if root.base else None
+        return Document(root, str(base or "<element>"), base, base.parent if base else Path())
+    if not isinstance(root, ElementTree.Element):
+        what = f"a {type(source).__name__} is neither a path nor XML"
+        remedy = "give a path, bytes, an XML tree, or an object with get_element()"
+        raise ScenarioError(Problem(what, remedy, name))
+    return Document(parse(_as_written(root, name), name), name, None, Path())
+
+
+def _as_written(root: ElementTree.Element, name: str) -> bytes:
+    """The text of a tree that knows no lines.
+
+    It has one element a line after the XML declaration, as write_xml of scenariogeneration sets it: the line of a
+    message is the line that the element would have in such a file.
+    """
+    indented = copy.deepcopy(root)
+    try:
+        ElementTree.indent(indented)
+        text: bytes = ElementTree.tostring(indented, "utf-8", xml_declaration=True)
+    except (TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise ScenarioError(Problem(f"cannot be written as XML: {error}", "give texts only", name)) from error
+    return text
 
 
 def parse(content: bytes, name: str) -> etree._Element:

@@ -70,14 +70,23 @@ class Scenario:
         return self.entries[reference]
 
 
-def load_scenario(source: Source, parameters: Mapping[str, str] | None = None) -> Scenario:
-    """Reads a scenario from a file, from its bytes or from a parsed tree, with other values for its parameters.
+def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
+    """Reads a scenario, with other values for its parameters.
 
-    Raises ScenarioError with everything that is wrong with the file and its catalogs, each as file:line.
+    source        a file's path; the bytes of a file; an XML tree of lxml or of Python's ElementTree; or an object whose
+                  `get_element()` gives such a tree, as a Scenario of scenariogeneration. Relative paths in a scenario
+                  without a file count from the current folder
+    parameters    values by name; an Assignment also knows the file and line that gave the value
+
+    Raises ScenarioError with everything that is wrong with the file and its catalogs, each as file:line; it is a
+    ConstraintError where all of it is that parameters have values outside their constraints.
     """
     document = open_document(source)
     findings = Findings()
-    assignments = {name: Assignment(str(value)) for name, value in (parameters or {}).items()}
+    assignments = {
+        name: value if isinstance(value, Assignment) else Assignment(str(value))
+        for name, value in (parameters or {}).items()
+    }
     read = read_root(document, findings, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
         findings.settle()

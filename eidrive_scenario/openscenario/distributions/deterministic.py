@@ -1,0 +1,225 @@
+"""Deterministic distributions: each is a list of choices, and the runs are all combinations of their choices.
+
+A list is never written out: a range of a million steps costs no more than one of two.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import Protocol
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import (
+    Deterministic,
+    DeterministicMultiParameterDistribution,
+    DeterministicSingleParameterDistribution,
+    DistributionRange,
+    Element,
+    Range,
+)
+from eidrive_scenario.openscenario.parameters import Assignment, written
+
+Assignments = Mapping[str, Assignment]
+
+
+class Choices(Protocol):
+    """One distribution of a file: what it may assign."""
+
+    @property
+    def count(self) -> int:
+        """How many choices there are."""
+
+    @property
+    def names(self) -> Mapping[str, Problem]:
+        """The parameters, and where the file gives them a value first."""
+
+    def at(self, index: int) -> Assignments:
+        """The choice of that index, 0 to count - 1."""
+
+
+@dataclass(frozen=True)
+class Combinations:
+    """All combinations of choices, the last one changing from one to the next."""
+
+    choices: tuple[Choices, ...]
+
+    @property
+    def count(self) -> int:
+        """How many there are; one, without any assignment, if there is no choice at all."""
+        return math.prod(one.count for one in self.choices)
+
+    @property
+    def names(self) -> Mapping[str, Problem]:
+        """The parameters, and where the file gives them a value first."""
+        return {name: origin for one in reversed(self.choices) for name, origin in one.names.items()}
+
+    def at(self, index: int) -> Assignments:
+        """The combination of that index."""
+        parts: list[Assignments] = []
+        for one in reversed(self.choices):
+            index, own = divmod(index, one.count)
+            parts.append(one.at(own))
+        return {name: assignment for part in reversed(parts) for name, assignment in part.items()}
+
+
+@dataclass(frozen=True)
+class Listed:
+    """Choices that the file spells out."""
+
+    choices: tuple[Assignments, ...]
+
+    @property
+    def names(self) -> Mapping[str, Problem]:
+        """The parameters, and where the file gives them a value first."""
+        return {name: given.origin or _NOWHERE for choice in reversed(self.choices) for name, given in choice.items()}
+
+    @property
+    def count(self) -> int:
+        """How many choices there are."""
+        return len(self.choices)
+
+    def at(self, index: int) -> Assignments:
+        """The choice of that index."""
+        return self.choices[index]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Values `lower`, `lower + step`, … of one parameter.
+
+    The numbers are taken as the decimals that they are written as: three steps of 0.1 from 0 on make 0.3, and the
+    upper limit of a range is met where it is meant to be.
+    """
+
+    name: str
+    lower: Fraction
+    step: Fraction
+    count: int
+    origin: Problem
+
+    @property
+    def names(self) -> Mapping[str, Problem]:
+        """The parameter, and where its range stands."""
+        return {self.name: self.origin}
+
+    def at(self, index: int) -> Assignments:
+        """The choice of that index."""
+        return {self.name: Assignment(written(float(self.lower + index * self.step)), self.origin)}
+
+
+_NOWHERE = Problem("")
+
+
+def combinations_of(deterministic: Deterministic, findings: Findings) -> Combinations:
+    """The distributions in the order of the file; what is wrong with them becomes a finding."""
+    both: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
+        *deterministic.deterministic_multi_parameter_distribution,
+        *deterministic.deterministic_single_parameter_distribution,
+    ]
+    found: list[Choices] = []
+    for distribution in sorted(both, key=lambda one: one.line):
+        if isinstance(distribution, DeterministicMultiParameterDistribution):
+            found.append(_value_sets(distribution, findings))
+        else:
+            choices = _single(distribution, findings)
+            if choices is not None:
+                found.append(choices)
+    varied_once(((name, origin) for one in found for name, origin in one.names.items()), findings)
+    combinations = Combinations(tuple(found))
+    if combinations.count > sys.maxsize:
+        message = f"the distribution unfolds into {Decimal(combinations.count):.1e} runs"
+        remedy = "take wider steps in its ranges"
+        findings.error(message, remedy, source=deterministic.source, line=deterministic.line)
+    return combinations
+
+
+def varied_once(names: Iterable[tuple[str, Problem]], findings: Findings) -> None:
+    """Reports every parameter that more than one distribution gives a value."""
+    seen: dict[str, Problem] = {}
+    for name, origin in names:
+        if name in seen:
+            message = f"the parameter {name!r} is varied by another distribution too"
+            findings.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
+        seen.setdefault(name, origin)
+
+
+def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: Findings) -> Listed:
+    choices = []
+    for value_set in distribution.value_set_distribution.parameter_value_set:
+        choice: dict[str, Assignment] = {}
+        for one in value_set.parameter_assignment:
+            if one.parameter_ref in choice:
+                findings.error(
+                    f"the set assigns {one.parameter_ref!r} twice", "remove one", source=one.source, line=one.line
+                )
+            choice[one.parameter_ref] = Assignment(one.value, place(one))
+        choices.append(choice)
+    return Listed(tuple(choices))
+
+
+def _single(distribution: DeterministicSingleParameterDistribution, findings: Findings) -> Choices | None:
+    name = distribution.parameter_name
+    if distribution.distribution_set is not None:
+        elements = distribution.distribution_set.element
+        return Listed(tuple({name: Assignment(one.value, place(one))} for one in elements))
+    if distribution.distribution_range is not None:
+        return _steps(name, distribution.distribution_range, findings)
+    refuse_user_defined(distribution, name, "DistributionSet or DistributionRange", findings)
+    return None
+
+
+def _steps(name: str, given: DistributionRange, findings: Findings) -> Steps | None:
+    """From the lower limit on, a step at a time, as long as the value is not above the upper limit."""
+    if not sound_range(given.range, findings, finite=True):
+        return None
+    if not (math.isfinite(given.step_width) and given.step_width > 0):
+        findings.error(
+            f"stepWidth is {written(given.step_width)}",
+            "give a number above zero",
+            source=given.source,
+            line=given.line,
+        )
+        return None
+    lower, upper, step = (
+        _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
+    )
+    return Steps(name, lower, step, (upper - lower) // step + 1, place(given))
+
+
+def _exact(value: float) -> Fraction:
+    return Fraction(repr(value))
+
+
+def sound_range(given: Range, findings: Findings, *, finite: bool = False) -> bool:
+    """Whether the limits are numbers in order; if they are not, that is a finding."""
+    lower, upper = given.lower_limit, given.upper_limit
+    if math.isnan(lower) or math.isnan(upper) or lower > upper:
+        message = f"the range from {written(lower)} to {written(upper)} is empty"
+        findings.error(message, "lowerLimit has to be at most upperLimit", source=given.source, line=given.line)
+        return False
+    if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
+        message = f"the range from {written(lower)} to {written(upper)} has no end"
+        findings.error(message, "give finite limits", source=given.source, line=given.line)
+        return False
+    return True
+
+
+def refuse_user_defined(element: Element, name: str, instead: str, findings: Findings) -> None:
+    """What only another tool understands cannot be unfolded."""
+    findings.error(
+        f"the values of {name!r} come from a UserDefinedDistribution, whose meaning is left to a tool",
+        f"write {instead}",
+        source=element.source,
+        line=element.line,
+    )
+
+
+def place(element: Element) -> Problem:
+    """Where a value was given."""
+    return Problem("", "", element.source, element.line)

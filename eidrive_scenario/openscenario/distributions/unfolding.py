@@ -1,0 +1,118 @@
+"""The concrete runs that a distribution file stands for, one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import overload
+
+from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.openscenario.distributions.deterministic import Combinations, combinations_of
+from eidrive_scenario.openscenario.distributions.stochastic import Draws, draws_of
+from eidrive_scenario.openscenario.document import read_root
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
+from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.openscenario.parsing import Source, open_document
+
+
+@dataclass(frozen=True)
+class ConcreteRun:
+    """A scenario with a value for each parameter that its distribution varies.
+
+    number        of the run among those of the file, from 0 on
+    assignments   values by parameter, each with the line that gave it; `load_scenario` takes them as they are
+    """
+
+    scenario: Path
+    number: int
+    assignments: Mapping[str, Assignment]
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """The values by parameter."""
+        return {name: assignment.text for name, assignment in self.assignments.items()}
+
+    def __str__(self) -> str:
+        """For human eyes, as `Speed=10,Model=car`; of a path only the last part."""
+        return ",".join(f"{name}={PurePosixPath(text).name or text}" for name, text in self.parameters.items())
+
+
+class Unfolding(Sequence[ConcreteRun]):
+    """All runs of a distribution file, counted and numbered, but made only when one is asked for.
+
+    source      what messages call the file
+    scenario    the file that is run
+    varied      deterministic distributions combined in the order of the file, the last one changing from run to run;
+                or stochastic ones, where a run is the same whichever runs were asked for before
+    warnings    what the file's version of the standard deprecates
+    """
+
+    def __init__(
+        self, source: str, scenario: Path, varied: Combinations | Draws, warnings: tuple[Problem, ...] = ()
+    ) -> None:
+        self.source = source
+        self.scenario = scenario
+        self.varied = varied
+        self.warnings = warnings
+
+    def __len__(self) -> int:
+        return self.varied.count
+
+    @overload
+    def __getitem__(self, index: int) -> ConcreteRun: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[ConcreteRun, ...]: ...
+    def __getitem__(self, index: int | slice) -> ConcreteRun | tuple[ConcreteRun, ...]:
+        """A run by its number, or several. Raises IndexError."""
+        if isinstance(index, slice):
+            return tuple(self[each] for each in range(*index.indices(len(self))))
+        number = range(len(self))[index]
+        return ConcreteRun(self.scenario, number, self.varied.at(number))
+
+
+def load_distribution(source: Source, *, seed: float = 0) -> Unfolding:
+    """Reads a parameter value distribution.
+
+    seed    of the draws where a stochastic distribution names no randomSeed itself
+
+    The scenario's path counts from the folder of the distribution. The scenario itself is not read: whether it has
+    the parameters, and whether their constraints allow the values, comes out when a run is loaded.
+    Raises ScenarioError with everything that is wrong with the file, each as file:line.
+    """
+    document = open_document(source)
+    findings = Findings()
+    read = read_root(document, findings)
+    distribution = read.root.parameter_value_distribution if read is not None else None
+    if read is None or distribution is None or findings.problems:
+        findings.settle()
+        raise ScenarioError(_other_kind(read.root if read else None, document.name))
+    varied = _varied(distribution, seed, findings)
+    scenario = _scenario_file(distribution.scenario_file, document.folder, findings)
+    return Unfolding(document.name, scenario, varied, findings.settle())
+
+
+def _varied(distribution: ParameterValueDistribution, seed: float, findings: Findings) -> Combinations | Draws:
+    if distribution.stochastic is not None:
+        return draws_of(distribution.stochastic, seed, findings)
+    assert distribution.deterministic is not None
+    return combinations_of(distribution.deterministic, findings)
+
+
+def _scenario_file(given: File, folder: Path, findings: Findings) -> Path:
+    path = folder / PurePosixPath(given.filepath.strip().replace("\\", "/"))
+    if not path.is_file():
+        beside = path.parent.glob("*.xosc") if path.parent.is_dir() else ()
+        findings.error(
+            f"no scenario {given.filepath!r}",
+            suggestion(path.name, {file.name for file in beside}),
+            source=given.source,
+            line=given.line,
+        )
+    return path
+
+
+def _other_kind(root: OpenScenario | None, name: str) -> Problem:
+    kind = "catalog" if root is not None and root.catalog is not None else "scenario"
+    return Problem(f"this is a {kind}, not a distribution of parameter values", "", name, root.line if root else None)

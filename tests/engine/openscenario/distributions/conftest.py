@@ -1,0 +1,38 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+DISTRIBUTION = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="{minor}" date="2026-01-31T12:00:00" description="a test" author="nobody"/>
+<ParameterValueDistribution>
+<ScenarioFile filepath="scenario.xosc"/>
+{body}
+</ParameterValueDistribution>
+</OpenSCENARIO>"""
+
+
+@pytest.fixture
+def distribution_file(tmp_path: Path) -> Callable[..., Path]:
+    """A distribution file with the given body from line 5 on, beside a scenario that is only named."""
+
+    def write(body: str, *, minor: int = 3) -> Path:
+        (tmp_path / "scenario.xosc").touch()
+        path = tmp_path / "distribution.xosc"
+        path.write_text(DISTRIBUTION.format(minor=minor, body=body), encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def stochastic(distribution_file: Callable[..., Path]) -> Callable[..., Path]:
+    """A distribution file that draws the parameter P."""
+
+    def write(distribution: str, *, runs: int = 1000, seed: str = 'randomSeed="1"') -> Path:
+        return distribution_file(
+            f'<Stochastic numberOfTestRuns="{runs}" {seed}>\n'
+            f'<StochasticDistribution parameterName="P">\n{distribution}\n</StochasticDistribution></Stochastic>'
+        )
+
+    return write

@@ -1,0 +1,175 @@
+"""Sets, ranges and value sets, and their combinations."""
+
+import tracemalloc
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_distribution, load_scenario
+
+Write = Callable[..., Path]
+
+SINGLE = '<DeterministicSingleParameterDistribution parameterName="{}">{}</DeterministicSingleParameterDistribution>'
+
+
+def values(name: str, *texts: str) -> str:
+    elements = "".join(f'<Element value="{text}"/>' for text in texts)
+    return SINGLE.format(name, f"<DistributionSet>{elements}</DistributionSet>")
+
+
+def steps(name: str, lower: str, upper: str, step: str) -> str:
+    limits = f'<Range lowerLimit="{lower}" upperLimit="{upper}"/>'
+    return SINGLE.format(name, f'<DistributionRange stepWidth="{step}">{limits}</DistributionRange>')
+
+
+def sets(*choices: dict[str, str]) -> str:
+    one = '<ParameterAssignment parameterRef="{}" value="{}"/>'
+    inside = "".join(
+        "<ParameterValueSet>" + "".join(one.format(*pair) for pair in choice.items()) + "</ParameterValueSet>"
+        for choice in choices
+    )
+    return (
+        "<DeterministicMultiParameterDistribution><ValueSetDistribution>"
+        f"{inside}</ValueSetDistribution></DeterministicMultiParameterDistribution>"
+    )
+
+
+def deterministic(*distributions: str) -> str:
+    return "<Deterministic>\n" + "\n".join(distributions) + "\n</Deterministic>"
+
+
+def texts(path: Path) -> list[str]:
+    return [run.parameters["P"] for run in load_distribution(path)]
+
+
+def test_all_combinations_in_the_order_of_the_file(distribution_file: Write, tmp_path: Path) -> None:
+    body = deterministic(values("A", "1", "2"), sets({"B": "x", "C": "u"}, {"B": "y", "C": "v"}), values("D", "on"))
+    runs = load_distribution(distribution_file(body))
+    assert len(runs) == 4
+    assert [list(run.parameters.items()) for run in runs] == [
+        [("A", "1"), ("B", "x"), ("C", "u"), ("D", "on")],
+        [("A", "1"), ("B", "y"), ("C", "v"), ("D", "on")],
+        [("A", "2"), ("B", "x"), ("C", "u"), ("D", "on")],
+        [("A", "2"), ("B", "y"), ("C", "v"), ("D", "on")],
+    ]
+    assert {run.scenario for run in runs} == {tmp_path / "scenario.xosc"}
+    assert [run.number for run in runs] == [0, 1, 2, 3]
+    assert runs[-1] == runs[3]
+    assert runs[1:3] == (runs[1], runs[2])
+    assert str(runs[2]) == "A=2,B=x,C=u,D=on"
+    with pytest.raises(IndexError):
+        runs[4]
+
+
+def test_a_value_knows_its_line(distribution_file: Write) -> None:
+    path = distribution_file(deterministic(values("A", "1"), steps("B", "0", "1", "1"), sets({"C": "x"})))
+    origins = {name: given.origin for name, given in load_distribution(path)[0].assignments.items()}
+    assert {name: str(origin) for name, origin in origins.items()} == {
+        "A": f"{path}:6: ",
+        "B": f"{path}:7: ",
+        "C": f"{path}:8: ",
+    }
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "step", "expected"),
+    [
+        ("5.0", "20.0", "5.0", ["5", "10", "15", "20"]),
+        # The standard: a value is added until it is greater than the upper limit.
+        ("-1.75", "1.75", "1.5", ["-1.75", "-0.25", "1.25"]),
+        # As binary fractions, 0.1 + 0.1 + 0.1 is above 0.3, and 1.1 + 0.2 + 0.2 above 1.5.
+        ("0", "0.3", "0.1", ["0", "0.1", "0.2", "0.3"]),
+        ("1.1", "1.5", "0.2", ["1.1", "1.3", "1.5"]),
+        ("2", "2", "1", ["2"]),
+        ("0", "1", "1e3", ["0"]),
+        ("1e-7", "3e-7", "1e-7", ["1e-07", "2e-07", "3e-07"]),
+    ],
+)
+def test_a_range(distribution_file: Write, lower: str, upper: str, step: str, expected: list[str]) -> None:
+    assert texts(distribution_file(deterministic(steps("P", lower, upper, step)))) == expected
+
+
+def test_no_distribution_is_one_run_as_the_scenario_stands(distribution_file: Write) -> None:
+    runs = load_distribution(distribution_file("<Deterministic/>"))
+    assert [run.parameters for run in runs] == [{}]
+
+
+def test_runs_are_made_one_by_one(distribution_file: Write) -> None:
+    """A thousand million runs: counted at once, any of them at hand, the memory of a walk through them constant."""
+    body = deterministic(*(steps(name, "1", "1000", "1") for name in "ABC"))
+    runs = load_distribution(distribution_file(body))
+    assert len(runs) == 10**9
+    assert runs[123_456_789].parameters == {"A": "124", "B": "457", "C": "790"}
+    tracemalloc.start()
+    walked = sum(1 for _ in islice(runs, 1000))
+    early = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    walked += sum(1 for _ in islice(runs, 10_000))
+    late = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert walked == 11_000
+    assert late < early + 20_000
+
+
+@pytest.mark.parametrize(
+    ("distributions", "line", "message"),
+    [
+        ([steps("P", "2", "1", "1")], 6, "the range from 2 to 1 is empty; lowerLimit has to be at most upperLimit"),
+        ([steps("P", "NaN", "1", "1")], 6, "the range from nan to 1 is empty"),
+        ([steps("P", "0", "INF", "1")], 6, "the range from 0 to inf has no end; give finite limits"),
+        ([steps("P", "0", "1", "0")], 6, "stepWidth is 0; give a number above zero"),
+        ([steps("P", "0", "1", "-1")], 6, "stepWidth is -1; give a number above zero"),
+        (
+            [values("P", "1"), sets({"P": "2"})],
+            7,
+            "the parameter 'P' is varied by another distribution too; see line 6",
+        ),
+        ([sets({"P": "$Other"})], 6, "value of ParameterAssignment: unknown parameter $Other"),
+        ([steps("A", "0", "1", "1e-9"), steps("B", "0", "1", "1e-9"), steps("C", "0", "1", "1e-9")], 5, "1.0e+27 runs"),
+        (
+            [SINGLE.format("P", '<UserDefinedDistribution type="mine">x</UserDefinedDistribution>')],
+            6,
+            "the values of 'P' come from a UserDefinedDistribution, whose meaning is left to a tool; "
+            "write DistributionSet or DistributionRange",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(
+    distribution_file: Write, distributions: list[str], line: int, message: str
+) -> None:
+    path = distribution_file(deterministic(*distributions))
+    with pytest.raises(ScenarioError) as caught:
+        load_distribution(path)
+    assert [(problem.source, problem.line) for problem in caught.value.problems] == [(str(path), line)]
+    assert message in str(caught.value)
+
+
+def test_a_set_that_assigns_twice(distribution_file: Write) -> None:
+    body = deterministic(sets({"P": "1"})).replace(
+        "</ParameterValueSet>", '<ParameterAssignment parameterRef="P" value="2"/></ParameterValueSet>'
+    )
+    with pytest.raises(ScenarioError, match=r":6: the set assigns 'P' twice; remove one"):
+        load_distribution(distribution_file(body))
+
+
+def test_a_scenario_that_is_not_there(distribution_file: Write) -> None:
+    path = distribution_file(deterministic())
+    path.write_text(path.read_text(encoding="utf-8").replace("scenario.xosc", "scenaro.xosc"), encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r":4: no scenario 'scenaro\.xosc'; did you mean 'scenario\.xosc'\?"):
+        load_distribution(path)
+
+
+def test_a_scenario_and_a_distribution_are_told_apart(distribution_file: Write, scenario_xml: Write) -> None:
+    with pytest.raises(ScenarioError, match="this is a scenario, not a distribution of parameter values"):
+        load_distribution(bytes(scenario_xml()))
+    with pytest.raises(ScenarioError, match="this is a distribution of parameter values, not a scenario"):
+        load_scenario(distribution_file(deterministic()))
+
+
+def test_the_oldest_version_has_no_distributions(distribution_file: Write) -> None:
+    with pytest.raises(ScenarioError, match=r"OpenSCENARIO has it since 1\.1; the file says 1\.0"):
+        load_distribution(distribution_file(deterministic(), minor=0))
+    assert len(load_distribution(distribution_file(deterministic(), minor=1))) == 1
