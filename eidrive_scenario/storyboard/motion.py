@@ -65,7 +65,7 @@ class Motion:
         """True from a teleport until the view that shows it."""
 
     def put(self, place: Place) -> None:
-        """Place it there, at once; its speed stays. The next view shows it there, so the step that begins is used up."""
+        """Place it there at once; its speed stays. The next view shows it there, so the step that begins is used up."""
         self.pose = place.pose
         self._adopt(place.location)
         self.end_of_road = False
@@ -83,7 +83,8 @@ class Motion:
     def go_to(self, pose: Pose, *, land: bool = False) -> None:
         """The pose at the end of the step that begins now, wherever it is (a trajectory).
 
-        With `land` the actor looks for its lane there, to follow it from then on.
+        With `land` the actor looks for its lane there, to follow it from then on; where there are no roads at all it
+        has nothing left to follow, and stops.
         """
         self._next_pose = pose
         self._landing = land
@@ -133,6 +134,8 @@ class Motion:
             self.location = None
             if self._landing:
                 self.land()
+                if self.roads is None:
+                    self.speed = 0.0
         elif distance == 0.0 and steering is None:
             pass
         elif self.location is not None and (carried is not None or abs(math.cos(self.heading)) >= ACROSS):

@@ -92,9 +92,10 @@ class Storyboard:
         return self._finished(commands)
 
     def _bring_trailers(self) -> None:
-        """Trailers enter with what draws them, in line."""
+        """Trailers enter with what draws them, in line; in Init they are put there wherever they were placed."""
         for front, back in pairs(self.stage.actors):
-            if front.present and not back.present:
+            if front.present and (not back.present or self.stage.view.tick < 0):
+                back.motion.speed = front.motion.speed
                 self.stage.enter(back.name, Place(pose_behind(front, back, straight=True)))
 
     def _refresh(self, commands: Commands) -> None:

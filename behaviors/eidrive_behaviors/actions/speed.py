@@ -20,7 +20,7 @@ class SpeedAction(ActionBehaviour):
     Speed follows its shape over time; where the dynamics say a distance, the time in which that distance is covered.
     A relative target is read anew in each step; a continuous one is kept up until a younger action ends it. The
     vehicle's Performance bounds target and steepest slope (not those of a step). A vehicle that drives itself is given
-    the speed as its goal, and has reached it when it drives that fast.
+    the speed as its goal, and has reached it when it drives that fast; one that was just placed starts with it.
     """
 
     domains = Domain.LONGITUDINAL
@@ -74,6 +74,9 @@ class SpeedAction(ActionBehaviour):
         speed = transition.advance(self.stage.dt)
         slope = 0.0 if transition.done or self.stage.dt == 0.0 else (speed - before) / self.stage.dt
         self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
+        if self.actor.motion.jumped and transition.done:
+            self.actor.motion.speed = speed
+            return Status.RUNNING if self._continuous else Status.SUCCESS
         reached = transition.done and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 

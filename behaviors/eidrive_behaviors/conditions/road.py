@@ -28,7 +28,7 @@ class EndOfRoadCondition(EntityCondition):
 
 
 class OffroadCondition(EntityCondition):
-    """Has been off the road with its reference point for longer than a duration [s]. Lanes of type `none` are no road."""
+    """Has been off the road with its reference point for longer than a duration [s]. Lanes `none` are no road."""
 
     element: model.OffroadCondition
 

@@ -77,7 +77,7 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
     return seen
 
 
-def test_without_triggers_all_falls_through_in_one_tick_and_ends_from_the_bottom_up(
+def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(
     clock: Any, make: Any, task: Any
 ) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
@@ -113,7 +113,7 @@ def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, tas
     ]
 
 
-def test_an_act_is_stopped_alone_and_its_stop_trigger_is_asked_from_the_tick_after_its_start(
+def test_an_act_is_stopped_alone_from_the_tick_after_its_start(
     clock: Any, make: Any, task: Any
 ) -> None:
     one = make.act(make.group(make.maneuver(make.event("one", task(9)))), stop=[NO, YES], name="first")
@@ -176,7 +176,7 @@ def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, mak
     assert root.state.name == "RUNNING"
 
 
-def test_a_younger_action_ends_an_older_one_on_the_same_domain_of_the_same_actor(
+def test_a_younger_action_ends_an_older_one_on_the_same_domain(
     clock: Any, make: Any, task: Any
 ) -> None:
     slow = make.event("slow", task(9, actor="A", domain=Domain.LONGITUDINAL))

@@ -91,7 +91,7 @@ def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: 
     assert math.sin(placement.yaw - along) == pytest.approx(0.6)
 
 
-def test_a_lane_may_be_expressed_by_its_neighbour_even_if_that_one_comes_towards(street: Any) -> None:
+def test_a_place_may_be_expressed_by_the_oncoming_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     assert motion.relate_to_lane(1).offset == pytest.approx(-4.0)
     assert motion.direction == -1

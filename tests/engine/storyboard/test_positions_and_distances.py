@@ -118,7 +118,7 @@ def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text:
         resolve(model.Position(**frame), on_street)
 
 
-def test_a_place_beside_somebody_who_is_not_there_is_absent(on_street: Any) -> None:
+def test_nobody_is_placed_beside_who_is_not_there(on_street: Any) -> None:
     on_street.leave("B")
     with pytest.raises(Absent):
         resolve(

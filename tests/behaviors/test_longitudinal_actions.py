@@ -1,0 +1,195 @@
+"""Speeds and distances along the way, with numbers by hand. Ego drives 20 m/s from x = 100 in steps of 0.1 s."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from eidrive_behaviors.actions.speed import duration_over
+from eidrive_behaviors.actions.speed_profile import rounded
+
+
+def speed(target: str, shape: str = "linear", dimension: str = "time", value: float = 0.0) -> str:
+    return f"""<PrivateAction><LongitudinalAction><SpeedAction>
+      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="{dimension}" value="{value}"/>
+      <SpeedActionTarget>{target}</SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction>"""
+
+
+def absolute(value: float) -> str:
+    return f'<AbsoluteTargetSpeed value="{value}"/>'
+
+
+def relative(value: float, kind: str, continuous: bool = False) -> str:
+    return (
+        f'<RelativeTargetSpeed entityRef="Other" value="{value}" speedTargetValueType="{kind}" '
+        f'continuous="{str(continuous).lower()}"/>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "dimension", "value", "half", "end"),
+    [
+        ("linear", "time", 2.0, 25.0, 1.9),
+        ("cubic", "time", 2.0, 25.0, 1.9),
+        ("sinusoidal", "time", 2.0, 25.0, 1.9),
+        ("linear", "rate", 5.0, 25.0, 1.9),
+        ("linear", "distance", 50.0, 25.0, 1.9),
+    ],
+)
+def test_a_speed_is_reached_by_its_dynamics(
+    scene: Any, shape: str, dimension: str, value: float, half: float, end: float
+) -> None:
+    """From 20 to 30 m/s in 2 s, at 5 m/s², over 50 m at 25 m/s on average: the same to the second."""
+    played = scene(3, ("Ego", speed(absolute(30), shape, dimension, value)))
+    assert played.at(1.0).speed == pytest.approx(half)
+    assert played.at(2.0).speed == 30.0
+    assert played.when("action 0", "completeState") == pytest.approx(end)
+
+
+def test_the_steepest_slope_of_a_cubic_is_its_rate(scene: Any) -> None:
+    """Δ = 10 at 5 m/s² take 1.5 · 10 / 5 = 3 s."""
+    played = scene(4, ("Ego", speed(absolute(30), "cubic", "rate", 5)))
+    assert played.at(1.5).speed == pytest.approx(25.0)
+    assert played.when("action 0", "completeState") == pytest.approx(2.9)
+
+
+def test_a_step_holds_at_once_and_moves_the_actor_in_the_same_step(scene: Any) -> None:
+    played = scene(0.2, ("Ego", speed(absolute(30), "step")))
+    assert played.at(0.1).x == pytest.approx(103.0)
+    assert played.when("action 0", "completeState") == 0.0
+
+
+def test_the_vehicle_cannot_do_more_than_its_performance(scene: Any) -> None:
+    """From 20 to 60 m/s in 1 s would be 40 m/s²; at 10 m/s² it takes 4 s. And 80 m/s are beyond its 70."""
+    played = scene(8, ("Ego", speed(absolute(60), "linear", "time", 1)))
+    assert played.at(2.0).speed == pytest.approx(40.0)
+    assert scene(8, ("Ego", speed(absolute(80), "linear", "rate", 10))).at(8.0).speed == 70.0
+
+
+@pytest.mark.parametrize(("value", "kind", "expected"), [(5, "delta", 15.0), (1.5, "factor", 15.0), (-4, "delta", 6.0)])
+def test_a_relative_speed(scene: Any, value: float, kind: str, expected: float) -> None:
+    played = scene(1, ("Ego", speed(relative(value, kind), "step")))
+    assert played.at(0.5).speed == expected
+
+
+def test_a_continuous_relative_speed_follows_until_somebody_else_takes_over(scene: Any) -> None:
+    later = '<ByValueCondition><SimulationTimeCondition value="2.95" rule="greaterThan"/></ByValueCondition>'
+    played = scene(
+        4,
+        ("Other", speed(absolute(20), "linear", "rate", 5)),
+        ("Ego", speed(relative(0, "delta", continuous=True), "step")),
+        ("Ego", speed(absolute(3), "step"), later),
+    )
+    assert played.at(1.1).speed == pytest.approx(played.at(1.0, "Other").speed)
+    assert played.when("action 1", "completeState") == pytest.approx(3.0)
+    assert played.at(3.1).speed == 3.0
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "expected"), [(10, 20, 4.0), (10, 10, 0.0), (20, 0, 6.0), (-10, 10, 2 * 30 / 10 + 2 * 30 / 10)]
+)
+def test_time_over_a_distance_of_60_m(start: float, target: float, expected: float) -> None:
+    assert duration_over(start, target, 60.0) == pytest.approx(expected)
+
+
+def test_who_drives_itself_is_given_the_speed_as_a_goal(scene: Any) -> None:
+    """Nothing moves it here, so the goal stands and the action goes on."""
+    played = scene(3, ("Ego", speed(absolute(30), "linear", "time", 1)), driven=True)
+    assert played.commands[0].driven == {"Ego"}
+    assert "Ego" not in played.commands[5].placements
+    assert played.commands[-1].goals["Ego"].speed == 30.0
+    assert played.when("action 0", "completeState") is None
+
+
+def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") -> str:
+    rows = "".join(
+        f'<SpeedProfileEntry {"" if time is None else f"time={chr(34)}{time}{chr(34)}"} speed="{value}"/>'
+        for time, value in entries
+    )
+    limits = f'<DynamicConstraints maxAcceleration="5" maxDeceleration="4" {rates}/>'
+    return f"""<PrivateAction><LongitudinalAction><SpeedProfileAction followingMode="{mode}">{limits}{rows}
+      </SpeedProfileAction></LongitudinalAction></PrivateAction>"""
+
+
+def test_a_profile_in_straight_lines(scene: Any) -> None:
+    played = scene(4, ("Ego", profile("position", (1.0, 30.0), (2.0, 20.0))))
+    assert [played.at(t).speed for t in (0.5, 1.0, 2.0, 3.0)] == pytest.approx([25, 30, 25, 20])
+    assert played.when("action 0", "completeState") == pytest.approx(2.9)
+
+
+def test_an_entry_without_time_is_reached_as_fast_as_the_limits_allow(scene: Any) -> None:
+    """10 m/s more at 5 m/s², then 8 m/s less at 4 m/s²: 2 s each."""
+    played = scene(5, ("Ego", profile("position", (None, 30.0), (None, 22.0))))
+    assert [played.at(t).speed for t in (1.0, 2.0, 3.0, 4.0)] == pytest.approx([25, 30, 26, 22])
+
+
+def test_followed_profiles_round_their_corners() -> None:
+    """To 10 m/s in 4 s, to 4 m/s in 4 s more; slopes 2.5 and -1.5 m/s², rates 4 and 3 m/s³: worked by hand.
+
+    The first slope is there after 0.625 s with 0.78125 m/s; from then on v = 2.5 t - 0.78125, which meets the second
+    line 16 - 1.5 t at 4.1953 s; the turn takes 4/3 s about that; the last slope ends 0.25 s after the end.
+    """
+    pieces = rounded([(0.0, 0.0), (4.0, 10.0), (8.0, 4.0)], up=4.0, down=3.0)
+    assert pieces is not None
+    times = [piece.time for piece in pieces]
+    assert times == pytest.approx([0, 0.625, 4.1953 - 2 / 3, 4.1953 + 2 / 3, 8 - 1.5 / 8, 8 + 1.5 / 8], abs=1e-4)
+    assert pieces[1].at(2.0) == pytest.approx(2.5 * 2.0 - 0.78125)
+    assert pieces[3].at(6.0) == pytest.approx(16.0 - 9.0)
+    assert pieces[-1].speed == pytest.approx(4.0)
+
+
+def test_one_change_of_speed_within_a_time_begins_and_ends_without_acceleration() -> None:
+    """8 m/s in 5 s at 4 m/s³: a (5 - a/4) = 8 gives a = 1.757 m/s²."""
+    pieces = rounded([(0.0, 0.0), (5.0, 8.0)], up=4.0, down=4.0)
+    assert pieces is not None
+    slope = 10.0 - math.sqrt(100.0 - 32.0)
+    assert pieces[1].slope == pytest.approx(slope)
+    assert pieces[2].at(pieces[3].time) == pytest.approx(8.0)
+    assert pieces[3].time == 5.0
+
+
+def keep(attributes: str, limits: str = "") -> str:
+    return f"""<PrivateAction><LongitudinalAction>
+      <LongitudinalDistanceAction entityRef="Other" {attributes}>{limits}</LongitudinalDistanceAction>
+      </LongitudinalAction></PrivateAction>"""
+
+
+@pytest.mark.parametrize(
+    ("attributes", "gap"),
+    [
+        ('distance="30" freespace="false" continuous="true"', 30.0),
+        ('distance="30" freespace="true" continuous="true"', 35.0),
+        ('timeGap="2" freespace="false" continuous="true"', 20.0),
+        ('distance="15" freespace="false" continuous="true" displacement="leadingReferencedEntity"', -15.0),
+    ],
+)
+def test_without_limits_a_distance_holds_at_once(scene: Any, attributes: str, gap: float) -> None:
+    played = scene(1, ("Ego", keep(attributes)))
+    for time in (0.1, 1.0):
+        assert played.at(time, "Other").x - played.at(time).x == pytest.approx(gap)
+    assert played.at(1.0).speed == 10.0
+
+
+def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
+    limits = '<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="25"/>'
+    played = scene(40, ("Ego", keep('distance="20" freespace="false" continuous="false"', limits)))
+    end = played.when("action 0", "completeState")
+    assert end is not None
+    assert played.at(end, "Other").x - played.at(end).x == pytest.approx(20.0, abs=0.15)
+    changes = [abs(b["Ego"].speed - a["Ego"].speed) for a, b in zip(played.rows, played.rows[1:], strict=False)]
+    assert max(changes) <= 0.3 + 1e-9
+
+
+def test_two_arrive_together(scene: Any) -> None:
+    """Other needs (400 - 150) / 10 = 25 s; Ego has 500 m for that, and shall arrive with 22 m/s."""
+    position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster>{position.format(-1, 400)[10:-11]}</TargetPositionMaster>
+      <TargetPosition>{position.format(-1, 600)[10:-11]}</TargetPosition>
+      <FinalSpeed><AbsoluteSpeed value="22"/></FinalSpeed></SynchronizeAction></PrivateAction>"""
+    played = scene(30, ("Ego", action), dt=0.05)
+    end = played.when("action 0", "completeState")
+    assert end == pytest.approx(25.0, abs=0.15)
+    assert played.at(25.0).x == pytest.approx(600.0, abs=1.0)
+    assert played.at(end + 0.1).speed == 22.0
