@@ -80,7 +80,7 @@ def _from_tree(source: Any) -> Document:
         base = Path(root.base) if root.base else None
         return Document(root, str(base or "<element>"), base, base.parent if base else Path())
     if not isinstance(root, ElementTree.Element):
-        what = f"a {type(source).__name__} is neither a path nor XML"
+        what = "this is neither a path nor XML"
         remedy = "give a path, bytes, an XML tree, or an object with get_element()"
         raise ScenarioError(Problem(what, remedy, name))
     return Document(parse(_as_written(root, name), name), name, None, Path())
