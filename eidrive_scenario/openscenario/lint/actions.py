@@ -1,0 +1,136 @@
+"""Rules on actions: what takes a domain from its neighbour, what is too fast, what never gets anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations, pairwise
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.openscenario.lint.endless import at_once, stands_still
+from eidrive_scenario.openscenario.lint.rule import at
+from eidrive_scenario.openscenario.lint.survey import Survey
+from eidrive_scenario.openscenario.model import (
+    AbsoluteSpeed,
+    AbsoluteTargetSpeed,
+    Action,
+    Element,
+    Event,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    LongitudinalDistanceAction,
+    Polyline,
+    SpeedAction,
+    SpeedProfileAction,
+    SpeedProfileEntry,
+    SynchronizeAction,
+    Trajectory,
+    TransitionDynamics,
+    Vehicle,
+)
+
+_DOMAINS: Mapping[type[Element], str] = {
+    SpeedAction: "longitudinal",
+    SpeedProfileAction: "longitudinal",
+    LongitudinalDistanceAction: "longitudinal",
+    SynchronizeAction: "longitudinal",
+    LaneChangeAction: "lateral",
+    LaneOffsetAction: "lateral",
+    LateralDistanceAction: "lateral",
+    FollowTrajectoryAction: "lateral",
+}
+"""Actions that take time, and what of an entity they control (ASAM OpenSCENARIO XML, control strategies)."""
+
+
+def conflicting_actions(survey: Survey) -> Iterator[Problem]:
+    """Two actions of one event that control the same domain of the same entities: the second ends the first."""
+    for node in survey.nodes:
+        if not isinstance(node.element, Event) or not survey.actors(node):
+            continue
+        lasting = [(action, leaf) for action in node.element.action if (leaf := _lasting(action)) is not None]
+        for (first, one), (second, other) in combinations(lasting, 2):
+            shared = _controls(one) & _controls(other)
+            if shared:
+                yield at(
+                    second,
+                    f"action {second.name!r} ends action {first.name!r} of the same event at once: both control "
+                    f"the {' and '.join(sorted(shared))} domain of {', '.join(survey.actors(node))}",
+                    "let an event of its own start it, when the other has ended",
+                )
+
+
+def _lasting(action: Action) -> Element | None:
+    """What a private action does that takes time."""
+    if action.private_action is None:
+        return None
+    leaf = next((one for one in action.private_action.walk() if type(one) in _DOMAINS), None)
+    if leaf is None or any(isinstance(one, TransitionDynamics) and at_once(one) for one in leaf.walk()):
+        return None
+    return leaf
+
+
+def _controls(leaf: Element) -> set[str]:
+    domains = {_DOMAINS[type(leaf)]}
+    if isinstance(leaf, FollowTrajectoryAction) and leaf.time_reference.timing is not None:
+        domains.add("longitudinal")
+    return domains
+
+
+def too_fast(survey: Survey) -> Iterator[Problem]:
+    """A speed beyond the maxSpeed of the vehicle that shall drive it."""
+    for action, actors in survey.performances:
+        for element in action.walk():
+            speed = _speed(element)
+            if speed is None:
+                continue
+            for name in actors:
+                body = survey.scenario.entities.get(name)
+                limit = body.performance.max_speed if isinstance(body, Vehicle) else None
+                if limit is not None and speed > limit + 1e-9:
+                    yield at(
+                        element,
+                        f"{speed:g} m/s is asked of {name!r}, whose maxSpeed is {limit:g} m/s",
+                        "speeds are in m/s; lower it, or raise maxSpeed of the vehicle's Performance",
+                    )
+
+
+def _speed(element: Element) -> float | None:
+    if isinstance(element, AbsoluteTargetSpeed | AbsoluteSpeed):
+        return element.value
+    return element.speed if isinstance(element, SpeedProfileEntry) else None
+
+
+def no_progress(survey: Survey) -> Iterator[Problem]:
+    """A transition at the rate 0 never reaches its target."""
+    for element in survey.elements:
+        if isinstance(element, TransitionDynamics) and stands_still(element):
+            yield at(element, "at a rate of 0 the action never reaches its target", "give a rate above 0")
+
+
+def untimed_trajectories(survey: Survey) -> Iterator[Problem]:
+    """Times that count, and are not there or not in order."""
+    for element in survey.elements:
+        if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
+            continue
+        trajectory = _trajectory(element, survey)
+        shape = trajectory.shape.polyline if trajectory is not None else None
+        if isinstance(shape, Polyline):
+            yield from _times(shape)
+
+
+def _times(shape: Polyline) -> Iterator[Problem]:
+    for vertex in shape.vertex:
+        if vertex.time is None:
+            yield at(vertex, "a trajectory is followed by its times, and this vertex has none", "give it a time")
+    for one, after in pairwise(shape.vertex):
+        if one.time is not None and after.time is not None and after.time < one.time:
+            yield at(after, f"the time {after.time:g} s comes after {one.time:g} s", "let the times ascend")
+
+
+def _trajectory(action: FollowTrajectoryAction, survey: Survey) -> Trajectory | None:
+    given = action.trajectory_ref or action
+    if given.trajectory is not None or given.catalog_reference is None:
+        return given.trajectory
+    entry = survey.scenario.entries.get(given.catalog_reference)
+    return entry if isinstance(entry, Trajectory) else None

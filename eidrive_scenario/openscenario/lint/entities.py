@@ -1,0 +1,108 @@
+"""Rules on entities: who is never there, who is never spoken of, groups in which nobody acts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.openscenario.lint.outline import Node
+from eidrive_scenario.openscenario.lint.rule import at
+from eidrive_scenario.openscenario.lint.survey import Survey
+from eidrive_scenario.openscenario.model import (
+    Action,
+    CustomCommandAction,
+    Event,
+    LateralDistanceAction,
+    LongitudinalDistanceAction,
+    ManeuverGroup,
+    ScenarioObject,
+    SynchronizeAction,
+)
+from eidrive_scenario.openscenario.participants import scenario_objects
+
+_WORD = re.compile(r"\w+")
+
+
+def _objects(survey: Survey) -> Iterator[ScenarioObject]:
+    """The scenario objects that stand in the file for an entity of their own."""
+    entities = survey.scenario.document.entities
+    for one, _ in scenario_objects(entities, survey.scenario.entries):
+        if one.name in survey.scenario.entities and one.name not in survey.trailers:
+            yield one
+
+
+def _spoken_of(survey: Survey) -> set[str]:
+    names = {one for name in survey.named.get("entity", set()) for one in survey.members(name)}
+    commands = [one.content for one in survey.elements if isinstance(one, CustomCommandAction)]
+    return names | {word for text in commands for word in _WORD.findall(text)}
+
+
+def unused_entities(survey: Survey) -> Iterator[Problem]:
+    """An entity that is declared, and then never spoken of; what has a controller may be known to that."""
+    spoken_of = _spoken_of(survey)
+    for one in _objects(survey):
+        if one.name not in spoken_of | survey.placed and not one.object_controller:
+            yield at(one, f"the entity {one.name!r} is never used", "place it with a TeleportAction, or take it out")
+
+
+def never_placed(survey: Survey) -> Iterator[Problem]:
+    """An entity that acts or is asked about, but is nowhere."""
+    spoken_of = _spoken_of(survey)
+    for one in _objects(survey):
+        if one.name in spoken_of and one.name not in survey.placed:
+            yield at(
+                one,
+                f"the entity {one.name!r} is never placed, so it is not in the world",
+                "give it a TeleportAction in Init, or an AddEntityAction",
+            )
+
+
+def groups_without_actors(survey: Survey) -> Iterator[Problem]:
+    """Private actions for which there is nobody."""
+    for node in survey.nodes:
+        group = node.element
+        if not isinstance(group, ManeuverGroup) or survey.actors(node):
+            continue
+        acting = [event for event in node.walk() if _acts(event)]
+        if not acting:
+            continue
+        if not group.actors.select_triggering_entities:
+            yield at(
+                group,
+                f"{node.title} has no actors, so nobody does what is private in {acting[0].title}",
+                "name them in Actors",
+            )
+        for event in acting:
+            if group.actors.select_triggering_entities and not _about_entities(event):
+                yield at(
+                    event.element,
+                    f"{event.title} is for the entities that trigger it, and its trigger asks about none",
+                    "name the actors, or trigger it by a ByEntityCondition",
+                )
+
+
+def _acts(node: Node) -> bool:
+    actions = node.element.action if isinstance(node.element, Event) else ()
+    return any(isinstance(action, Action) and action.private_action is not None for action in actions)
+
+
+def _about_entities(node: Node) -> bool:
+    trigger = node.start
+    groups = trigger.condition_group if trigger is not None else ()
+    return any(condition.by_entity_condition is not None for group in groups for condition in group.condition)
+
+
+def relations_to_oneself(survey: Survey) -> Iterator[Problem]:
+    """An action that keeps an entity at a distance from itself, or synchronises it with itself."""
+    for action, actors in survey.performances:
+        for element in action.walk():
+            if isinstance(element, LateralDistanceAction | LongitudinalDistanceAction):
+                other = element.entity_ref
+            elif isinstance(element, SynchronizeAction):
+                other = element.master_entity_ref
+            else:
+                continue
+            if other in actors:
+                kind = type(element).__name__
+                yield at(element, f"{kind} of {other!r} refers to {other!r} itself", "name another entity")

@@ -1,0 +1,167 @@
+"""When each element of the storyboard can start at the earliest, and which conditions keep it from ever starting.
+
+The times are lower bounds: what is said to be impossible is so in every run. They are found as a least fixed point:
+at first nothing can start, then whatever the triggers allow, until nothing changes any more. What waits for itself,
+or for something that comes only after it, is never reached.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from eidrive_scenario.openscenario.lint.outline import Node, Outline
+from eidrive_scenario.openscenario.lint.spans import ALWAYS, NEVER, Spans, both, either, falls, rises, shifted, since
+from eidrive_scenario.openscenario.lint.states import States, asks_for_state
+from eidrive_scenario.openscenario.lint.truth import Truth, truth
+from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
+from eidrive_scenario.openscenario.names import CRITERIA
+
+SWALLOWED = "swallowed-edge"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a trigger can see of one of its conditions, with edge and delay.
+
+    spans   the instants at which it can count as true
+    rule    by which rule that is never; "" where it can
+    reason  why
+    """
+
+    condition: Condition
+    spans: Spans
+    rule: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A condition group, its conditions as seen, and when all of them can hold together."""
+
+    group: ConditionGroup
+    seen: tuple[Seen, ...]
+    spans: Spans
+
+
+@dataclass(frozen=True)
+class Watch:
+    """A trigger at work: whose it is, whether it starts or stops that, and since when it is asked at the earliest."""
+
+    owner: Node
+    trigger: Trigger
+    starts: bool
+    first: float
+    groups: tuple[Judged, ...]
+
+    @property
+    def spans(self) -> Spans:
+        """When it can fire."""
+        return either(group.spans for group in self.groups)
+
+
+class Reach:
+    """The earliest times of a outline's elements [s]; inf for never."""
+
+    def __init__(self, outline: Outline) -> None:
+        self._outline = outline
+        self._truths: dict[int, Truth] = {}
+        self._states = States(outline)
+        changed = True
+        while changed:
+            changed = False
+            for node in outline.nodes:
+                changed |= self._advance(node)
+
+    def _advance(self, node: Node) -> bool:
+        states = self._states
+        stop = stop_trigger(node)
+        start = self._earliest(node, node.start, starts=True) if node.start else self._first(node, starts=True)
+        stopped = self._earliest(node, stop, starts=False) if stop and node.parent else math.inf
+        return states.improve(node, start, stopped)
+
+    def _first(self, node: Node, *, starts: bool) -> float:
+        """Since when its trigger is asked: its parent runs, or for a stop trigger it does so itself."""
+        if node.parent is None:
+            return 0.0
+        return self._states.start[node.parent if starts else node]
+
+    def _earliest(self, node: Node, trigger: Trigger, *, starts: bool) -> float:
+        first = self._first(node, starts=starts)
+        if first == math.inf:
+            return first
+        spans = either(self._judge(group, node, starts, first).spans for group in trigger.condition_group)
+        return spans[0][0] if spans else math.inf
+
+    def watches(self) -> Iterator[Watch]:
+        """All triggers that are asked at all."""
+        for node in self._outline.nodes:
+            for trigger, starts in ((node.start, True), (stop_trigger(node), False)):
+                first = self._first(node, starts=starts)
+                if trigger is not None and first < math.inf:
+                    groups = tuple(self._judge(group, node, starts, first) for group in trigger.condition_group)
+                    yield Watch(node, trigger, starts, first, groups)
+
+    def _judge(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> Judged:
+        seen = tuple(self._see(condition, owner, starts, first) for condition in group.condition)
+        spans = since(ALWAYS, first)
+        for one in seen:
+            spans = both(spans, one.spans)
+        return Judged(group, seen, spans)
+
+    def _see(self, condition: Condition, owner: Node, starts: bool, first: float) -> Seen:
+        known = self._truth(condition, owner, starts)
+        spans = since(known.spans, first)
+        if not spans:
+            if known.rule:
+                return Seen(condition, NEVER, known.rule, known.reason)
+            return Seen(condition, NEVER, "impossible-condition", f"that is over before {owner.title} looks for it")
+        edge = condition.condition_edge
+        dead = _unseen(known, edge, first)
+        if dead:
+            return Seen(condition, NEVER, SWALLOWED, dead)
+        if known.certain and edge is not ConditionEdge.NONE:
+            up = rises(known.spans, first) if edge is not ConditionEdge.FALLING else NEVER
+            down = falls(known.spans, first) if edge is not ConditionEdge.RISING else NEVER
+            spans = either((up, down))
+        return Seen(condition, shifted(spans, condition.delay))
+
+    def _truth(self, condition: Condition, owner: Node, starts: bool) -> Truth:
+        if asks_for_state(condition):
+            return self._states.truth(condition, owner, starts)
+        known = self._truths.get(id(condition))
+        if known is None:
+            known = self._truths[id(condition)] = truth(condition, self._outline)
+        return known
+
+
+def _unseen(known: Truth, edge: ConditionEdge, first: float) -> str:
+    """Why an edge is never seen, "" where it can be."""
+    if edge is ConditionEdge.NONE:
+        return ""
+    if known.steady:
+        return known.steady
+    if edge is ConditionEdge.RISING and known.risen:
+        return known.risen
+    if not known.certain:
+        return ""
+    if edge is not ConditionEdge.FALLING and rises(known.spans, first):
+        return ""
+    if edge is not ConditionEdge.RISING and falls(known.spans, first):
+        return ""
+    if edge is ConditionEdge.FALLING:
+        return "it never becomes false"
+    return "it is already true at the first evaluation" if since(known.spans, first) else "it never becomes true"
+
+
+def stop_trigger(node: Node) -> Trigger | None:
+    """The stop trigger of an element, without the criteria that ScenarioRunner keeps there; None if nothing is left."""
+    if not isinstance(node.element, Act | Storyboard) or node.element.stop_trigger is None:
+        return None
+    kept = []
+    for group in node.element.stop_trigger.condition_group:
+        conditions = tuple(one for one in group.condition if node.parent or not one.name.startswith(CRITERIA))
+        if conditions:
+            kept.append(ConditionGroup(condition=conditions, line=group.line, source=group.source))
+    return Trigger(condition_group=tuple(kept)) if kept else None

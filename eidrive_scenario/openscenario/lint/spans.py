@@ -1,0 +1,79 @@
+"""Sets of instants, as ascending closed intervals [s], and what edges and delays make of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from eidrive_scenario.openscenario.model import Rule
+
+Spans = tuple[tuple[float, float], ...]
+
+NEVER: Spans = ()
+ALWAYS: Spans = ((0.0, math.inf),)
+TINY = 1e-6
+"""Two numbers nearer than this are equal to a Rule."""
+STEP = 0.25
+"""An edge is seen at the first tick after it: no later than one step, which is shorter than this [s]."""
+
+
+def compared(rule: Rule, value: float) -> Spans:
+    """The instants at which the time is as the rule says."""
+    spans = {
+        Rule.GREATER_THAN: ((value + TINY, math.inf),),
+        Rule.GREATER_OR_EQUAL: ((value - TINY, math.inf),),
+        Rule.LESS_THAN: ((-math.inf, value - TINY),),
+        Rule.LESS_OR_EQUAL: ((-math.inf, value + TINY),),
+        Rule.EQUAL_TO: ((value - TINY, value + TINY),),
+        Rule.NOT_EQUAL_TO: ((-math.inf, value - TINY), (value + TINY, math.inf)),
+    }[rule]
+    return since(spans, 0.0)
+
+
+def since(spans: Spans, first: float) -> Spans:
+    """What of the spans is not before `first`."""
+    return tuple((max(low, first), high) for low, high in spans if high >= first)
+
+
+def both(one: Spans, other: Spans) -> Spans:
+    """The instants that are in both."""
+    met = ((max(a, c), min(b, d)) for a, b in one for c, d in other)
+    return tuple(sorted((low, high) for low, high in met if low <= high))
+
+
+def either(several: Iterable[Spans]) -> Spans:
+    """The instants that are in one of them."""
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted(span for spans in several for span in spans):
+        if joined and low <= joined[-1][1]:
+            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
+        else:
+            joined.append((low, high))
+    return tuple(joined)
+
+
+def shifted(spans: Spans, delay: float) -> Spans:
+    """The spans, later by a delay."""
+    return tuple((low + delay, high + delay) for low, high in spans) if delay > 0.0 else spans
+
+
+def rises(spans: Spans, first: float) -> Spans:
+    """Where something that is true in these spans is seen to become true by one who looks from `first` on."""
+    return tuple((low, low + STEP) for low, _ in spans if low > first)
+
+
+def falls(spans: Spans, first: float) -> Spans:
+    """Where it is seen to become false."""
+    return tuple((high, high + STEP) for _, high in spans if first <= high < math.inf)
+
+
+def in_words(spans: Spans) -> str:
+    """The first and the last instant in words."""
+    if not spans:
+        return "never"
+    low, high = round(spans[0][0], 3), spans[-1][1]
+    if high == math.inf:
+        return f"from {low:g} s on" if low > 0.0 else "at any time"
+    if high - low <= STEP + 2 * TINY:
+        return f"at {low:g} s"
+    return f"until {round(high, 3):g} s" if low <= 0.0 else f"from {low:g} s to {round(high, 3):g} s"

@@ -1,0 +1,160 @@
+"""When the elements of the storyboard can be in a state at the earliest, and when a condition can see that."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.openscenario.lint.endless import never_ends
+from eidrive_scenario.openscenario.lint.outline import Node, Outline
+from eidrive_scenario.openscenario.lint.spans import ALWAYS
+from eidrive_scenario.openscenario.lint.truth import OPEN, STATE, WAITS, Truth, never
+from eidrive_scenario.openscenario.model import (
+    Action,
+    Condition,
+    Event,
+    Priority,
+    StoryboardElementState,
+    StoryboardElementStateCondition,
+    StoryboardElementType,
+)
+
+_OVERRIDING = (Priority.OVERWRITE, Priority.OVERRIDE)
+_AFTER = (
+    StoryboardElementState.COMPLETE_STATE,
+    StoryboardElementState.END_TRANSITION,
+    StoryboardElementState.STOP_TRANSITION,
+)
+
+
+def asks_for_state(condition: Condition) -> bool:
+    """Whether a condition looks at the storyboard itself."""
+    return _question(condition) is not None
+
+
+def _question(condition: Condition) -> StoryboardElementStateCondition | None:
+    by_value = condition.by_value_condition
+    return by_value.storyboard_element_state_condition if by_value is not None else None
+
+
+class States:
+    """Lower bounds of the times at which elements start, end and are stopped [s]; inf for never."""
+
+    def __init__(self, outline: Outline) -> None:
+        self._outline = outline
+        self.start: dict[Node, float] = dict.fromkeys(outline.nodes, math.inf)
+        self._stopped: dict[Node, float] = dict.fromkeys(outline.nodes, math.inf)
+
+    def improve(self, node: Node, start: float, stopped: float) -> bool:
+        """Earlier times for an element; False where these were known."""
+        better = start < self.start[node] or stopped < self._stopped[node]
+        self.start[node] = min(start, self.start[node])
+        self._stopped[node] = min(stopped, self._stopped[node])
+        return better
+
+    def truth(self, condition: Condition, owner: Node, starts: bool) -> Truth:
+        """When a condition on states can hold for a trigger that starts or stops its owner."""
+        question = _question(condition)
+        assert question is not None
+        state = question.state
+        meant = self._outline.find(question.storyboard_element_type, question.storyboard_element_ref)
+        if not meant:
+            return OPEN
+        around = [*owner.above(), *(() if starts else (owner,))]
+        if all(node in around for node in meant):
+            return _around(meant[0], state, owner)
+        if meant == [owner] and owner.limit == 1:
+            if state is StoryboardElementState.STANDBY_STATE:
+                return Truth(steady=f"{owner.title} stands by as long as it waits")
+            return never(f"{owner.title} waits for itself", WAITS)
+        spoken = " or ".join(reason for node in meant if (reason := self._unreal(node, state)))
+        if spoken and all(self._unreal(node, state) for node in meant):
+            return never(spoken, STATE)
+        earliest = min(self._earliest(node, state) for node in meant)
+        if earliest == math.inf:
+            return never(self._missed(meant[0], state), WAITS)
+        return Truth(((earliest, math.inf),))
+
+    def _unreal(self, node: Node, state: StoryboardElementState) -> str:
+        """Why an element of this make never is in a state, "" where it may be."""
+        if state is StoryboardElementState.SKIP_TRANSITION:
+            if not isinstance(node.element, Event):
+                return f"only events are skipped, {node.title} is none"
+            if node.element.priority is not Priority.SKIP:
+                return f"{node.title} has the priority {node.element.priority.value!r}; only 'skip' is ever skipped"
+        if state is StoryboardElementState.STOP_TRANSITION and not _can_be_stopped(node):
+            return f"nothing stops {node.title}"
+        if state is StoryboardElementState.END_TRANSITION and isinstance(node.element, Action):
+            endless = never_ends(node.element)
+            return f"{node.title} does not end by itself: {endless}" if endless else ""
+        return ""
+
+    def _earliest(self, node: Node, state: StoryboardElementState) -> float:
+        match state:
+            case StoryboardElementState.STANDBY_STATE:
+                return self.start[node.parent] if node.parent else 0.0
+            case StoryboardElementState.COMPLETE_STATE:
+                return self._complete(node)
+            case StoryboardElementState.END_TRANSITION:
+                return self._end(node)
+            case StoryboardElementState.STOP_TRANSITION:
+                return self._stop(node)
+        return self.start[node]
+
+    def _end(self, node: Node) -> float:
+        if node.level in (StoryboardElementType.EVENT, StoryboardElementType.ACTION):
+            return self.start[node]
+        if not node.children:
+            return math.inf
+        return max(self.start[node], *(self._complete(child) for child in node.children))
+
+    def _stop(self, node: Node) -> float:
+        """By its own trigger, with those above it, by another event of its maneuver, by another action."""
+        times = [self._stopped[one] for one in (node, *node.above())]
+        event = node.parent if isinstance(node.element, Action) else node
+        if isinstance(node.element, Action):
+            times.append(self.start[node])
+        if event is not None and isinstance(event.element, Event):
+            times += [max(self.start[event], self.start[rival]) for rival in _rivals(event)]
+        return min(times)
+
+    def _complete(self, node: Node) -> float:
+        return min(self._end(node), self._stop(node))
+
+    def _missed(self, node: Node, state: StoryboardElementState) -> str:
+        """Why a state is never reached."""
+        if self.start[node] == math.inf:
+            return f"{node.title} never starts"
+        if state is StoryboardElementState.STOP_TRANSITION:
+            return f"{node.title} is never stopped"
+        late = next((one for one in node.walk() if self.start[one] == math.inf), None)
+        return f"{node.title} never ends, as {late.title} never starts" if late else f"{node.title} never ends"
+
+
+def _around(node: Node, state: StoryboardElementState, owner: Node) -> Truth:
+    """Of an element that runs as long as the trigger is asked."""
+    runs = f"{node.title} runs as long as {owner.title} waits" if node is not owner else f"{node.title} runs"
+    if state is StoryboardElementState.RUNNING_STATE:
+        return Truth(ALWAYS, steady=runs)
+    if state is StoryboardElementState.START_TRANSITION:
+        return Truth(ALWAYS, risen=f"{node.title} has started before {owner.title} first looks")
+    if state is StoryboardElementState.STANDBY_STATE:
+        return never(f"{runs}, so it does not stand by", STATE)
+    if state in _AFTER:
+        return never(f"{node.title} is not over before {owner.title} is", WAITS)
+    return never(f"only events are skipped, {node.title} is none", STATE)
+
+
+def _can_be_stopped(node: Node) -> bool:
+    if isinstance(node.element, Action):
+        return True
+    acts = [one for one in (node, *node.above()) if one.level is StoryboardElementType.ACT]
+    stopped = any(getattr(act.element, "stop_trigger", None) is not None for act in acts)
+    return stopped or bool(_rivals(node))
+
+
+def _rivals(node: Node) -> list[Node]:
+    """The other events of its maneuver that end it when they start."""
+    if not isinstance(node.element, Event) or node.parent is None:
+        return []
+    others = [one for one in node.parent.children if one is not node]
+    return [one for one in others if isinstance(one.element, Event) and one.element.priority in _OVERRIDING]
