@@ -22,10 +22,11 @@ from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
-from eidrive_scenario.storyboard.behaviour import ActionBehaviour, Domain
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.storyboard.condition import Condition, EntityCondition, compares, in_words
 from eidrive_scenario.storyboard.distances import box_of, distance, frame_of, kind_of
+from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
 from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve
 from eidrive_scenario.storyboard.progress import Progress, Watch

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from enum import Flag, auto
 from typing import ClassVar
 
 import py_trees
@@ -12,17 +11,8 @@ from py_trees.common import Status
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.storyboard.actor import Actor
+from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.stage import Stage
-
-
-class Domain(Flag):
-    """What of an actor an action controls. Of two actions on one domain the younger ends the older."""
-
-    NONE = 0
-    LONGITUDINAL = auto()
-    LATERAL = auto()
-    LIGHTING = auto()
-    ANIMATION = auto()
 
 
 class ActionBehaviour(py_trees.behaviour.Behaviour):

@@ -11,14 +11,13 @@ from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition, EntityCondition
 from eidrive_scenario.storyboard.elements import (
     ActElement,
-    ActionElement,
-    EventElement,
-    InitBlock,
     ManeuverElement,
     ManeuverGroupElement,
     StoryboardElement,
     StoryNode,
 )
+from eidrive_scenario.storyboard.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.init_block import InitBlock
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
 

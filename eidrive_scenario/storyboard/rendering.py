@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eidrive_scenario.storyboard.elements import ActionElement, EventElement, ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.elements import ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 Branch = tuple[str, list["Branch"]]

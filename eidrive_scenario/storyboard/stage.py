@@ -10,6 +10,7 @@ from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.commands import Commands, Override
+from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.progress import Progress
 from eidrive_scenario.world.view import WorldView
@@ -74,7 +75,7 @@ class Stage:
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
             for name, entity in scenario.entities.items()
         }
-        self._holders: list[tuple[str, object, Occupant, Holder]] = []
+        self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
 
     @property
     def time(self) -> float:
@@ -152,12 +153,12 @@ class Stage:
             )
         return entry
 
-    def occupy(self, actor: str | None, domains: object, occupant: Occupant, holder: Holder) -> None:
+    def occupy(self, actor: str | None, domains: Domain, occupant: Occupant, holder: Holder) -> None:
         """A behaviour begins to control domains of an actor; older ones on these domains end."""
         if actor is None or not domains:
             return
         for held, other_domains, other, behaviour in list(self._holders):
-            if held == actor and other_domains & domains and behaviour.resource == holder.resource:  # type: ignore[operator]
+            if held == actor and other_domains & domains and behaviour.resource == holder.resource:
                 self._holders = [entry for entry in self._holders if entry[3] is not behaviour]
                 other.displace(behaviour, f"{holder.name} took over")
         self._holders.append((actor, domains, occupant, holder))

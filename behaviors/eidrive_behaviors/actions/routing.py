@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.teleport import position_in_words
 from eidrive_scenario.api import (
     ActionBehaviour,
     EidriveError,
@@ -68,7 +69,7 @@ class AcquirePositionAction(ActionBehaviour):
 
     def describe(self) -> str:
         """Where to."""
-        return f"drive to {type(self.action.position.chosen()).__name__}"
+        return f"drive to {position_in_words(self.action.position)}"
 
 
 def follow(behaviour: ActionBehaviour, route: Route) -> None:

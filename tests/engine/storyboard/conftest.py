@@ -11,8 +11,9 @@ from py_trees.common import Status
 
 from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.behaviour import ActionBehaviour, Domain
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition
+from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.view import WorldView

@@ -6,17 +6,16 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.behaviour import Domain
+from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.elements import (
     ActElement,
-    ActionElement,
-    EventElement,
-    InitBlock,
     ManeuverElement,
     ManeuverGroupElement,
     StoryboardElement,
     StoryNode,
 )
+from eidrive_scenario.storyboard.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.init_block import InitBlock
 from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
 
 YES, NO = True, False
@@ -77,9 +76,7 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
     return seen
 
 
-def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(
-    clock: Any, make: Any, task: Any
-) -> None:
+def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
     first, second, third = play(clock, root, 3)
     assert first == [
@@ -113,9 +110,7 @@ def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, tas
     ]
 
 
-def test_an_act_is_stopped_alone_from_the_tick_after_its_start(
-    clock: Any, make: Any, task: Any
-) -> None:
+def test_an_act_is_stopped_alone_from_the_tick_after_its_start(clock: Any, make: Any, task: Any) -> None:
     one = make.act(make.group(make.maneuver(make.event("one", task(9)))), stop=[NO, YES], name="first")
     two = make.act(make.group(make.maneuver(make.event("two", task(9)))), name="second")
     ticks = play(clock, make.storyboard(one, two), 3)
@@ -176,9 +171,7 @@ def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, mak
     assert root.state.name == "RUNNING"
 
 
-def test_a_younger_action_ends_an_older_one_on_the_same_domain(
-    clock: Any, make: Any, task: Any
-) -> None:
+def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make: Any, task: Any) -> None:
     slow = make.event("slow", task(9, actor="A", domain=Domain.LONGITUDINAL))
     aside = make.event("aside", task(9, actor="A", domain=Domain.LATERAL))
     other = make.event("other", task(9, actor="B", domain=Domain.LONGITUDINAL))

@@ -1,0 +1,61 @@
+"""The actions of Init: what holds before the first view, and what goes on from there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from eidrive_scenario.storyboard.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.stage import Absent, Holder, Stage
+
+
+class InitBlock(Composite):
+    """The actions of Init. Those that need time go on until they end or a younger action takes their domain."""
+
+    def __init__(self, stage: Stage, behaviours: Sequence[ActionBehaviour]) -> None:
+        super().__init__("Init", list(behaviours))
+        self.stage = stage
+        self.actions = tuple(behaviours)
+        self.running: list[ActionBehaviour] = list(behaviours)
+
+    def start(self) -> None:
+        """Do what holds before the first view, in the order of the file.
+
+        An action whose position refers to an entity that is placed further below waits for it. Raises ScenarioError
+        where entities refer to each other in a circle.
+        """
+        waiting = list(self.running)
+        while waiting:
+            late = [behaviour for behaviour in waiting if not self._started(behaviour)]
+            if len(late) == len(waiting):
+                raise late[0].problem("refers to an entity that nobody places", "place that entity in Init")
+            waiting = late
+
+    def _started(self, behaviour: ActionBehaviour) -> bool:
+        try:
+            behaviour.tick_once()
+        except Absent:
+            behaviour.stop(Status.INVALID)
+            return False
+        if behaviour.status is Status.RUNNING:
+            self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
+        else:
+            self.running.remove(behaviour)
+        return True
+
+    def displace(self, behaviour: Holder, why: str) -> None:
+        """A younger action took the domain."""
+        self.running = [other for other in self.running if other is not behaviour]
+
+    def tick(self) -> Iterator[Behaviour]:
+        """The running ones decide on the next step."""
+        for behaviour in tuple(self.running):
+            yield from behaviour.tick()
+            if behaviour.status is not Status.RUNNING:
+                self.running.remove(behaviour)
+                self.stage.release(behaviour)
+        self.status = Status.RUNNING if self.running else Status.SUCCESS
+        yield self
