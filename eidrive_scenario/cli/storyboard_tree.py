@@ -6,7 +6,8 @@ from rich.text import Text
 from rich.tree import Tree
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.elements import ActionElement, EventElement, ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.elements import ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 _KINDS = {"maneuverGroup": "maneuver group"}
