@@ -40,7 +40,7 @@ def _relative_world(frame: model.RelativeWorldPosition, stage: Stage, actor: str
     origin = stage.pose(frame.entity_ref)
     x, y, z = origin.x + frame.dx, origin.y + frame.dy, origin.z + (frame.dz or 0.0)
     h, p, r = _angles(frame.orientation, origin)
-    return _on_ground(stage, Pose(x, y, z, h, p, r), z_given=bool(frame.dz))
+    return _on_ground(stage, Pose(x, y, z, h, p, r), z_given=bool(frame.dz), near=frame.entity_ref)
 
 
 def _relative_object(frame: model.RelativeObjectPosition, stage: Stage, actor: str | None) -> Place:
@@ -49,7 +49,9 @@ def _relative_object(frame: model.RelativeObjectPosition, stage: Stage, actor: s
     x = origin.x + frame.dx * cos - frame.dy * sin
     y = origin.y + frame.dx * sin + frame.dy * cos
     h, p, r = _angles(frame.orientation, origin)
-    return _on_ground(stage, Pose(x, y, origin.z + (frame.dz or 0.0), h, p, r), z_given=bool(frame.dz))
+    return _on_ground(
+        stage, Pose(x, y, origin.z + (frame.dz or 0.0), h, p, r), z_given=bool(frame.dz), near=frame.entity_ref
+    )
 
 
 def _road(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
@@ -216,11 +218,11 @@ def _angles(orientation: model.Orientation | None, base: Pose) -> tuple[float, f
     return h, p, r
 
 
-def _on_ground(stage: Stage, pose: Pose, *, z_given: bool) -> Place:
-    """The place of a pose in the world: on the road below it where there is one."""
+def _on_ground(stage: Stage, pose: Pose, *, z_given: bool, near: str | None = None) -> Place:
+    """The place of a pose in the world: on the road below it where there is one, first looked for `near` an actor."""
     if stage.roads is None:
         return Place(pose)
-    here = stage.roads.locate_at(pose.x, pose.y)
+    here = stage.roads.locate_at(pose.x, pose.y, None if near is None else stage.location(near))
     if here is None:
         return Place(pose)
     if not z_given:

@@ -1,0 +1,19 @@
+"""Rules of `eidrive check` that need the roads; those that need nothing but the file are in `openscenario.lint`."""
+
+from __future__ import annotations
+
+from eidrive_scenario.openscenario.lint import Level, Rule
+from eidrive_scenario.storyboard.lint import paths, places
+from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+
+ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
+    Rule("no-such-place", Level.ERROR, "a position that the road network does not have", places.missing_places),
+    Rule("no-route", Level.ERROR, "a route between whose waypoints no lanes lead", paths.impossible_routes),
+    Rule("no-such-lane", Level.WARNING, "a change to a lane that no road has", places.missing_lanes),
+    Rule("no-such-signal", Level.WARNING, "a traffic signal that no road has", places.missing_signals),
+    Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", paths.trajectories_off_road),
+    Rule("waypoint-off-road", Level.WARNING, "a waypoint beside the road", paths.waypoints_off_road),
+)
+"""The rules that ask where something is."""
+
+__all__ = ["ROAD_RULES", "RoadSurvey"]

@@ -1,0 +1,133 @@
+"""Rules on ways: trajectories and waypoints off the road, routes that lead nowhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.openscenario.lint import at
+from eidrive_scenario.openscenario.model import (
+    AssignRouteAction,
+    FollowTrajectoryAction,
+    Position,
+    Route,
+    RouteRef,
+    Trajectory,
+    TrajectoryRef,
+    Vehicle,
+)
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.storyboard.route import route_of
+from eidrive_scenario.storyboard.trajectory import Layout, lay_out
+
+MARGIN = 2.0
+"""How far from the outermost lane a vehicle may be and still count as on the road [m]: a bay, a verge."""
+SPACING = 2.0
+"""Distance between the points of a trajectory that are looked at [m]."""
+
+
+class _Relative(Exception):
+    """A position depends on where somebody is."""
+
+
+def trajectories_off_road(survey: RoadSurvey) -> Iterator[Problem]:
+    """A trajectory of a vehicle that leaves all roads."""
+    if survey.roads is None:
+        return
+    for action, actors in survey.performances:
+        for element in action.walk():
+            if isinstance(element, FollowTrajectoryAction) and _vehicles(survey, actors):
+                trajectory = _trajectory(survey, element.trajectory_ref or element)
+                layout = _layout(survey, trajectory) if trajectory is not None else None
+                if trajectory is not None and layout is not None:
+                    yield from _leaves(survey, element, trajectory, layout)
+
+
+def _leaves(
+    survey: RoadSurvey, action: FollowTrajectoryAction, trajectory: Trajectory, layout: Layout
+) -> Iterator[Problem]:
+    count = max(2, math.ceil(layout.length / SPACING) + 1)
+    along = [layout.length * number / (count - 1) for number in range(count)]
+    points = [layout.at(s) for s in along]
+    outside = survey.outside([point.x for point in points], [point.y for point in points])
+    first = next((number for number, gap in enumerate(outside) if gap > MARGIN), None)
+    if first is not None:
+        where = points[first]
+        yield at(
+            action,
+            f"the trajectory {trajectory.name!r} leaves the road after {along[first]:.0f} m, at x = {where.x:.1f}, "
+            f"y = {where.y:.1f}; it gets {max(outside):.1f} m away from it",
+            "move its points onto a lane, or check the road file",
+        )
+
+
+def _layout(survey: RoadSurvey, trajectory: Trajectory) -> Layout | None:
+    """The trajectory in the world, None where it depends on somebody or a point of it is nowhere."""
+
+    def pose(position: Position) -> Pose:
+        place = survey.place(position)
+        if place is None:
+            raise _Relative
+        return place.pose
+
+    spline = trajectory.shape.clothoid_spline
+    if spline is not None and spline.clothoid_spline_segment[0].position_start is None:
+        return None
+    try:
+        return lay_out(trajectory, pose)
+    except (_Relative, InputError, ValueError, ZeroDivisionError):
+        return None
+
+
+def _trajectory(survey: RoadSurvey, given: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
+    if given.trajectory is not None or given.catalog_reference is None:
+        return given.trajectory
+    entry = survey.scenario.entries.get(given.catalog_reference)
+    return entry if isinstance(entry, Trajectory) else None
+
+
+def waypoints_off_road(survey: RoadSurvey) -> Iterator[Problem]:
+    """A waypoint beside the road."""
+    if survey.roads is None:
+        return
+    for route in _routes(survey):
+        for waypoint in route.waypoint:
+            if id(waypoint.position) in survey.lost or (place := survey.place(waypoint.position)) is None:
+                continue
+            gap = survey.outside([place.pose.x], [place.pose.y])[0]
+            if gap > MARGIN:
+                yield at(waypoint, f"the waypoint is {gap:.1f} m off the road", "move it onto a lane")
+
+
+def impossible_routes(survey: RoadSurvey) -> Iterator[Problem]:
+    """A route between whose waypoints no lanes lead."""
+    if survey.roads is None:
+        return
+    for route in _routes(survey):
+        positions = [waypoint.position for waypoint in route.waypoint]
+        if any(id(position) in survey.lost or survey.place(position) is None for position in positions):
+            continue
+        try:
+            route_of(route, survey.roads, survey.place)  # type: ignore[arg-type]
+        except InputError as error:
+            for problem in error.problems:
+                yield at(route, f"route {route.name!r}: {problem.message}", problem.remedy or "change its waypoints")
+
+
+def _routes(survey: RoadSurvey) -> Iterator[Route]:
+    """Routes that the scenario uses, each once."""
+    routes = []
+    for element in survey.elements:
+        if isinstance(element, AssignRouteAction | RouteRef):
+            entry = element.route or (
+                survey.scenario.entries.get(element.catalog_reference) if element.catalog_reference else None
+            )
+            if isinstance(entry, Route):
+                routes.append(entry)
+    yield from {id(route): route for route in routes}.values()
+
+
+def _vehicles(survey: RoadSurvey, actors: tuple[str, ...]) -> bool:
+    return any(isinstance(survey.scenario.entities.get(name), Vehicle) for name in actors)
