@@ -18,25 +18,32 @@ _SUFFIX = ".xosc"
 def check(
     paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or names of the library.")],
 ) -> None:
-    """Print every mistake in scenarios as `file:line: what is wrong; what would be right`."""
+    """Print every mistake in scenarios and distributions as `file:line: what is wrong; what would be right`."""
+    from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
     from eidrive_scenario.experiments.inspection import inspect_scenario
 
     files = list(_files(paths))
-    wrong = warnings = 0
+    problems: dict[Problem, None] = {}
+    warnings: dict[Problem, None] = {}
     for path in files:
         kind = definition(path)
-        if kind in ("catalog", "distribution"):
-            typer.echo(f"{path}: a {kind}, checked with the scenarios that use it")
+        if kind == "catalog":
+            typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
             continue
-        findings = inspect_scenario(path)
+        findings = inspect_distribution(path) if kind == "distribution" else inspect_scenario(path)
         for problem in findings.problems:
-            typer.echo(str(problem))
+            if problem not in problems:
+                typer.echo(str(problem))
         for problem in findings.warnings:
-            typer.echo(f"{problem} (warning)")
-        wrong += len(findings.problems)
-        warnings += len(findings.warnings)
-    typer.echo(f"{_count(len(files), 'file')}, {_count(wrong, 'problem')}, {_count(warnings, 'warning')}")
-    raise typer.Exit(WRONG_INPUT if wrong else 0)
+            if problem not in warnings:
+                typer.echo(f"{problem} (warning)")
+        if isinstance(findings, DistributionFindings) and findings.runs:
+            typer.echo(f"{path}: {_count(findings.runs, 'run')}")
+        problems.update(dict.fromkeys(findings.problems))
+        warnings.update(dict.fromkeys(findings.warnings))
+    counts = _count(len(files), "file"), _count(len(problems), "problem"), _count(len(warnings), "warning")
+    typer.echo(", ".join(counts))
+    raise typer.Exit(WRONG_INPUT if problems else 0)
 
 
 def _files(paths: list[str]) -> Iterator[Path]:

@@ -10,11 +10,16 @@ import typer
 from eidrive_scenario.errors import Problem, SettingError
 
 if TYPE_CHECKING:
-    pass
+    from eidrive_scenario.openscenario import ConcreteRun
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library such as coop/scenario_1.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="An .xosc file, or a name of the library such as coop/scenario_1. A distribution is played run by run."
+        ),
+    ],
     channel: Annotated[
         str | None,
         typer.Option(help="Channel profile, by name or file; none: no cooperation.", show_default="the file's"),
@@ -28,6 +33,9 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with seeds from --seed on.")] = 1,
+    max_runs: Annotated[
+        int | None, typer.Option(min=1, help="Most runs of a distribution, spread over its values.", show_default="all")
+    ] = None,
     dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
     time_limit: Annotated[float, typer.Option(help="Longest simulated time, in seconds.")] = 120.0,
     out: Annotated[Path | None, typer.Option(help="Folder for recording.mcap and result.json.")] = None,
@@ -35,36 +43,49 @@ def run(
     csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run, nothing else.")] = False,
 ) -> None:
-    """Play a scenario and judge it."""
+    """Play a scenario and judge it, or every run of a distribution of parameter values."""
+    from eidrive_scenario.cli.batch import play_all
     from eidrive_scenario.cli.verdicts import show
     from eidrive_scenario.experiments.single_run import as_json_text, play
+    from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.simulation import RunSettings
 
+    parameters = _parameters(param or [])
     settings = RunSettings(
         channel=channel,
         detector=detector,
         cooperate=_senders(cooperate),
-        parameters=_parameters(param or []),
+        parameters=parameters,
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
     )
-    code = 0
-    for each in range(seed, seed + repeat):
-        mark = f"seed-{each}" if repeat > 1 else ""
-        result = play(
-            scenario,
-            seed=each,
-            settings=settings,
-            out=out / mark if out is not None else None,
-            record=not no_record,
-            csv=csv.with_stem(f"{csv.stem}-{mark}") if csv is not None and mark else csv,
-        )
-        if json:
-            typer.echo(as_json_text(result))
-        else:
-            show(result)
-        code = max(code, result.exit_code)
-    raise typer.Exit(code)
+
+    def play_seeds(source: Path | ConcreteRun) -> int:
+        code = 0
+        marks = [] if isinstance(source, Path) else [f"run-{source.number}"]
+        for each in range(seed, seed + repeat):
+            mark = [*marks, f"seed-{each}"] if repeat > 1 else marks
+            result = play(
+                source,
+                seed=each,
+                settings=settings,
+                out=out.joinpath(*mark) if out is not None else None,
+                record=not no_record,
+                csv=csv.with_stem("-".join([csv.stem, *mark])) if csv is not None else None,
+            )
+            if json:
+                typer.echo(as_json_text(result))
+            else:
+                show(result, varied="" if isinstance(source, Path) else str(source))
+            code = max(code, result.exit_code)
+        return code
+
+    path = resolve_scenario(scenario)
+    if definition(path) == "distribution":
+        raise typer.Exit(play_all(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
+    if max_runs is not None:
+        raise SettingError(Problem(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path)))
+    raise typer.Exit(play_seeds(path))
 
 
 def _senders(text: str | None) -> tuple[str, ...] | None:
@@ -74,7 +95,7 @@ def _senders(text: str | None) -> tuple[str, ...] | None:
 
 
 def _parameters(assignments: list[str]) -> dict[str, str]:
-    parameters = {}
+    parameters: dict[str, str] = {}
     for assignment in assignments:
         name, equals, value = assignment.partition("=")
         if not equals or not name:

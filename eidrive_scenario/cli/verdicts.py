@@ -21,11 +21,14 @@ def console() -> Console:
     return Console(highlight=False, width=180)
 
 
-def show(result: RunResult) -> None:
-    """Print verdicts, end, fingerprint and speed."""
+def show(result: RunResult, varied: str = "") -> None:
+    """Print verdicts, end, fingerprint and speed; for a run of a distribution, with the parameters that it varies."""
     out = console()
     word, style = ("passed", "bold green") if result.passed else ("failed", "bold red")
-    title = Text.assemble((result.scenario, "bold"), f"  seed {result.seed}  channel {result.channel}  ", (word, style))
+    run = "" if result.run is None else f"  run {result.run} ({varied})"
+    title = Text.assemble(
+        (result.scenario, "bold"), f"{run}  seed {result.seed}  channel {result.channel}  ", (word, style)
+    )
     out.print(title)
     if result.criteria:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))

@@ -6,13 +6,13 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording import CsvWriter, Recorder
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
@@ -22,7 +22,7 @@ RECORDING, RESULT, TABLE = "recording.mcap", "result.json", "motion.csv"
 
 
 def play(
-    source: str | Path,
+    source: str | Path | ConcreteRun,
     *,
     seed: int = 1,
     settings: RunSettings | None = None,
@@ -30,15 +30,22 @@ def play(
     record: bool = True,
     csv: Path | None = None,
 ) -> RunResult:
-    """Run a scenario, given by path or library name.
+    """Run a scenario, given by path or library name, or one run out of a parameter value distribution.
 
     out     folder for `recording.mcap` (unless `record` is False) and `result.json`
     csv     file for one row per actor and tick
 
-    Raises InputError for a wrong scenario, setting or place to write.
+    Parameters in `settings` win over those of the distribution. Raises InputError for a wrong scenario, setting or
+    place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
     settings = settings or RunSettings()
-    path = resolve_scenario(source)
+    number = None
+    if isinstance(source, ConcreteRun):
+        number = source.number
+        settings = replace(settings, parameters={**source.assignments, **settings.parameters})
+        path = source.scenario
+    else:
+        path = resolve_scenario(source)
     scenario = load_for_seed(path, seed, settings.parameters)
     observers: list[Observer] = []
     with ExitStack() as stack:
@@ -48,10 +55,11 @@ def play(
         if out is not None and record:
             attachments = _attachments(path, scenario)
             observers.append(
-                Recorder(out / RECORDING, metadata=_told(scenario, seed, settings), attachments=attachments)
+                Recorder(out / RECORDING, metadata=_told(scenario, seed, number, settings), attachments=attachments)
             )
             stack.callback(observers[-1].close)
         result = Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
+    result = replace(result, run=number)
     if out is not None:
         with create(out / RESULT) as stream:
             stream.write(as_json_text(result, indent=2).encode() + b"\n")
@@ -71,9 +79,11 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _told(scenario: Scenario, seed: int, settings: RunSettings) -> dict[str, str]:
+def _told(scenario: Scenario, seed: int, run: int | None, settings: RunSettings) -> dict[str, str]:
     """What the run was told, as texts; what was left to the file is not there."""
     told = {name: value for name, value in asdict(settings).items() if value is not None and name != "parameters"}
+    if run is not None:
+        told["run"] = run
     if settings.cooperate is not None:
         told["cooperate"] = ",".join(settings.cooperate) or "none"
     texts = {name: str(value) for name, value in told.items()}

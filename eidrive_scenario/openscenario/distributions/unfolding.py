@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -15,6 +17,8 @@ from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.openscenario.parsing import Source, open_document
+
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,20 @@ class Unfolding(Sequence[ConcreteRun]):
             return tuple(self[each] for each in range(*index.indices(len(self))))
         number = range(len(self))[index]
         return ConcreteRun(self.scenario, number, self.varied.at(number))
+
+    def spread(self, count: int) -> Sequence[int]:
+        """Numbers of `count` runs, or of all if there are no more, ascending.
+
+        Combinations are picked all over: a part of them leaves out no value of a parameter that varies fast, and jumps
+        evenly through those that vary slowly. A greater count adds runs to those of a smaller one. Of draws, which are
+        alike, it is the first.
+        """
+        if count >= len(self) or isinstance(self.varied, Draws):
+            return range(min(count, len(self)))
+        # Steps of the golden ratio are the most even ones for any count (Weyl); without a common divisor they meet
+        # every run before one comes again, and in the digits of a mixed radix every value.
+        step = next(step for step in itertools.count(round(len(self) * _GOLDEN)) if math.gcd(step, len(self)) == 1)
+        return sorted(index * step % len(self) for index in range(count))
 
 
 def load_distribution(source: Source, *, seed: float = 0) -> Unfolding:

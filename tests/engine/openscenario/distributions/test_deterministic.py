@@ -114,6 +114,22 @@ def test_runs_are_made_one_by_one(distribution_file: Write) -> None:
     assert late < early + 20_000
 
 
+def test_some_of_many_runs_are_spread_over_all_values(distribution_file: Write) -> None:
+    sizes = {"A": 5, "B": 4, "C": 7, "D": 6}
+    runs = load_distribution(distribution_file(deterministic(*(steps(n, "1", str(m), "1") for n, m in sizes.items()))))
+    assert len(runs) == 840
+    for name, size in sizes.items():
+        taken = [runs[number].parameters[name] for number in runs.spread(2 * size)]
+        assert len(taken) == 2 * size
+        often = {value: taken.count(value) for value in taken}
+        assert max(often.values()) <= 4, "twice each on average"
+        assert len(often) >= size - 1
+    assert set(runs.spread(10)) < set(runs.spread(50))
+    assert runs.spread(50) == sorted(runs.spread(50))
+    assert list(runs.spread(839)) != list(range(839))
+    assert list(runs.spread(840)) == list(runs.spread(10**6)) == list(range(840))
+
+
 @pytest.mark.parametrize(
     ("distributions", "line", "message"),
     [

@@ -158,6 +158,9 @@ class TestReproducibility:
             assert stats.pearsonr(left, right).pvalue > LEVEL
             assert stats.pearsonr(left[1:], right[:-1]).pvalue > LEVEL
 
+    def test_some_of_many_draws_are_the_first(self, stochastic: Write) -> None:
+        assert list(load_distribution(stochastic(normal(0, 1), runs=50)).spread(3)) == [0, 1, 2]
+
     @pytest.mark.parametrize("seed", ["0", "7", "7.25", "-1", "1e300"])
     def test_the_seed_of_the_file_decides(self, distribution_file: Write, seed: str) -> None:
         given = distribution_file(self.BODY.format(runs=3, seed=f'randomSeed="{seed}"', inside=self.ONE.format("A")))
