@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.openscenario.model import Element
 
-S = TypeVar("S")
+S = TypeVar("S", contravariant=True)
 
 
 class Level(Enum):

@@ -1,0 +1,164 @@
+"""The rules of `eidrive check`: docs/checks.md names each of them, and each of its examples breaks its rule."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.experiments.rules import ALL_RULES, broken_rules
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario.lint import Level
+
+DOCUMENT = Path(__file__).parents[3] / "docs" / "checks.md"
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="street" length="200" id="1" junction="-1"><link/>
+  <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
+  <lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
+  <right><lane id="-1" type="driving" level="false"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
+  </laneSection></lanes></road></OpenDRIVE>"""
+
+CATALOG = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="cars" author="test"/>
+<Catalog name="cars"><Vehicle name="car" vehicleCategory="car">
+  <BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions length="4.5" width="1.8" height="1.5"/></BoundingBox>
+  <Performance maxSpeed="60" maxAcceleration="5" maxDeceleration="9"/>
+  <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
+  <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles>
+</Vehicle></Catalog></OpenSCENARIO>"""
+
+SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
+  <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>
+  <SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget>
+  </SpeedAction></LongitudinalAction></PrivateAction>"""
+
+TIME = """<ConditionGroup><Condition name="at {0} s" delay="0" conditionEdge="none"><ByValueCondition>
+  <SimulationTimeCondition rule="greaterOrEqual" value="{0}"/></ByValueCondition></Condition></ConditionGroup>"""
+
+PLACED = """<Private entityRef="{}"><PrivateAction><TeleportAction><Position>
+  <LanePosition roadId="1" laneId="-1" s="{}"/></Position></TeleportAction></PrivateAction></Private>"""
+
+SCENARIO = f"""<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="a scaffold" author="test"/>
+<ParameterDeclarations/><VariableDeclarations/><MonitorDeclarations/>
+<CatalogLocations><VehicleCatalog><Directory path="."/></VehicleCatalog></CatalogLocations>
+<RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
+<Entities>
+  <ScenarioObject name="Ego"><CatalogReference catalogName="cars" entryName="car"/></ScenarioObject>
+  <ScenarioObject name="Other"><CatalogReference catalogName="cars" entryName="car"/></ScenarioObject>
+</Entities>
+<Storyboard><Init><Actions>{PLACED.format("Ego", 10)}{PLACED.format("Other", 50)}</Actions></Init>
+<Story name="Story"><Act name="Act">
+  <ManeuverGroup name="Group" maximumExecutionCount="1">
+    <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
+    <Maneuver name="Maneuver">
+      <Event name="First" priority="override"><Action name="Speed">{SPEED}</Action>
+        <StartTrigger>{TIME.format(1)}</StartTrigger></Event>
+      <Event name="Later" priority="parallel"><Action name="Speed later">{SPEED}</Action>
+        <StartTrigger>{TIME.format(9)}</StartTrigger></Event>
+    </Maneuver>
+  </ManeuverGroup>
+</Act></Story>
+<StopTrigger>{TIME.format(20)}</StopTrigger></Storyboard></OpenSCENARIO>"""
+
+INTO = {
+    "EntitySelection": "Entities",
+    "Event": "Maneuver",
+    "ManeuverGroup": "Act",
+    "MonitorDeclaration": "MonitorDeclarations",
+    "ParameterDeclaration": "ParameterDeclarations",
+    "PedestrianCatalog": "CatalogLocations",
+    "Private": "Init/Actions",
+    "VariableDeclaration": "VariableDeclarations",
+}
+"""The element of the scaffold to which an example's element is added."""
+IN_PLACE_OF = {
+    "GlobalAction": "PrivateAction",
+    "PrivateAction": "PrivateAction",
+    "StartTrigger": "StartTrigger",
+}
+"""What of the first event an example's element replaces."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a road, 200 m with one lane, and a catalog with one car."""
+    (tmp_path / "street.xodr").write_text(ROAD, encoding="utf-8")
+    (tmp_path / "cars.xosc").write_text(CATALOG, encoding="utf-8")
+    return tmp_path
+
+
+def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Problem]]:
+    """What the rules find in the scaffold with elements put in their places."""
+    root = etree.fromstring(text)
+    for fragment in fragments:
+        for element in list(etree.fromstring(f"<Fragment>{fragment}</Fragment>")):
+            put(root, element)
+    path = folder / "scenario.xosc"
+    path.write_bytes(etree.tostring(root, pretty_print=True))
+    return list(broken_rules(load_scenario(path)))
+
+
+def put(root: etree._Element, element: etree._Element) -> None:
+    if element.tag == "StopTrigger":
+        old = root.find("Storyboard/StopTrigger")
+    elif element.tag in IN_PLACE_OF:
+        old = root.find(f".//Event[@name='First']//{IN_PLACE_OF[element.tag]}")
+    elif element.tag == "ScenarioObject":
+        root.find("Entities").insert(0, element)
+        return
+    else:
+        root.find(f".//{INTO[element.tag]}").append(element)
+        return
+    old.getparent().replace(old, element)
+
+
+def broken(folder: Path, *fragments: str) -> set[str]:
+    return {problem.rule for _, problem in findings(folder, *fragments)}
+
+
+def documented() -> Iterator[tuple[str, str, str]]:
+    """Name, level and example of each rule in docs/checks.md."""
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for part in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
+        heading, _, body = part.partition("\n")
+        name, level = re.fullmatch(r"`([a-z-]+)` \((\w+)\)", heading).groups()
+        examples = re.findall(r"^```xml\n(.*?)^```", body, flags=re.MULTILINE | re.DOTALL)
+        assert len(examples) == 1, name
+        after = body.rpartition("```")[2].partition("\n## ")[0].strip()
+        assert after, f"{name} has no remedy"
+        yield name, level, examples[0]
+
+
+EXAMPLES = {name: (level, example) for name, level, example in documented()}
+
+
+def test_the_document_has_every_rule_with_its_level() -> None:
+    assert {name: level for name, (level, _) in EXAMPLES.items()} == {r.name: r.level.value for r in ALL_RULES}
+    assert len(ALL_RULES) == len({rule.name for rule in ALL_RULES})
+
+
+def test_the_scaffold_breaks_no_rule(folder: Path) -> None:
+    assert findings(folder) == []
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> None:
+    level, example = EXAMPLES[name]
+    found = findings(folder, example)
+    assert {problem.rule for _, problem in found} == {name}
+    assert {level.value for level, _ in found} == {level}
+    for _, problem in found:
+        assert problem.source == str(folder / "scenario.xosc")
+        assert problem.line is not None
+        assert problem.remedy
+
+
+def test_a_rule_can_be_left_out(folder: Path) -> None:
+    findings(folder, "<StopTrigger/>")
+    scenario = load_scenario(folder / "scenario.xosc")
+    assert list(broken_rules(scenario, ["no-stop-trigger"])) == []
+    with pytest.raises(SettingError, match="there is no rule 'no-stop'; did you mean 'no-stop-trigger'"):
+        list(broken_rules(scenario, ["no-stop"]))

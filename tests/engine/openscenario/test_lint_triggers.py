@@ -1,0 +1,285 @@
+"""What the rules say about triggers, worked out by hand from the standard's words on edges, delays and states."""
+
+from collections.abc import Callable
+
+import pytest
+
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario.lint import RULES, Survey
+
+PLACE = """<Private entityRef="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
+</TeleportAction></PrivateAction></Private>"""
+SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>
+<SpeedActionTarget>{}</SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction>"""
+ABSOLUTE = '<AbsoluteTargetSpeed value="10"/>'
+FOREVER = '<RelativeTargetSpeed entityRef="Ego" value="0" speedTargetValueType="delta" continuous="true"/>'
+STOP = '<SimulationTimeCondition rule="greaterThan" value="60"/>'
+
+GREATER, AT_LEAST, LESS, EQUAL = "greaterThan", "greaterOrEqual", "lessThan", "equalTo"
+
+
+def time(rule: str, value: float) -> str:
+    return f'<ByValueCondition><SimulationTimeCondition rule="{rule}" value="{value}"/></ByValueCondition>'
+
+
+def state(kind: str, name: str, what: str) -> str:
+    return (
+        f'<ByValueCondition><StoryboardElementStateCondition storyboardElementType="{kind}" '
+        f'storyboardElementRef="{name}" state="{what}"/></ByValueCondition>'
+    )
+
+
+def entity(condition: str, name: str = "Ego") -> str:
+    return (
+        f'<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="{name}"/>'
+        f"</TriggeringEntities><EntityCondition>{condition}</EntityCondition></ByEntityCondition>"
+    )
+
+
+def parameter(name: str) -> str:
+    return f'<ByValueCondition><ParameterCondition parameterRef="{name}" rule="equalTo" value="1"/></ByValueCondition>'
+
+
+def when(what: str, edge: str = "none", delay: float = 0) -> str:
+    return f'<Condition name="a condition" delay="{delay}" conditionEdge="{edge}">{what}</Condition>'
+
+
+def trigger(*groups: str, kind: str = "StartTrigger") -> str:
+    return f"<{kind}>{''.join(f'<ConditionGroup>{group}</ConditionGroup>' for group in groups)}</{kind}>"
+
+
+def event(name: str, start: str = "", *, priority: str = "parallel", count: int = 1, target: str = ABSOLUTE) -> str:
+    action = f'<Action name="{name} action">{SPEED.format(target)}</Action>'
+    return f'<Event name="{name}" priority="{priority}" maximumExecutionCount="{count}">{action}{start}</Event>'
+
+
+def act(events: str, start: str = "", stop: str = "", name: str = "act") -> str:
+    return f"""<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
+<Maneuver name="{name} maneuver">{events}</Maneuver></ManeuverGroup>{start}{stop}</Act>"""
+
+
+Check = Callable[..., list[str]]
+
+
+@pytest.fixture
+def check(scenario_xml: Callable[..., bytes]) -> Check:
+    """The rules that a story of these acts breaks, in the order of the file."""
+
+    def found(*acts: str, **parts: str) -> list[str]:
+        story = f'<Story name="story">{"".join(acts)}</Story>'
+        stop = parts.pop(
+            "stop", f"<ConditionGroup>{when(f'<ByValueCondition>{STOP}</ByValueCondition>')}</ConditionGroup>"
+        )
+        init = parts.pop("init", PLACE)
+        scenario = load_scenario(scenario_xml(story=story, init=init, stop=stop, **parts))
+        survey = Survey(scenario)
+        problems = [problem for rule in RULES for problem in rule.findings(survey)]
+        return [problem.rule for problem in sorted(problems, key=lambda problem: problem.line or 0)]
+
+    return found
+
+
+@pytest.mark.parametrize(
+    ("condition", "edge", "expected"),
+    [
+        (time(GREATER, 0), "rising", []),
+        (time(GREATER, 0), "none", []),
+        (time(AT_LEAST, 0), "none", []),
+        (time(AT_LEAST, 0), "rising", ["swallowed-edge"]),
+        (time(GREATER, -1), "rising", ["swallowed-edge"]),
+        (time(GREATER, -1), "risingOrFalling", ["swallowed-edge"]),
+        (time(GREATER, 5), "falling", ["swallowed-edge"]),
+        (time(LESS, 3), "rising", ["swallowed-edge"]),
+        (time(LESS, 3), "falling", []),
+        (time(LESS, 3), "risingOrFalling", []),
+        (time(LESS, 0), "none", ["impossible-condition"]),
+        (time(EQUAL, 0), "none", []),
+        (time(EQUAL, 0), "rising", ["swallowed-edge"]),
+        (time(EQUAL, -2), "none", ["impossible-condition"]),
+        (time(EQUAL, 4), "rising", ["equal-time"]),
+        (time("notEqualTo", 4), "rising", []),
+        (time("notEqualTo", 0), "rising", []),
+    ],
+)
+def test_time_at_the_start_of_an_act(check: Check, condition: str, edge: str, expected: list[str]) -> None:
+    assert check(act(event("go"), trigger(when(condition, edge)))) == expected
+
+
+def test_an_event_first_looks_when_its_act_runs(check: Check) -> None:
+    positive = when(time(GREATER, 0), "rising")
+    assert check(act(event("go", trigger(positive)), trigger(when(time(AT_LEAST, 0))))) == []
+    assert check(act(event("go", trigger(positive)), trigger(when(time(GREATER, 0))))) == ["swallowed-edge"]
+    assert check(act(event("go", trigger(when(time(LESS, 3)))), trigger(when(time(GREATER, 5))))) == [
+        "impossible-condition"
+    ]
+
+
+def test_the_stop_trigger_of_an_act_first_looks_when_it_runs(check: Check) -> None:
+    late = when(time(GREATER, 5), "rising")
+    assert check(act(event("go"), trigger(late), trigger(late, kind="StopTrigger"))) == ["swallowed-edge"]
+    assert check(act(event("go"), "", trigger(late, kind="StopTrigger"))) == []
+
+
+@pytest.mark.parametrize(
+    ("group", "expected"),
+    [
+        (when(time(GREATER, 5)) + when(time(LESS, 3)), ["contradictory-group"]),
+        (when(time(GREATER, 5)) + when(time(LESS, 5)), ["contradictory-group"]),
+        (when(time(AT_LEAST, 5)) + when(time("lessOrEqual", 5)), []),
+        (when(time(GREATER, 5), delay=2) + when(time(LESS, 6)), ["contradictory-group"]),
+        (when(time(GREATER, 5), delay=2) + when(time(LESS, 8)), []),
+        (when(time(GREATER, 5), "rising") + when(time(LESS, 8)), []),
+        (when(time(GREATER, 5), "rising") + when(time(GREATER, 8)), ["contradictory-group"]),
+        (when(time(LESS, 5), "falling", 4) + when(time(GREATER, 8)), []),
+    ],
+)
+def test_conditions_of_one_group(check: Check, group: str, expected: list[str]) -> None:
+    assert check(act(event("go", trigger(group)))) == expected
+
+
+def test_another_group_may_still_fire(check: Check) -> None:
+    both = trigger(when(time(LESS, -1)), when(time(GREATER, 5)))
+    follower = event("follower", trigger(when(state("event", "go", "endTransition"))))
+    assert check(act(event("go", both) + follower)) == ["impossible-condition"]
+
+
+def test_events_that_wait_for_each_other(check: Check) -> None:
+    after = {name: when(state("event", name, "endTransition")) for name in ("one", "other")}
+    circle = event("one", trigger(after["other"])) + event("other", trigger(after["one"]))
+    assert check(act(circle)) == ["unreachable", "unreachable"]
+    opened = event("one", trigger(after["other"], when(time(GREATER, 5)))) + event("other", trigger(after["one"]))
+    assert check(act(opened)) == []
+
+
+def test_an_event_that_repeats_itself(check: Check) -> None:
+    again = trigger(when(time(GREATER, 5)), when(state("event", "go", "endTransition")))
+    assert check(act(event("go", again, count=3))) == []
+    assert check(act(event("go", again, count=1))) == ["unreachable"]
+    assert check(act(event("go", trigger(when(state("event", "go", "endTransition"))), count=3))) == ["unreachable"]
+
+
+def test_what_waits_for_an_element_that_never_starts(check: Check) -> None:
+    dead = event("dead", trigger(when(time(LESS, -1))))
+    first = act(dead + event("alive"), name="first")
+    ended = act(event("go"), trigger(when(state("act", "first", "endTransition"))), name="second")
+    assert check(first, ended) == ["impossible-condition", "unreachable"]
+    stopped = act(dead, "", trigger(when(time(GREATER, 9)), kind="StopTrigger"), name="first")
+    complete = act(event("go"), trigger(when(state("act", "first", "completeState"))), name="second")
+    assert check(stopped, complete) == ["impossible-condition"]
+
+
+def test_nothing_is_said_about_what_is_below_an_unreachable_act(check: Check) -> None:
+    below = event("go", trigger(when(time(LESS, -1))))
+    assert check(act(below, trigger(when(time(LESS, -1))))) == ["impossible-condition"]
+
+
+def test_times_add_up_along_a_chain_of_events(check: Check) -> None:
+    chain = event("first", trigger(when(time(GREATER, 10))))
+    chain += event("second", trigger(when(state("event", "first", "endTransition")) + when(time(LESS, 8))))
+    assert check(act(chain)) == ["contradictory-group"]
+
+
+@pytest.mark.parametrize(
+    ("what", "edge", "expected"),
+    [
+        ("runningState", "none", []),
+        ("runningState", "rising", ["swallowed-edge"]),
+        ("startTransition", "none", []),
+        ("startTransition", "rising", ["swallowed-edge"]),
+        ("startTransition", "falling", []),
+        ("standbyState", "none", ["impossible-state"]),
+        ("completeState", "none", ["unreachable"]),
+        ("stopTransition", "none", ["unreachable"]),
+        ("skipTransition", "none", ["impossible-state"]),
+    ],
+)
+def test_an_event_looks_at_the_act_around_it(check: Check, what: str, edge: str, expected: list[str]) -> None:
+    assert check(act(event("go", trigger(when(state("act", "act", what), edge))))) == expected
+
+
+def test_what_can_be_skipped_and_stopped(check: Check) -> None:
+    waits = {
+        what: event("waits", trigger(when(state("event", "rival", what))))
+        for what in ("skipTransition", "stopTransition")
+    }
+    rival = event("rival")
+    assert check(act(rival + waits["skipTransition"])) == ["impossible-state"]
+    assert check(act(event("rival", priority="skip") + waits["skipTransition"])) == []
+    assert check(act(rival + waits["stopTransition"])) == ["impossible-state"]
+    assert check(act(rival + event("taker", priority="override") + waits["stopTransition"])) == []
+    assert check(act(rival + waits["stopTransition"], "", trigger(when(time(GREATER, 5)), kind="StopTrigger"))) == []
+
+
+def test_the_end_of_an_action_that_has_none(check: Check) -> None:
+    waits = event("waits", trigger(when(state("action", "rival action", "endTransition"))))
+    assert check(act(event("rival", target=FOREVER) + waits)) == ["impossible-state"]
+    assert check(act(event("rival") + waits)) == []
+
+
+def test_edges_of_parameters_that_nobody_sets(
+    check: Check, parameters_xml: Callable[..., str], scenario_xml: Callable[..., bytes]
+) -> None:
+    declarations = parameters_xml(Mode=("integer", "1"))
+    rising, plain = (trigger(when(parameter("Mode"), edge)) for edge in ("rising", "none"))
+    assert check(act(event("go", rising)), declarations=declarations) == ["swallowed-edge"]
+    assert check(act(event("go", plain)), declarations=declarations) == []
+    setter = """<Event name="set" priority="parallel"><Action name="set"><GlobalAction><ParameterAction
+        parameterRef="Mode"><SetAction value="1"/></ParameterAction></GlobalAction></Action></Event>"""
+    assert check(act(event("go", rising) + setter), declarations=declarations) == []
+
+
+@pytest.mark.parametrize(
+    ("condition", "expected"),
+    [
+        (
+            '<RelativeDistanceCondition entityRef="Ego" relativeDistanceType="lateral" freespace="false" '
+            'rule="lessThan" value="5"/>',
+            ["impossible-condition"],
+        ),
+        ('<AccelerationCondition rule="lessThan" value="-3"/>', ["impossible-condition"]),
+        ('<AccelerationCondition rule="lessThan" value="-3" direction="longitudinal"/>', []),
+        ('<SpeedCondition rule="lessThan" value="-1"/>', []),
+        ('<TraveledDistanceCondition value="10"/>', []),
+    ],
+)
+def test_quantities_of_entities(check: Check, condition: str, expected: list[str]) -> None:
+    assert check(act(event("go", trigger(when(entity(condition), "rising"))))) == expected
+
+
+def test_no_way_at_all_is_travelled_at_once(check: Check) -> None:
+    start = trigger(when(entity('<TraveledDistanceCondition value="0"/>'), "rising"))
+    assert check(act(event("go", start))) == ["swallowed-edge"]
+
+
+def test_conditions_on_who_is_nowhere(check: Check) -> None:
+    moving = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
+    assert check(act(event("go", moving)), init="") == ["never-placed", "impossible-condition"]
+    added = """<Event name="add" priority="parallel"><Action name="add"><GlobalAction><EntityAction entityRef="Ego">
+        <AddEntityAction><Position><WorldPosition x="0" y="0"/></Position></AddEntityAction></EntityAction>
+        </GlobalAction></Action></Event>"""
+    assert check(act(event("go", moving) + added), init="") == []
+
+
+def test_the_time_of_day_needs_an_environment(check: Check) -> None:
+    noon = (
+        '<ByValueCondition><TimeOfDayCondition rule="greaterThan" dateTime="2025-01-01T12:00:00"/></ByValueCondition>'
+    )
+    assert check(act(event("go", trigger(when(noon))))) == ["impossible-condition"]
+
+
+def test_two_edges_at_one_instant(check: Check) -> None:
+    fast = when(entity('<SpeedCondition rule="greaterThan" value="5"/>'), "rising")
+    ended = when(state("event", "other", "endTransition"), "rising")
+    assert check(act(event("other") + event("go", trigger(fast + ended)))) == ["coinciding-edges"]
+    assert check(act(event("other") + event("go", trigger(fast, ended)))) == []
+
+
+def test_criteria_in_the_stop_trigger_are_no_conditions(check: Check) -> None:
+    criterion = when(parameter(""), "rising").replace("a condition", "criteria_CollisionTest")
+    assert check(act(event("go")), stop=f"<ConditionGroup>{criterion}</ConditionGroup>") == []
+
+
+def test_a_storyboard_without_end(check: Check) -> None:
+    assert check(act(event("go")), stop="") == ["no-stop-trigger"]
