@@ -8,7 +8,7 @@ or for something that comes only after it, is never reached.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.lint.outline import Node, Outline
@@ -73,6 +73,11 @@ class Reach:
             changed = False
             for node in outline.nodes:
                 changed |= self._advance(node)
+
+    @property
+    def start(self) -> Mapping[Node, float]:
+        """When each element starts at the earliest [s]."""
+        return self._states.start
 
     def _advance(self, node: Node) -> bool:
         states = self._states
