@@ -1,13 +1,19 @@
 """pytest runs scenario files: `pytest xosc/coop --eidrive-seeds 3 --eidrive-channel ideal,none`.
 
 A `.xosc` file that is named on the command line, or lies below a folder named there, becomes one test per channel and
-seed. The ini option `eidrive_paths` says instead which folders hold scenarios to test. Tests written in Python take the
+seed; a distribution of parameter values becomes that many for each of its runs, of which `--eidrive-max-runs` is the
+most. The ini option `eidrive_paths` says instead which folders hold scenarios to test. Tests written in Python take the
 marker `scenario` and the fixture `run_scenario`.
 """
 
 from __future__ import annotations
 
 from eidrive_scenario.pytest_plugin.collection import pytest_collect_file
+from eidrive_scenario.pytest_plugin.distributions import (
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+    pytest_testnodedown,
+)
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests, run_scenario
 from eidrive_scenario.pytest_plugin.options import (
     pytest_addoption,
@@ -23,5 +29,8 @@ __all__ = [
     "pytest_configure_node",
     "pytest_generate_tests",
     "pytest_report_header",
+    "pytest_sessionfinish",
+    "pytest_terminal_summary",
+    "pytest_testnodedown",
     "run_scenario",
 ]

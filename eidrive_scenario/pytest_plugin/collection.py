@@ -10,17 +10,21 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.library import definition
+from eidrive_scenario.pytest_plugin.distributions import DistributionFile
 from eidrive_scenario.pytest_plugin.options import Arm, arms, wanted
-from eidrive_scenario.pytest_plugin.outcome import ScenarioFailed, failure_text, play_arm, properties
+from eidrive_scenario.pytest_plugin.outcome import failure_text, judge
 
 
-def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
-    """A scenario that was asked for; catalogs and parameter distributions are none."""
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.File | None:
+    """A scenario or a distribution of parameter values that was asked for; catalogs are neither."""
     if file_path.suffix != ".xosc" or not wanted(parent.config, file_path):
         return None
-    if definition(file_path) not in ("scenario", "unreadable"):
+    kind = definition(file_path)
+    if kind not in ("scenario", "distribution", "unreadable"):
         return None
-    file: ScenarioFile = ScenarioFile.from_parent(parent, path=file_path)
+    file: pytest.File = (DistributionFile if kind == "distribution" else ScenarioFile).from_parent(
+        parent, path=file_path
+    )
     return file
 
 
@@ -42,10 +46,7 @@ class ScenarioItem(pytest.Item):
 
     def runtest(self) -> None:
         """Play it and note its numbers. Raises ScenarioFailed, InputError."""
-        result = play_arm(self.config, self.path, self.arm)
-        self.user_properties.extend(properties(result))
-        if not result.passed:
-            raise ScenarioFailed(result)
+        judge(self, self.path, self.arm)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """The verdict's reason, or file and line of a wrong input; a traceback for anything else."""

@@ -13,6 +13,7 @@ MARKER = (
     "scenario(pattern, channel=None, seeds=None): run the test once for every scenario that matches the pattern "
     "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
 )
+_MOST_RUNS = 100
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
 
@@ -41,6 +42,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
     )
     group.addoption("--eidrive-detector", metavar="NAME", help="detector of all stations (default: the file's own)")
+    group.addoption(
+        "--eidrive-max-runs",
+        metavar="N|all",
+        type=_count_or_all,
+        default=_MOST_RUNS,
+        help=f"most runs of a distribution that become tests, spread over its values (default: {_MOST_RUNS})",
+    )
     group.addoption("--eidrive-out", metavar="DIR", help="keep recording.mcap and result.json of every run below DIR")
     parser.addini(
         "eidrive_paths",
@@ -55,6 +63,10 @@ def _count(text: str) -> int:
     if count < 1:
         raise ValueError
     return count
+
+
+def _count_or_all(text: str) -> int | None:
+    return None if text == "all" else _count(text)
 
 
 def pytest_configure(config: pytest.Config) -> None:

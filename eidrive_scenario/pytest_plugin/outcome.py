@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.pytest_plugin.options import Arm
 
 if TYPE_CHECKING:
+    from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.recording import Verdict
     from eidrive_scenario.simulation import RunResult
 
@@ -25,18 +27,38 @@ class ScenarioFailed(Exception):
         self.result = result
 
 
+def judge(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = None) -> None:
+    """Play a test's scenario, or that run of its distribution, and note its numbers.
+
+    Raises ScenarioFailed, InputError.
+    """
+    result = play_arm(item.config, source, arm) if run is None else _play(item.config, source, run, arm, {})
+    item.user_properties.extend(properties(result))
+    if run is not None:
+        item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
+    if not result.passed:
+        raise ScenarioFailed(result)
+
+
 def play_arm(config: pytest.Config, source: Path, arm: Arm, **overrides: Any) -> RunResult:
     """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
 
     Raises InputError.
     """
+    return _play(config, source, source, arm, overrides)
+
+
+def _play(
+    config: pytest.Config, file: Path, source: Path | ConcreteRun, arm: Arm, overrides: Mapping[str, Any]
+) -> RunResult:
     # Imported with the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import play
     from eidrive_scenario.simulation import RunSettings
 
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
-    out = Path(config.invocation_params.dir, folder, *_place(config, source), str(arm)) if folder is not None else None
+    place = [*_place(config, file), *([] if isinstance(source, Path) else [f"run-{source.number}"]), str(arm)]
+    out = Path(config.invocation_params.dir, folder, *place) if folder is not None else None
     return play(source, seed=arm.seed, settings=RunSettings(**settings), out=out)
 
 
@@ -51,6 +73,8 @@ def properties(result: RunResult) -> Properties:
     Plain numbers only, as pytest-xdist sends nothing else to its controller.
     """
     noted: Properties = [("channel", result.channel), ("seed", result.seed), ("end", result.end)]
+    if result.run is not None:
+        noted.append(("run", result.run))
     for verdict in result.criteria:
         noted.append((f"{verdict.name}.passed", bool(verdict.passed)))
         if verdict.value is not None:
@@ -66,7 +90,8 @@ def explain(result: RunResult) -> str:
     lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
     if not lines:
         lines = [f"ended by its {result.end} after {result.simulated_s:.2f} s"]
-    return "\n".join([f"{result.scenario} failed with channel {result.channel}, seed {result.seed}", *lines])
+    run = "" if result.run is None else f"run {result.run} of "
+    return "\n".join([f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}", *lines])
 
 
 def _limit(verdict: Verdict) -> str:
