@@ -17,33 +17,45 @@ _SUFFIX = ".xosc"
 
 def check(
     paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or names of the library.")],
+    strict: Annotated[bool, typer.Option("--strict", help="Let warnings count as problems.")] = False,
+    ignore: Annotated[
+        list[str] | None, typer.Option(metavar="RULE", help="A rule to leave out; repeatable.", show_default="none")
+    ] = None,
 ) -> None:
-    """Print every mistake in scenarios and distributions as `file:line: what is wrong; what would be right`."""
+    """Print every mistake in scenarios and distributions as `file:line: what is wrong; what would be right`.
+
+    Findings end with the rule that made them: `eidrive list checks` names all rules.
+    """
     from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
     from eidrive_scenario.experiments.inspection import inspect_scenario
 
-    files = list(_files(paths))
-    problems: dict[Problem, None] = {}
-    warnings: dict[Problem, None] = {}
+    files, ignored = list(_files(paths)), tuple(ignore or ())
+    told: dict[str, dict[Problem, None]] = {"problem": {}, "warning": {}, "note": {}}
     for path in files:
         kind = definition(path)
         if kind == "catalog":
             typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
             continue
-        findings = inspect_distribution(path) if kind == "distribution" else inspect_scenario(path)
-        for problem in findings.problems:
-            if problem not in problems:
-                typer.echo(str(problem))
-        for problem in findings.warnings:
-            if problem not in warnings:
-                typer.echo(f"{problem} (warning)")
+        inspect = inspect_distribution if kind == "distribution" else inspect_scenario
+        findings = inspect(path, ignored)
+        for level, found in zip(told, (findings.problems, findings.warnings, findings.notes), strict=True):
+            for problem in found:
+                if problem not in told[level]:
+                    typer.echo(f"{problem}{_mark(level, problem.rule)}")
+            told[level].update(dict.fromkeys(found))
         if isinstance(findings, DistributionFindings) and findings.runs:
             typer.echo(f"{path}: {_count(findings.runs, 'run')}")
-        problems.update(dict.fromkeys(findings.problems))
-        warnings.update(dict.fromkeys(findings.warnings))
-    counts = _count(len(files), "file"), _count(len(problems), "problem"), _count(len(warnings), "warning")
-    typer.echo(", ".join(counts))
-    raise typer.Exit(WRONG_INPUT if problems else 0)
+    counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in told.items())]
+    typer.echo(", ".join(counts if told["note"] else counts[:-1]))
+    raise typer.Exit(WRONG_INPUT if told["problem"] or (strict and told["warning"]) else 0)
+
+
+def _mark(level: str, rule: str) -> str:
+    """What stands behind a finding: how grave it is, and its rule."""
+    word = "error" if level == "problem" else level
+    if rule:
+        return f" ({word}: {rule})"
+    return "" if level == "problem" else f" ({word})"
 
 
 def _files(paths: list[str]) -> Iterator[Path]:

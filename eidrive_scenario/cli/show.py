@@ -20,6 +20,7 @@ class Names(StrEnum):
     criteria = "criteria"
     actions = "actions"
     conditions = "conditions"
+    checks = "checks"
 
 
 def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = Names.scenarios) -> None:
@@ -31,6 +32,11 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = library.scenarios()
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
+    elif what is Names.checks:
+        from eidrive_scenario.experiments.rules import ALL_RULES
+
+        width = max(len(rule.name) for rule in ALL_RULES)
+        lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.about}" for rule in ALL_RULES]
     else:
         known = registry(what.value)
         width = max(map(len, known), default=0)

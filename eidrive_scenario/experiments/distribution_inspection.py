@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ class DistributionFindings(Findings):
     runs: int = 0
 
 
-def inspect_distribution(path: Path) -> DistributionFindings:
+def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> DistributionFindings:
     """Read a distribution, its scenario, and the scenario with each value that the distribution lists.
 
     Every listed value is in one of the runs that are read, with the first value of all other parameters; so are the
@@ -33,7 +33,7 @@ def inspect_distribution(path: Path) -> DistributionFindings:
         unfolding = load_distribution(path)
     except InputError as error:
         return DistributionFindings(error.problems)
-    alone = inspect_scenario(unfolding.scenario)
+    alone = inspect_scenario(unfolding.scenario, ignored)
     if alone.problems:
         return DistributionFindings(alone.problems, (*unfolding.warnings, *alone.warnings), len(unfolding))
     problems: dict[Problem, None] = {}

@@ -2,82 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from eidrive_scenario.errors import InputError, Problem, ScenarioError, suggestion
-from eidrive_scenario.library import library_path
-from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.openscenario.model import CustomCommandAction
-from eidrive_scenario.openscenario.variation import drawn_parameters
-from eidrive_scenario.recording.criteria_text import parse_criteria, stop_trigger_criteria, unbuilt_criteria
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario.findings import in_order
+from eidrive_scenario.openscenario.lint import Level
+from eidrive_scenario.recording.criteria_text import unbuilt_criteria
 from eidrive_scenario.simulation import Simulation
-from eidrive_scenario.v2x.profile import load_profile
-
-_OURS = "eidrive."
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What keeps a scenario from being played, and what is worth knowing."""
+    """What keeps a scenario from being played, what is most likely a mistake, and what is worth knowing."""
 
     problems: tuple[Problem, ...]
     warnings: tuple[Problem, ...] = ()
+    notes: tuple[Problem, ...] = field(default=(), kw_only=True)
 
 
-def inspect_scenario(path: Path) -> Findings:
+def inspect_scenario(path: Path, ignored: Collection[str] = ()) -> Findings:
     """Read a scenario with its roads, controllers, channels and criteria; every problem says where and what is right.
 
-    Commands of later events are read too, which a run would only meet on its way.
+    Commands of later events are read too, which a run would only meet on its way. What the rules find comes with
+    the names of these; `ignored` are the names of rules that are left out. Raises SettingError for an unknown name.
     """
     try:
         scenario = load_scenario(path)
     except InputError as error:
         return Findings(error.problems)
-    problems: list[Problem] = []
-    for examine in (_commands, _stop_trigger, _construction):
-        problems += examine(scenario)
     unbuilt = [problem for problem in unbuilt_criteria(scenario) if problem not in scenario.warnings]
-    return Findings(tuple(dict.fromkeys(problems)), (*scenario.warnings, *unbuilt))
-
-
-def _commands(scenario: Scenario) -> list[Problem]:
-    readers: dict[str, Callable[[CustomCommandAction], object]] = {
-        "eidrive.criterion": lambda command: parse_criteria(
-            command.content, source=command.source, line=command.line, entities=scenario.entities
-        ),
-        "eidrive.channel": lambda command: load_profile(
-            command.content, (library_path() / "channels",), origin=command.source, line=command.line
-        ),
-        "eidrive.variation": lambda _: drawn_parameters(scenario, 0),
-    }
-    problems: list[Problem] = []
-    for command in scenario.storyboard.walk():
-        if not isinstance(command, CustomCommandAction) or not command.type.startswith(_OURS):
-            continue
-        try:
-            if command.type not in readers:
-                message = f"unknown command type {command.type!r}"
-                raise ScenarioError(Problem(message, suggestion(command.type, readers), command.source, command.line))
-            readers[command.type](command)
-        except InputError as error:
-            problems += error.problems
-    return problems
-
-
-def _stop_trigger(scenario: Scenario) -> list[Problem]:
-    try:
-        stop_trigger_criteria(scenario)
-    except InputError as error:
-        return list(error.problems)
-    return []
-
-
-def _construction(scenario: Scenario) -> list[Problem]:
-    """Roads, controllers, first positions: what building the run finds."""
+    found: dict[Level, list[Problem]] = {Level.ERROR: [], Level.WARNING: [*scenario.warnings, *unbuilt], Level.NOTE: []}
+    for level, problem in broken_rules(scenario, ignored):
+        found[level].append(problem)
     try:
         Simulation(scenario).close()
     except InputError as error:
-        return list(error.problems)
-    return []
+        known = [replace(problem, rule="") for problem in found[Level.ERROR]]
+        found[Level.ERROR] += [problem for problem in error.problems if problem not in known]
+    problems, warnings, notes = (tuple(in_order(problems)) for problems in found.values())
+    return Findings(problems, warnings, notes=notes)

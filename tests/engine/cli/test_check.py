@@ -61,3 +61,61 @@ def test_a_folder_without_scenarios(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
     assert "no .xosc file in" in result.stderr
+
+
+UNUSED = (
+    "<ParameterDeclarations>",
+    '<ParameterDeclarations><ParameterDeclaration name="N" parameterType="int" value="1"/>',
+)
+
+
+def test_a_rule_that_is_broken_is_named(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    path = folder(unused=UNUSED) / "unused.xosc"
+    result = eidrive("check", path)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        f"{path}:5: the parameter 'N' is never used; take it out, or write $N where its value belongs "
+        "(warning: unused-parameter)",
+        "1 file, 0 problems, 1 warning",
+    ]
+
+
+def test_strict_lets_warnings_count(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    place = folder(unused=UNUSED)
+    assert eidrive("check", "--strict", place).exit_code == 2
+    assert eidrive("check", "--strict", place / "right.xosc").exit_code == 0
+
+
+def test_a_rule_can_be_left_out(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    path = folder(unused=UNUSED) / "unused.xosc"
+    result = eidrive("check", "--strict", "--ignore", "unused-parameter", path)
+    assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")
+    unknown = eidrive("check", "--ignore", "unused-parameters", path)
+    assert unknown.exit_code == 2
+    assert "did you mean 'unused-parameter'?" in unknown.stderr
+
+
+def test_notes_are_counted_apart(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    catalog = '<CatalogLocations><RouteCatalog><Directory path="routes"/></RouteCatalog></CatalogLocations>'
+    path = folder(noted=("<CatalogLocations/>", catalog)) / "noted.xosc"
+    result = eidrive("check", "--strict", path)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[0].endswith("(note: unused-catalog)")
+    assert result.stdout.splitlines()[1] == "1 file, 0 problems, 0 warnings, 1 note"
+
+
+def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_path: Path) -> None:
+    """The library's own scenario, with an event that teleports somebody beyond the end of a road."""
+    library = Path(__file__).parents[3] / "xosc"
+    text = (library / "coop" / "scenario_1.xosc").read_text(encoding="utf-8").replace("../", f"{library}/")
+    event = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
+        <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors><Maneuver name="m">
+        <Event name="e" priority="parallel"><Action name="jump"><PrivateAction><TeleportAction><Position>
+        <LanePosition roadId="nowhere" laneId="-1" s="1"/></Position></TeleportAction></PrivateAction></Action></Event>
+        </Maneuver></ManeuverGroup><StartTrigger/></Act></Story>"""
+    path = tmp_path / "jump.xosc"
+    path.write_text(text.replace("<StopTrigger>", f"{event}<StopTrigger>"), encoding="utf-8")
+    result = eidrive("check", path)
+    assert result.exit_code == 2, result.output
+    assert "names road 'nowhere', which the road network does not have" in result.stdout
+    assert "(error: no-such-place)" in result.stdout

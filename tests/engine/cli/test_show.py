@@ -37,6 +37,7 @@ def test_version(eidrive: Eidrive) -> None:
         ("detectors", "oracle"),
         ("actions", "SpeedAction"),
         ("conditions", "SimulationTimeCondition"),
+        ("checks", "swallowed-edge"),
     ],
 )
 def test_list(eidrive: Eidrive, what: str, expected: str) -> None:

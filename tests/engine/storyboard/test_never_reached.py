@@ -27,9 +27,9 @@ ACT = """<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionC
 RULES = ("greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual", "equalTo", "notEqualTo")
 EDGES = ("none", "rising", "falling", "risingOrFalling")
 STATES = (
-    ("endTransition", "startTransition", "stopTransition", "skipTransition")
-    + ("runningState", "completeState", "standbyState")
-    + ("endTransition", "completeState")
+    *("endTransition", "startTransition", "stopTransition", "skipTransition"),
+    *("runningState", "completeState", "standbyState"),
+    *("endTransition", "completeState"),
 )
 
 
@@ -72,11 +72,12 @@ class Storyteller:
     def trigger(self, kind: str, likely: float) -> str:
         if self.chance.random() > likely:
             return ""
-        groups = (
-            f"<ConditionGroup>{''.join(self.condition() for _ in range(self.chance.choice([1, 1, 2])))}</ConditionGroup>"
-            for _ in range(self.chance.choice([1, 1, 2]))
-        )
-        return f"<{kind}>{''.join(groups)}</{kind}>"
+        groups = "".join(self.group() for _ in range(self.chance.choice([1, 1, 2])))
+        return f"<{kind}>{groups}</{kind}>"
+
+    def group(self) -> str:
+        conditions = "".join(self.condition() for _ in range(self.chance.choice([1, 1, 2])))
+        return f"<ConditionGroup>{conditions}</ConditionGroup>"
 
     def condition(self) -> str:
         chance = self.chance
