@@ -1,0 +1,90 @@
+"""The rules over files that others wrote: every finding was looked at by hand, so that none is raised in vain."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.openscenario import load_scenario
+
+CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
+pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA is not set")
+
+PLENTY = {"unused-parameter", "unused-catalog", "no-stop-trigger"}
+"""Rules that many files break: declarations copied from file to file, the empty stop triggers of 1.0."""
+
+AT_TIME_0 = "time = 0 is true when the act first looks, so `rising` never comes"
+AFTER_TIME_0 = "its act starts after time 0, so time > 0 is true when the event first looks"
+EDGES_APART = "the edges of one group belong to things that happen one after the other"
+EXAMINED = {
+    "alks/concrete_scenarios/alks_scenario_4_4_1_cut_in_no_collision_template.xosc": {
+        "no-progress": "the template's own value of the rate is 0"
+    },
+    "alks/concrete_scenarios/alks_scenario_4_4_2_cut_in_unavoidable_collision_template.xosc": {
+        "no-progress": "the template's own value of the rate is 0"
+    },
+    "esmini/xosc/cut-in_cr.xosc": {
+        "impossible-state": "it waits for the end of a continuous LaneOffsetAction, which by the standard has none"
+    },
+    "esmini/xosc/ltap-od-relative-speed.xosc": {"no-such-place": "s = 455 on a road of 304 m"},
+    "scenario_runner/CatalogExample.xosc": {"coinciding-edges": EDGES_APART, "swallowed-edge": AFTER_TIME_0},
+    "scenario_runner/CyclistCrossing.xosc": {"coinciding-edges": EDGES_APART},
+    "scenario_runner/FollowLeadingVehicle.xosc": {"swallowed-edge": AT_TIME_0},
+    "scenario_runner/InitAddEntityAction.xosc": {"coinciding-edges": EDGES_APART},
+    "scenario_runner/InitDeleteEntityAction.xosc": {
+        "coinciding-edges": EDGES_APART,
+        "never-placed": "two adversaries are deleted in Init, and never put anywhere",
+    },
+    "scenario_runner/LaneChangeSimple.xosc": {"swallowed-edge": AT_TIME_0},
+    "scenario_runner/LaneOffsetActionExample.xosc": {"swallowed-edge": AT_TIME_0},
+    "scenario_runner/OscControllerExample.xosc": {"swallowed-edge": AT_TIME_0},
+    "scenario_runner/PedestrianCrossingFront.xosc": {"coinciding-edges": EDGES_APART},
+    "scenario_runner/Slalom.xosc": {"swallowed-edge": "the act starts after 120 s and is to stop as these pass"},
+    "scenario_runner/StoryAddEntityAction.xosc": {"coinciding-edges": EDGES_APART},
+    "scenario_runner/StoryDeleteEntityAction.xosc": {"coinciding-edges": EDGES_APART},
+    "scenario_runner/VehicleLateralDistance.xosc": {"swallowed-edge": AT_TIME_0},
+}
+
+
+@pytest.fixture(scope="module")
+def maps() -> Iterator[None]:
+    """Where ScenarioRunner's maps lie."""
+    patch = pytest.MonkeyPatch()
+    patch.setenv("EIDRIVE_MAPS", f"{CORPORA}/carla_towns")
+    yield
+    patch.undo()
+
+
+@pytest.fixture(scope="module")
+def found(maps: None) -> dict[str, Counter[str]]:
+    """By file, how often each rule is broken."""
+    assert CORPORA is not None
+    counts: dict[str, Counter[str]] = {}
+    for path in sorted(CORPORA.rglob("*.xosc")):
+        if "<Storyboard" not in path.read_text(encoding="utf-8", errors="replace"):
+            continue
+        try:
+            scenario = load_scenario(path)
+        except ScenarioError:
+            continue
+        rules = Counter(problem.rule for _, problem in broken_rules(scenario))
+        counts[path.relative_to(CORPORA).as_posix()] = rules
+    return counts
+
+
+def test_every_finding_was_examined(found: dict[str, Counter[str]]) -> None:
+    telling = {path: set(rules) - PLENTY for path, rules in found.items()}
+    assert {path: rules for path, rules in telling.items() if rules} == {
+        path: set(rules) for path, rules in EXAMINED.items()
+    }
+
+
+def test_most_files_break_no_rule_of_importance(found: dict[str, Counter[str]]) -> None:
+    assert len(found) > 110
+    in_all = sum(found.values(), Counter())
+    assert in_all["no-stop-trigger"] == sum("no-stop-trigger" in rules for rules in found.values())
+    assert sum(not (set(rules) - PLENTY) for rules in found.values()) > 100
