@@ -13,8 +13,9 @@ from scipy.spatial import cKDTree
 
 from eidrive_scenario.traffic.lanes import Array, TrafficLanes
 
-CLEARANCE = 2.6
-"""Two lanes meet where their centre lines come closer than this: a car's width and some air [m]."""
+CLEARANCE = 3.2
+"""Two lanes meet where their centre lines come closer than this: less than lanes side by side have, more than two cars
+need whose ends swing out in bends [m]."""
 FORK = 9.0
 """From here on two lanes that begin together lie apart [m]."""
 SAMPLE = 0.75

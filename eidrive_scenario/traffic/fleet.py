@@ -1,20 +1,32 @@
-"""Background traffic: cars that follow their lanes and each other, and stop for whatever stands in their way."""
+"""Background traffic: cars that follow lanes and each other, change lanes, and stop for what stands in their way."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.crossings import Crossings
 from eidrive_scenario.traffic.idm import IntelligentDriver, ballistic
-from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import LOOK_AHEAD, Leaders, Occupants, find_leaders, obstacles, together
+from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanges
+from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
+from eidrive_scenario.traffic.leaders import (
+    FIXED,
+    LOOK_AHEAD,
+    Leaders,
+    Occupants,
+    find_leaders,
+    nobody,
+    obstacles,
+    together,
+)
+from eidrive_scenario.traffic.mobil import LaneChanger
+from eidrive_scenario.traffic.stop_lines import MustStop, StopLines
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -24,242 +36,360 @@ STOP_LINE = 1.0
 """A car that waits for a junction stops this far before it [m]."""
 ROLLING = 2.0
 """A leader at this speed clears the space behind a junction by itself [m/s]."""
-PLANNED = 8
-"""Most lanes that a car knows ahead of itself."""
-
-
-@dataclass
-class _Car:
-    spec: ActorSpec
-    plan: list[int]
-    desired_speed: float | None
-    turns: int = 0
-    granted: set[int] = field(default_factory=set)
-
-    @property
-    def front(self) -> float:
-        return self.spec.offset[0] + 0.5 * self.spec.size[0]
-
-    @property
-    def rear(self) -> float:
-        return self.spec.offset[0] - 0.5 * self.spec.size[0]
+TOO_LATE = 4.0
+"""A car that would have to brake harder than this passes a light that has just turned [m/s²]."""
 
 
 class Fleet:
     """Cars on the lanes of a road network.
 
     Each follows the lane's centre with the Intelligent Driver Model, slows down for bends, takes a branch at a fork by
-    its own stream of random numbers (seed, name), and enters a junction only when the lanes that it meets are free.
-    Lane changes are none of its business. A car that reaches the end of the lanes leaves: `departed` names it.
+    its own stream of random numbers (seed, name), and enters a junction only when the lanes that it meets are free and
+    its light, if any, lets it. Lanes are changed by MOBIL. A car that reaches the end of the lanes leaves: `departed`
+    names it.
     """
 
-    def __init__(self, roads: RoadNetwork, *, seed: int = 0, driver: IntelligentDriver | None = None) -> None:
+    def __init__(
+        self,
+        roads: RoadNetwork,
+        *,
+        seed: int = 0,
+        driver: IntelligentDriver | None = None,
+        changer: LaneChanger | None = None,
+        must_stop: MustStop | None = None,
+    ) -> None:
         self.driver = driver or IntelligentDriver()
         self.departed: frozenset[str] = frozenset()
+        self.lanes = TrafficLanes(roads)
         self._seed = seed
-        self._lanes = TrafficLanes(roads)
-        self._crossings = Crossings(self._lanes)
-        self._cars: dict[str, _Car] = {}
-        self._progress: Array = np.empty(0)
-        self._speed: Array = np.empty(0)
+        self._crossings = Crossings(self.lanes)
+        self._changes = LaneChanges(self.lanes, changer or LaneChanger(), self.driver)
+        self._lines = None if must_stop is None else StopLines(self.lanes, must_stop)
+        self._cars = Cars()
+        self._index: dict[str, int] = {}
+        self._made = 0
+        self._ticks = 0
+        self._poses: Array | None = None
+        self._foreign, self._moving = nobody(), set[int]()
+        self._ends = self._ends_of_lanes()
 
     @property
     def names(self) -> tuple[str, ...]:
         """The cars, in the order in which they were added."""
-        return tuple(self._cars)
+        return tuple(self._index)
 
     @property
     def speeds(self) -> Mapping[str, float]:
         """Speed of each car [m/s]."""
-        return dict(zip(self._cars, self._speed.tolist(), strict=True))
+        return dict(zip(self._index, self._cars.speed.tolist(), strict=True))
+
+    @property
+    def specs(self) -> list[ActorSpec]:
+        """The bodies of the cars."""
+        return self._cars.specs
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._index
+
+    def __len__(self) -> int:
+        return len(self._index)
 
     def add(
-        self, spec: ActorSpec, location: LaneLocation, *, speed: float = 0.0, desired_speed: float | None = None
+        self,
+        spec: ActorSpec,
+        location: LaneLocation,
+        *,
+        speed: float = 0.0,
+        desired_speed: float | None = None,
+        driver: IntelligentDriver | None = None,
     ) -> Placement:
         """Bring a car in at a lane's centre line; without a desired speed it drives at the limit.
 
         Raises PositionError for a lane that does not exist, ValueError for a name that is taken.
         """
-        if spec.name in self._cars:
+        row, progress = self.lanes.of(location)
+        return self.add_at(spec, row, progress, speed=speed, desired_speed=desired_speed, driver=driver)
+
+    def add_at(
+        self,
+        spec: ActorSpec,
+        row: int,
+        progress: float,
+        *,
+        speed: float = 0.0,
+        desired_speed: float | None = None,
+        driver: IntelligentDriver | None = None,
+        factor: float = 1.0,
+        fallback: float = FREE,
+    ) -> Placement:
+        """`add`, by the lane's row and the progress along it.
+
+        factor    of the speed limit that the car keeps to;  fallback  its desired speed where there is no limit [m/s]
+        """
+        if spec.name in self._index:
             raise ValueError(f"car {spec.name!r} is in the fleet already")
-        row, progress = self._lanes.of(location)
-        car = _Car(spec, [row], desired_speed)
-        self._cars[spec.name] = car
-        self._progress = np.append(self._progress, progress)
-        self._speed = np.append(self._speed, speed)
-        if self._lanes.in_junction[row]:
-            self._grant(car, row)
-        self._extend(car)
-        return replace(self.placements()[spec.name], teleport=True)
+        half = 0.5 * spec.size[0]
+        index = self._cars.append(
+            spec,
+            driver or self.driver,
+            progress=progress,
+            speed=speed,
+            front=spec.offset[0] + half,
+            rear=spec.offset[0] - half,
+            own_speed=math.nan if desired_speed is None else desired_speed,
+            factor=factor,
+            fallback=fallback,
+            number=self._made,
+            walks=bool(self.lanes.walkable[row]),
+        )
+        self._made += 1
+        self._index[spec.name] = index
+        self._cars.plan[index, 0] = row
+        self._poses = None
+        if self.lanes.in_junction[row] and not self.lanes.walkable[row]:
+            self._grant(index, 0)
+        self._extend(index)
+        return self._placement(index, teleport=True)
 
     def remove(self, name: str) -> None:
         """Take a car out."""
-        index = list(self._cars).index(name)
-        del self._cars[name]
+        index = self._index[name]
         self._crossings.forget(name)
-        self._progress = np.delete(self._progress, index)
-        self._speed = np.delete(self._speed, index)
+        self._cars.delete(index)
+        self._poses = None
+        self._index = {spec.name: n for n, spec in enumerate(self._cars.specs)}
+
+    @property
+    def poses(self) -> Array:
+        """(N, 6) x y z yaw pitch roll of the reference points now [m, rad]."""
+        if self._poses is None:
+            cars, lanes = self._cars, self.lanes
+            sign = lanes.direction[cars.row]
+            found = lanes.tables.lane_poses(cars.row, lanes.s(cars.row, cars.progress), cars.offset * sign)
+            yaw = found.h + np.where(sign > 0, 0.0, math.pi) + np.arctan(cars.slope)
+            self._poses = np.column_stack([found.x, found.y, found.z, yaw, found.p * sign, found.r * sign])
+        return self._poses
 
     def placements(self) -> dict[str, Placement]:
         """Where the cars are now."""
-        if not self._cars:
-            return {}
-        row = np.array([car.plan[0] for car in self._cars.values()])
-        poses = self._lanes.tables.lane_poses(row, self._lanes.s(row, self._progress), np.zeros(len(row)))
-        sign = self._lanes.direction[row]
-        yaw = poses.h + np.where(sign > 0, 0.0, math.pi)
-        columns = (poses.x, poses.y, poses.z, yaw, poses.p * sign, poses.r * sign, self._speed)
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        return {
-            name: Placement(x, y, z, yaw=h, pitch=p, roll=r, speed=v)
-            for name, (x, y, z, h, p, r, v) in zip(self._cars, rows, strict=True)
-        }
+        rows = zip(self._index, self.poses.tolist(), self._cars.speed.tolist(), strict=True)
+        return {name: Placement(x, y, z, h, p, r, speed) for name, (x, y, z, h, p, r), speed in rows}
+
+    def _placement(self, index: int, *, teleport: bool) -> Placement:
+        x, y, z, h, p, r = self.poses[index].tolist()
+        return Placement(x, y, z, h, p, r, float(self._cars.speed[index]), teleport)
+
+    def observe(self, view: WorldView, *, everywhere: bool = True) -> None:
+        """Look where all others are; with `everywhere` False only near the cars of the fleet."""
+        near = None if everywhere else self.poses[:, :2]
+        self._foreign, self._moving = obstacles(self.lanes, view, frozenset(self._index), near)
 
     def step(self, view: WorldView | None, dt: float) -> dict[str, Placement]:
         """Drive on by dt; whatever in `view` is not of the fleet is an obstacle. Returns where the cars are then.
 
-        Cars that left in this step are in `departed` and no more in the result.
+        Without a view the others are where `observe` saw them last. Cars that left in this step are in `departed` and
+        no more in the result.
         """
         self.departed = frozenset()
-        if not self._cars:
+        self._ticks += 1
+        if view is not None:
+            self.observe(view, everywhere=False)
+        if not len(self):
             return {}
-        others, moving = (None, set()) if view is None else obstacles(self._lanes, view, frozenset(self._cars))
-        ahead = self._leaders(others)
-        self._update_crossings(ahead, moving)
-        leaders = self._halted(ahead)
-        acceleration = self.driver.response(
-            self._speed, self._desired_speeds(), leaders.gap, self._speed - leaders.speed
-        )
-        covered, self._speed = ballistic(self._speed, acceleration, dt)
-        row = np.array([car.plan[0] for car in self._cars.values()])
-        self._progress = self._progress + covered / self._lanes.stretch(row, self._progress)
+        cars = self._cars
+        row_lengths = np.where(cars.plan >= 0, self.lanes.length[cars.plan], 0.0)
+        begins = np.cumsum(row_lengths, axis=1) - row_lengths - cars.progress[:, None]
+        occupants = self.occupants()
+        leaders = self._leaders(occupants)
+        lights = self._lights()
+        self._update_crossings(leaders.or_nearer(lights), lights, begins)
+        desired = self._desired_speeds(begins)
+        halted = leaders.or_nearer(lights).or_nearer(self._waits(begins))
+        acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
+        self._change_lanes(dt, leaders, desired, occupants, begins)
+        covered, cars.speed = ballistic(cars.speed, acceleration, dt)
+        cars.progress = cars.progress + covered / self.lanes.stretch(cars.row, cars.progress)
+        self._changes.advance(cars, covered)
+        self._poses = None
         self._pass_ends()
         return self.placements()
 
-    def _leaders(self, others: Occupants | None) -> Leaders:
-        cars = list(self._cars.values())
-        row = np.array([car.plan[0] for car in cars])
-        front, rear = np.array([car.front for car in cars]), np.array([car.rear for car in cars])
-        occupants = Occupants(row, self._progress, self._progress + rear, self._speed, np.arange(len(cars)))
-        if others is not None:
-            occupants = together(occupants, others)
-        plans = np.full((len(cars), PLANNED + 1), -1)
-        for index, car in enumerate(cars):
-            plans[index, : len(car.plan)] = car.plan[: PLANNED + 1]
-        leaders = find_leaders(self._lanes, plans, self._progress, front, occupants)
-        return Leaders(leaders.gap * self._lanes.stretch(row, self._progress), leaders.speed)
+    def occupants(self) -> Occupants:
+        """Everything on the lanes: the fleet, also on the lanes that its cars are leaving, others, lanes' ends."""
+        cars = self._cars
+        own = np.arange(len(cars))
+        still, lane = self._changes.still_left(cars)
+        who, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
+        key = cars.progress[who]
+        mine = Occupants(row, key, key + cars.rear[who], key + cars.front[who], cars.speed[who], who)
+        return together(mine, self._foreign, self._ends)
 
-    def _halted(self, leaders: Leaders) -> Leaders:
-        """The leaders, or the stop line of a junction that a car may not enter yet where that is nearer."""
-        gap, speed = leaders.gap.copy(), leaders.speed.copy()
-        for index, car in enumerate(self._cars.values()):
-            wait = self._distance_to_wait(car, float(self._progress[index])) - car.front - STOP_LINE
-            if wait < gap[index]:
-                gap[index], speed[index] = max(wait, 1e-3), 0.0
-        return Leaders(gap, speed)
+    def _ends_of_lanes(self) -> Occupants:
+        row = np.flatnonzero(np.isfinite(self.lanes.ends_at))
+        at = self.lanes.ends_at[row]
+        return Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
-    def _distance_to_wait(self, car: _Car, progress: float) -> float:
-        """Metres to the first junction lane ahead that the car may not enter yet, inf if there is none in sight."""
-        distance = -progress
-        for row, following in zip(car.plan, car.plan[1:], strict=False):
-            distance += self._lanes.lengths[row]
-            if distance > LOOK_AHEAD:
-                break
-            if self._lanes.in_junction[following] and following not in car.granted:
-                return distance
-        return math.inf
+    def _leaders(self, occupants: Occupants) -> Leaders:
+        """The leaders of all cars; of those that change lanes, the nearer one of both lanes."""
+        cars = self._cars
+        leaders = find_leaders(self.lanes, cars.plan, cars.progress, cars.front, occupants)
+        still, lane = self._changes.still_left(cars)
+        if still.size:
+            chain = self.lanes.chain(lane, PLANNED + 1)
+            other = find_leaders(self.lanes, chain, cars.progress[still], cars.front[still], occupants, own=still)
+            gap, speed = leaders.gap.copy(), leaders.speed.copy()
+            nearer = Leaders(gap[still], speed[still]).or_nearer(other)
+            gap[still], speed[still] = nearer.gap, nearer.speed
+            leaders = Leaders(gap, speed)
+        return Leaders(leaders.gap * self.lanes.stretch(cars.row, cars.progress), leaders.speed)
 
-    def _update_crossings(self, leaders: Leaders, moving: set[int]) -> None:
+    def _lights(self) -> Leaders:
+        """The stop lines before lights that tell cars to stop, for those that still can."""
+        cars = self._cars
+        closed = nobody() if self._lines is None else self._lines.closed()
+        none = np.zeros(len(cars))
+        lights = find_leaders(self.lanes, cars.plan, cars.progress + cars.front, none, closed)
+        with np.errstate(divide="ignore"):
+            late = cars.speed**2 / (2.0 * np.maximum(lights.gap, 0.0)) > TOO_LATE
+        binding = (lights.gap >= 0.0) & ~(late & (cars.speed > 0.0)) & ~cars.walks
+        return Leaders(np.where(binding, np.maximum(lights.gap - STOP_LINE, 1e-3), np.inf), lights.speed)
+
+    def _waiting_lane(self) -> NDArray[np.bool_]:
+        """(N, D) for each lane of the plans beyond the first, whether the car has to wait before it."""
+        cars = self._cars
+        ahead: NDArray[np.bool_] = (cars.plan >= 0) & self.lanes.in_junction[cars.plan]
+        ahead &= ~cars.granted & ~cars.walks[:, None]
+        ahead[:, 0] = False
+        return ahead
+
+    def _distances_to_wait(self, begins: Array) -> Array:
+        """(N,) metres to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
+        distance = np.where(self._waiting_lane(), begins, np.inf).min(axis=1)
+        return np.where(distance > LOOK_AHEAD, np.inf, distance)
+
+    def _waits(self, begins: Array) -> Leaders:
+        """The stop lines of junctions that cars may not enter yet."""
+        wait = self._distances_to_wait(begins) - self._cars.front - STOP_LINE
+        return Leaders(np.maximum(wait, 1e-3), np.zeros(len(self)))
+
+    def _update_crossings(self, leaders: Leaders, lights: Leaders, begins: Array) -> None:
         """Hand passages through junctions to the cars that come near and may have them, the nearest first.
 
-        `moving` are the lanes beneath foreign actors on the move: lanes that meet one of them are not handed out.
+        Lanes that meet one beneath a foreign actor on the move are not handed out. Who is stopped by a light before the
+        junction gives back what it got.
         """
+        cars = self._cars
+        names = list(self._index)
+        for index in np.flatnonzero(cars.granted[:, 0]).tolist():
+            held = self._crossings.holders[int(cars.plan[index, 0])]
+            held[names[index]] = float(cars.progress[index] + cars.rear[index])
+        ahead = cars.granted.any(axis=1) & ~cars.granted[:, 0] & np.isfinite(lights.gap)
+        for index in np.flatnonzero(ahead).tolist():
+            if lights.gap[index] + cars.front[index] < begins[index, np.argmax(cars.granted[index])]:
+                self._crossings.forget(names[index])
+                cars.granted[index] = False
+        distance = self._distances_to_wait(begins)
+        v = cars.speed
+        close = distance <= v * v / (2.0 * cars.drivers.deceleration) + cars.front + 4.0 * STOP_LINE + v
+        gap = leaders.gap + cars.front
         asking = []
-        for index, (name, car) in enumerate(self._cars.items()):
-            progress = float(self._progress[index])
-            for row in car.granted:
-                if row == car.plan[0]:
-                    self._crossings.holders[row][name] = progress + car.rear
-            distance = self._distance_to_wait(car, progress)
-            v = float(self._speed[index])
-            if distance > v * v / (2.0 * self.driver.deceleration) + car.front + 4.0 * STOP_LINE + v:
-                continue
-            passage = self._passage(car)
-            behind = distance + sum(self._lanes.lengths[row] for row in passage) - car.rear
-            gap = float(leaders.gap[index]) + car.front
-            first = gap > distance
-            room = gap > behind + self.driver.standstill_gap or float(leaders.speed[index]) > ROLLING
-            if first and room:
-                asking.append((distance, name, passage))
-        for _, name, passage in sorted(asking):
-            if all(self._crossings.free(row, name, moving) for row in passage):
-                for row in passage:
-                    self._grant(self._cars[name], row)
+        for index in np.flatnonzero(close & (gap > distance)).tolist():
+            passage = self._passage(index)
+            beyond = begins[index, passage[-1]] + self.lanes.length[cars.plan[index, passage[-1]]]
+            behind = beyond - cars.rear[index]
+            room = gap[index] > behind + cars.drivers.standstill_gap[index] or leaders.speed[index] > ROLLING
+            if room:
+                asking.append((float(distance[index]), names[index], index, passage))
+        for _, name, index, passage in sorted(asking):
+            if all(self._crossings.free(int(cars.plan[index, d]), name, self._moving) for d in passage):
+                for d in passage:
+                    self._grant(index, d)
 
-    def _passage(self, car: _Car) -> list[int]:
-        """The lanes of a car's plan through the next junction that it may not enter yet."""
+    def _passage(self, index: int) -> list[int]:
+        """Which lanes of a car's plan lead through the next junction that it may not enter yet."""
+        cars = self._cars
         found: list[int] = []
-        for row in car.plan[1:]:
-            if self._lanes.in_junction[row] and row not in car.granted:
-                found.append(row)
+        for d in range(1, PLANNED + 1):
+            row = cars.plan[index, d]
+            if row >= 0 and self.lanes.in_junction[row] and not cars.granted[index, d]:
+                found.append(d)
             elif found:
                 break
         return found
 
-    def _grant(self, car: _Car, row: int) -> None:
-        """Give a car a junction lane."""
-        car.granted.add(row)
-        self._crossings.take(row, car.spec.name)
+    def _grant(self, index: int, d: int) -> None:
+        """Give a car a junction lane of its plan."""
+        self._cars.granted[index, d] = True
+        self._crossings.take(int(self._cars.plan[index, d]), self._cars.specs[index].name)
 
-    def _desired_speeds(self) -> Array:
+    def _desired_speeds(self, begins: Array) -> Array:
         """Each car's own speed or the limit, less before bends so that comfortable braking suffices."""
-        found = np.empty(len(self._cars))
-        for index, car in enumerate(self._cars.values()):
-            progress = float(self._progress[index])
-            own = car.desired_speed
-            wanted = self._lanes.limit(car.plan[0], progress) if own is None else own
-            distance = -progress
-            for row in car.plan:
-                bend = self._lanes.bend_speed(row, self.driver.lateral_acceleration)
-                ahead = max(distance, 0.0)
-                if bend < wanted:
-                    wanted = min(wanted, math.sqrt(bend * bend + 2.0 * self.driver.deceleration * ahead))
-                distance += self._lanes.lengths[row]
-                if distance > LOOK_AHEAD:
-                    break
-            found[index] = wanted
-        return found
+        cars = self._cars
+        limit = self.lanes.limits(cars.row, cars.progress) * cars.factor
+        wanted = np.where(
+            np.isfinite(limit), limit, np.where(np.isinf(limit), np.maximum(FREE, cars.fallback), cars.fallback)
+        )
+        wanted = np.where(np.isnan(cars.own_speed), wanted, cars.own_speed)
+        seen = (cars.plan >= 0) & (begins <= LOOK_AHEAD)
+        bend = self.lanes.tightest(np.where(seen, cars.plan, cars.row[:, None]))
+        square = cars.drivers.lateral_acceleration[:, None] / np.maximum(bend, 1e-6)
+        square = square + 2.0 * cars.drivers.deceleration[:, None] * np.maximum(begins, 0.0)
+        slowest = np.sqrt(np.where(seen, square, np.inf).min(axis=1))
+        return np.asarray(np.minimum(wanted, slowest))
+
+    def _change_lanes(self, dt: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array) -> None:
+        """Let the drivers whose turn it is think of another lane."""
+        cars = self._cars
+        every = max(round(DECIDE_EACH / dt), 1)
+        who = np.flatnonzero(cars.number % every == self._ticks % every)
+        if not who.size:
+            return
+        junction = (cars.plan >= 0) & self.lanes.in_junction[cars.plan]
+        to_junction = np.where(junction, begins, np.inf).min(axis=1)
+        for index, target in self._changes.decide(cars, who, leaders, desired, occupants, to_junction):
+            self._changes.begin(cars, index, target)
+            cars.plan[index] = -1
+            cars.plan[index, 0] = target
+            cars.granted[index] = False
+            self._extend(index)
 
     def _pass_ends(self) -> None:
         """Cars that have come to the end of their lane go on in the next one, or leave."""
+        cars, lanes = self._cars, self.lanes
         gone = []
-        for index, (name, car) in enumerate(self._cars.items()):
-            while self._progress[index] >= self._lanes.lengths[car.plan[0]]:
-                if len(car.plan) == 1:
+        for index in np.flatnonzero(cars.progress >= lanes.length[cars.row]).tolist():
+            name = cars.specs[index].name
+            while cars.progress[index] >= lanes.length[cars.plan[index, 0]]:
+                if cars.plan[index, 1] < 0:
                     gone.append(name)
                     break
-                left = car.plan.pop(0)
-                beyond = float(self._progress[index] - self._lanes.lengths[left])
-                scale = self._lanes.stretch(np.array([left, car.plan[0]]), np.array([self._lanes.lengths[left], 0.0]))
-                self._progress[index] = beyond * float(scale[0] / scale[1])
-                if left in car.granted:
-                    car.granted.discard(left)
+                left, entered = int(cars.plan[index, 0]), int(cars.plan[index, 1])
+                beyond = float(cars.progress[index] - lanes.length[left])
+                scale = lanes.stretch(np.array([left, entered]), np.array([lanes.lengths[left], 0.0]))
+                cars.progress[index] = beyond * float(scale[0] / scale[1])
+                if cars.granted[index, 0]:
                     self._crossings.release(name, left)
-                self._extend(car)
+                cars.plan[index] = np.append(cars.plan[index, 1:], -1)
+                cars.granted[index] = np.append(cars.granted[index, 1:], False)
+                self._extend(index)
         for name in gone:
             self.remove(name)
         self.departed = frozenset(gone)
 
-    def _extend(self, car: _Car) -> None:
+    def _extend(self, index: int) -> None:
         """Plan further lanes until they reach as far as a leader counts; forks by the car's own random numbers."""
-        ahead = sum(self._lanes.lengths[row] for row in car.plan[1:])
-        while ahead < LOOK_AHEAD and len(car.plan) <= PLANNED:
-            choices = [row for row in self._lanes.following(car.plan[-1]) if self._lanes.tables.lane_drivable[row]]
+        cars, lengths = self._cars, self.lanes.lengths
+        plan = [row for row in cars.plan[index].tolist() if row >= 0]
+        ahead = sum(lengths[row] for row in plan[1:])
+        while ahead < LOOK_AHEAD and len(plan) <= PLANNED:
+            choices = self.lanes.following(plan[-1])
             if not choices:
-                return
+                break
             pick = 0
             if len(choices) > 1:
-                pick = int(generator(self._seed, "traffic", car.spec.name, car.turns).integers(len(choices)))
-                car.turns += 1
-            car.plan.append(choices[pick])
-            ahead += self._lanes.lengths[choices[pick]]
+                name, turn = cars.specs[index].name, int(cars.turns[index])
+                pick = int(generator(self._seed, "traffic", name, turn).integers(len(choices)))
+                cars.turns[index] += 1
+            cars.plan[index, len(plan)] = choices[pick]
+            plan.append(choices[pick])
+            ahead += lengths[choices[pick]]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+ABOVE_DESIRED = 2.0
+"""A car that is only too fast brakes no harder than so many times its comfortable deceleration, whereas the model's own
+term grows without a bound (Treiber and Kesting, 2013, chapter 11, on the improved acceleration function)."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +41,53 @@ class IntelligentDriver:
         speed, desired_speed  (N,) [m/s];  gap  bumper to bumper, inf without a leader (N,) [m]
         approach  own speed less the leader's (N,) [m/s]
         """
-        braking = speed * approach / (2.0 * np.sqrt(self.acceleration * self.deceleration))
-        wanted = self.standstill_gap + np.maximum(0.0, speed * self.time_gap + braking)
-        free = (speed / np.maximum(desired_speed, 1e-3)) ** self.exponent
-        found = self.acceleration * (1.0 - free - (wanted / np.maximum(gap, 1e-3)) ** 2)
-        return np.asarray(np.maximum(found, -self.emergency))
+        return Drivers.of([self]).response(speed, desired_speed, gap, approach)
 
     def equilibrium_gap(self, speed: float, desired_speed: float) -> float:
         """The gap at which a string of cars keeps one speed (equation 5 of the paper) [m]."""
         free: float = 1.0 - (speed / desired_speed) ** self.exponent
         return (self.standstill_gap + speed * self.time_gap) / float(np.sqrt(free))
+
+
+@dataclass(frozen=True)
+class Drivers:
+    """The parameters of many drivers: one row for each, one column for each field of IntelligentDriver."""
+
+    table: Array
+
+    @classmethod
+    def of(cls, drivers: list[IntelligentDriver]) -> Drivers:
+        """Drivers as a table."""
+        return cls(np.array([astuple(driver) for driver in drivers]).reshape(-1, len(fields(IntelligentDriver))))
+
+    def of_rows(self, rows: NDArray[np.int64]) -> Drivers:
+        """Some of them."""
+        return Drivers(self.table[rows])
+
+    def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
+        """As `IntelligentDriver.response`, each driver by its own parameters."""
+        time_gap, standstill_gap, acceleration, deceleration, exponent, emergency, _ = self.table.T
+        braking = speed * approach / (2.0 * np.sqrt(acceleration * deceleration))
+        wanted = standstill_gap + np.maximum(0.0, speed * time_gap + braking)
+        free = acceleration * (1.0 - (speed / np.maximum(desired_speed, 1e-3)) ** exponent)
+        free = np.maximum(free, -ABOVE_DESIRED * deceleration)
+        found = free - acceleration * (wanted / np.maximum(gap, 1e-3)) ** 2
+        return np.asarray(np.maximum(found, -emergency))
+
+    @property
+    def standstill_gap(self) -> Array:
+        """s0 of each [m]."""
+        return self.table[:, 1]
+
+    @property
+    def deceleration(self) -> Array:
+        """b of each [m/s²]."""
+        return self.table[:, 3]
+
+    @property
+    def lateral_acceleration(self) -> Array:
+        """In curves, of each [m/s²]."""
+        return self.table[:, 6]
 
 
 def ballistic(speed: Array, acceleration: Array, dt: float) -> tuple[Array, Array]:

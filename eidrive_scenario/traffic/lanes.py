@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads.location import LaneKey
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -16,10 +18,20 @@ FREE = 13.9
 """Desired speed where the map gives no limit [m/s]."""
 SAMPLE = 5.0
 """Distance between the places at which a lane's curvature is looked at [m]."""
+NARROWEST = 2.2
+"""A lane is no way for cars where it is narrower [m]."""
+WALKABLE = frozenset(("sidewalk", "walking"))
+"""Lane types on which people walk."""
 
 
 class TrafficLanes:
-    """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction."""
+    """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction.
+
+    left, right   the neighbour of the same direction to which the marking lets cars change, -1 where there is none
+    beside_left, beside_right  the same, whatever the marking
+    onward, backward  the first lane that a lane leads to, and that leads to it, -1 where there is none
+    ends_at       progress at which a lane comes to an end while one beside it goes on, inf for all others
+    """
 
     def __init__(self, roads: RoadNetwork) -> None:
         self.roads = roads
@@ -34,8 +46,81 @@ class TrafficLanes:
         self._origin = np.where(self.direction > 0, start, start + self.length)
         self.in_junction = np.array([roads.roads[key.road].junction_id is not None for key in self.keys])
         self.lengths: list[float] = self.length.tolist()
-        self._bends: dict[int, float] = {}
-        self._limits: dict[int, float] = {}
+        self.walkable = np.array([lane.type in WALKABLE for lane in tables.lanes])
+        self.left_hand = np.array([roads.roads[key.road].rule == "LHT" for key in self.keys])
+        self.onward = np.full(len(self.keys), -1)
+        self.backward = np.full(len(self.keys), -1)
+        self._ways: list[list[int]] = []
+        self._link()
+        self.left, self.right, self.beside_left, self.beside_right = (np.full(len(self.keys), -1) for _ in range(4))
+        self._join_neighbours()
+        self.ends_at = np.full(len(self.keys), np.inf)
+        self._find_ends()
+        self._tightest = np.full(len(self.keys), np.nan)
+        self._limit = np.full(len(self.keys), np.nan)
+        self._varying = np.zeros(len(self.keys), dtype=bool)
+        for row, key in enumerate(self.keys):
+            road = roads.roads[key.road]
+            self._varying[row] = len(road.types) > 1 or len(tables.lanes[row].speeds) > 1
+
+    def _link(self) -> None:
+        """Ways on from the graph: driving lanes lead to driving lanes, sidewalks to sidewalks."""
+        graph, drivable = self.roads.graph, self.tables.lane_drivable
+        for row, key in enumerate(self.keys):
+            ways = graph[key].items() if key in graph else ()
+            found = [
+                other
+                for way, edge in ways
+                if edge["kind"] == "successor"
+                and (drivable[row], self.walkable[row]) == (drivable[other := self.row[way]], self.walkable[other])
+            ]
+            self._ways.append(found)
+            if found:
+                self.onward[row] = found[0]
+            for other in found:
+                if self.backward[other] < 0:
+                    self.backward[other] = row
+
+    def _join_neighbours(self) -> None:
+        for road in self.tables.roads:
+            if road.junction_id is not None:
+                continue
+            for section in road.sections:
+                numbers = [number for number in section.lanes if number]
+                for leftmost, rightmost in pairwise(numbers):
+                    one, two = (self.row[LaneKey(road.id, section.index, number)] for number in (leftmost, rightmost))
+                    same = self.direction[one] == self.direction[two]
+                    if not (same and self.tables.lane_drivable[one] and self.tables.lane_drivable[two]):
+                        continue
+                    outward, inward = self._may_cross(one, two)
+                    if self.direction[one] > 0:
+                        self.beside_right[one], self.beside_left[two] = two, one
+                        self.right[one], self.left[two] = (two if outward else -1), (one if inward else -1)
+                    else:
+                        self.beside_left[one], self.beside_right[two] = two, one
+                        self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
+
+    def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
+        """Whether the marking between neighbours, `one` left of `two` along s, lets cars from one to two, and back.
+
+        It is the marking on the outer edge of the lane nearer to lane 0. `increase` lets cars change to the higher id.
+        """
+        numbers = self.keys[one].lane, self.keys[two].lane
+        between = self.tables.roads[self.road[one]].sections[self.keys[one].section].lanes
+        edge = 0 if numbers[0] > 0 > numbers[1] else min(numbers, key=abs)
+        marks = between[edge].road_marks
+        rule = marks[0].lane_change if marks else "both"
+        return rule not in ("increase", "none"), rule not in ("decrease", "none")
+
+    def _find_ends(self) -> None:
+        """Lanes that lead nowhere beside one that goes on; cars have to have left them before they get too narrow."""
+        for row in np.flatnonzero(self.tables.lane_drivable & ~self.in_junction & (self.onward < 0)):
+            beside = [int(other) for other in (self.beside_left[row], self.beside_right[row]) if other >= 0]
+            if any(self.onward[other] >= 0 for other in beside):
+                progress = np.linspace(0.0, self.length[row], max(math.ceil(self.length[row] / SAMPLE), 1) + 1)
+                narrow = np.flatnonzero(self.width(np.full(len(progress), row), progress) < NARROWEST)
+                first = narrow[narrow > 0]
+                self.ends_at[row] = progress[first[0]] if first.size else self.length[row]
 
     def s(self, row: Integers, progress: Array) -> Array:
         """s of the road at a progress along lanes."""
@@ -45,6 +130,16 @@ class TrafficLanes:
         """The progress at which lanes pass an s of their road."""
         return (s - self._origin[row]) * self.direction[row]
 
+    def width(self, row: Integers, progress: Array) -> Array:
+        """Width of lanes at a progress [m]."""
+        ds = self.s(row, progress) - self.tables.section_start[self.tables.lane_section[row]]
+        return self.tables.width.value(row, ds)
+
+    def apart(self, row: Integers, other: Integers, progress: Array) -> Array:
+        """How far left of the driving direction the centre of `other` lies from that of `row`, of one section [m]."""
+        s = self.s(row, progress)
+        return (self.tables.lane_t(other, s)[0] - self.tables.lane_t(row, s)[0]) * self.direction[row]
+
     def of(self, location: LaneLocation) -> tuple[int, float]:
         """Row and progress of a place."""
         index = np.array([self.tables.index[location.road]])
@@ -52,41 +147,51 @@ class TrafficLanes:
         row = self.tables.lane_row(index, s, np.array([location.lane]))
         return int(row[0]), float(self.progress(row, s)[0])
 
+    def chain(self, row: Integers, depth: int) -> Integers:
+        """(N, depth) lanes that follow each other from rows (N,) on, the first way at each fork; -1 beyond an end."""
+        chain = np.full((len(row), depth), -1)
+        chain[:, 0] = row
+        for d in range(1, depth):
+            before = chain[:, d - 1]
+            chain[:, d] = np.where(before >= 0, self.onward[before], -1)
+        return chain
+
     def following(self, row: int) -> list[int]:
-        """The lanes that traffic may enter at the end of a lane, in the order of the map."""
-        key = self.keys[row]
-        if key not in self.roads.graph:
-            return []
-        ways = self.roads.graph[key].items()
-        return [self.row[other] for other, edge in ways if edge["kind"] == "successor"]
+        """The lanes of the same kind that traffic may enter at the end of a lane, in the order of the map."""
+        return self._ways[row]
 
     def stretch(self, row: Integers, progress: Array) -> Array:
         """Metres of path per metre of progress, at the lanes' centre lines."""
         return self.tables.stretch(row, self.s(row, progress))
 
-    def bend_speed(self, row: int, lateral: float) -> float:
-        """The speed at which the sharpest bend of a lane asks for a lateral acceleration [m/s]."""
-        tightest = self._bends.get(row)
-        if tightest is None:
-            count = max(math.ceil(self.length[row] / SAMPLE), 1) + 1
-            rows = np.full(count, row)
-            s = self.s(rows, np.linspace(0.0, self.length[row], count))
-            t, _ = self.tables.lane_t(rows, s)
-            _, _, _, curvature, _ = self.tables.curves.at(self.road[rows], s)
-            tightest = float(np.max(np.abs(curvature) / np.maximum(np.abs(1.0 - curvature * t), 0.05)))
-            self._bends[row] = tightest
-        return math.sqrt(lateral / tightest) if tightest > 1e-6 else math.inf
-
-    def limit(self, row: int, progress: float) -> float:
-        """The speed limit of a lane [m/s]."""
-        known = self._limits.get(row)
-        if known is not None:
-            return known
-        key = self.keys[row]
-        road = self.roads.roads[key.road]
-        s = float(self.s(np.array([row]), np.array([progress]))[0])
-        limit = self.roads.speed_limit(key.road, s, key.lane)
-        found = FREE if limit is None or math.isinf(limit) else limit
-        if len(road.types) < 2 and len(road.sections[key.section].lanes[key.lane].speeds) < 2:
-            self._limits[row] = found
+    def tightest(self, row: Integers) -> Array:
+        """The largest curvature of lanes [1/m], of any shape of rows."""
+        found = self._tightest[row]
+        if np.isnan(found).any():
+            for fresh in np.unique(row[np.isnan(found)]).tolist():
+                count = max(math.ceil(self.length[fresh] / SAMPLE), 1) + 1
+                rows = np.full(count, fresh)
+                s = self.s(rows, np.linspace(0.0, self.length[fresh], count))
+                t, _ = self.tables.lane_t(rows, s)
+                _, _, _, curvature, _ = self.tables.curves.at(self.road[rows], s)
+                self._tightest[fresh] = np.max(np.abs(curvature) / np.maximum(np.abs(1.0 - curvature * t), 0.05))
+            found = self._tightest[row]
         return found
+
+    def limits(self, row: Integers, progress: Array) -> Array:
+        """The speed limits at places (N,) [m/s]; NaN where the map gives none, inf where it gives `no limit`."""
+        found = self._limit[row]
+        fresh = np.isnan(found) | self._varying[row]
+        for n in np.flatnonzero(fresh):
+            limit = self._limit_at(int(row[n]), float(progress[n]))
+            found[n] = limit
+            if not self._varying[row[n]]:
+                self._limit[row[n]] = limit
+        return np.where(found < 0.0, np.nan, found)
+
+    def _limit_at(self, row: int, progress: float) -> float:
+        """The limit at one place, -1 where the map gives none."""
+        key = self.keys[row]
+        s = float(self.s(np.array([row]), np.array([progress]))[0])
+        limit = self.roads.speed_limit(key.road, min(max(s, 0.0), self.roads.roads[key.road].length), key.lane)
+        return -1.0 if limit is None else limit

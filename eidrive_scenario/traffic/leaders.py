@@ -1,8 +1,9 @@
-"""Who drives or stands ahead of whom: per lane, over the lanes that each car will take."""
+"""Who drives or stands ahead of whom, and behind: per lane, over the lanes that each car will take."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,12 @@ BIG = 1e5
 """Longer than any lane [m]: rows times BIG plus progress puts all lanes on one axis."""
 LOOK_AHEAD = 120.0
 """How far ahead a leader counts [m]."""
+LOOK_BACK = 3
+"""Over how many lanes a follower is looked for behind the own one."""
 STANDING = 0.5
 """Slower than this counts as standing [m/s]."""
+FOREIGN, FIXED = -1, -2
+"""Owners of what does not belong to the fleet: other actors, and the ends of lanes."""
 OUTLINE = np.array(
     [(0.5, 0.5), (0.5, 0.0), (0.5, -0.5), (0.0, 0.5), (0.0, -0.5), (-0.5, 0.5), (-0.5, 0.0), (-0.5, -0.5)]
 )
@@ -26,16 +31,26 @@ OUTLINE = np.array(
 
 @dataclass(frozen=True)
 class Occupants:
-    """What stands or drives on lanes: row, progress of what places it in the queue, progress of its rear, speed [m/s].
+    """What stands or drives on lanes.
 
-    owner  the car's index in the fleet, -1 for what does not belong to it
+    row    (M,) the lane;  key  (M,) progress of what places it in the queue [m]
+    rear, front  (M,) progress of its ends [m];  speed  (M,) along the lane [m/s]
+    owner  (M,) the car's index in the fleet, below 0 for what does not belong to it
     """
 
     row: Integers
     key: Array
     rear: Array
+    front: Array
     speed: Array
     owner: Integers
+
+    @cached_property
+    def order(self) -> tuple[Integers, Array]:
+        """Their numbers in the order along the axis of all lanes, and their places on it."""
+        place = self.row * BIG + self.key
+        order = np.argsort(place, kind="stable")
+        return order, place[order]
 
 
 @dataclass(frozen=True)
@@ -45,48 +60,117 @@ class Leaders:
     gap: Array
     speed: Array
 
+    def or_nearer(self, other: Leaders) -> Leaders:
+        """The nearer one of two, for each car."""
+        nearer = other.gap < self.gap
+        return Leaders(np.where(nearer, other.gap, self.gap), np.where(nearer, other.speed, self.speed))
 
-def find_leaders(lanes: TrafficLanes, plans: Integers, progress: Array, front: Array, occupants: Occupants) -> Leaders:
+
+@dataclass(frozen=True)
+class Followers:
+    """Gap from a car's rear to its follower's front (N,) [m], inf for none; the followers' numbers among the occupants
+    (N,), -1 for none."""
+
+    gap: Array
+    number: Integers
+
+
+def find_leaders(
+    lanes: TrafficLanes,
+    plans: Integers,
+    progress: Array,
+    front: Array,
+    occupants: Occupants,
+    own: Integers | None = None,
+) -> Leaders:
     """The next occupant ahead of each car on its plan.
 
     plans     (N, D) rows of the lanes that each car takes, its own first, -1 where the plan ends
     progress  (N,) of the cars' reference points; front  (N,) distance from there to the front bumper [m]
+    own       (N,) the cars' numbers in the fleet, 0, 1, 2, … where not given
     """
     count, depth = plans.shape
     gap, speed = np.full(count, np.inf), np.zeros(count)
-    if not len(occupants.row):
+    if not len(occupants.row) or not count:
         return Leaders(gap, speed)
-    composite = occupants.row * BIG + occupants.key
-    order = np.argsort(composite, kind="stable")
-    composite = composite[order]
-    me = np.arange(count)
-    offset = -progress
-    open_ = np.ones(count, dtype=bool)
+    order, place = occupants.order
+    me = np.arange(count) if own is None else own
+    open_, offset = np.arange(count), -progress
     for d in range(depth):
-        row = plans[:, d]
-        open_ &= (row >= 0) & (offset < LOOK_AHEAD)
-        if not open_.any():
+        row = plans[open_, d]
+        going = (row >= 0) & (offset < LOOK_AHEAD)
+        open_, offset, row = open_[going], offset[going], row[going]
+        if not open_.size:
             break
-        start = row * BIG + progress if d == 0 else row * BIG - 1.0
-        at = np.searchsorted(composite, start, side="right" if d == 0 else "left")
-        inside = open_ & (at < len(order))
+        if d == 0:
+            at = np.searchsorted(place, row * BIG + progress[open_], side="right")
+        else:
+            at = np.searchsorted(place, row * BIG - 1.0, side="left")
         found = order[np.minimum(at, len(order) - 1)]
-        hit = inside & (occupants.row[found] == row) & (occupants.owner[found] != me)
-        gap[hit] = offset[hit] + occupants.rear[found[hit]] - front[hit]
-        speed[hit] = occupants.speed[found[hit]]
-        open_ &= ~hit
-        offset = offset + np.where(row >= 0, lanes.length[row], 0.0)
+        hit = (at < len(order)) & (occupants.row[found] == row) & (occupants.owner[found] != me[open_])
+        which = found[hit]
+        gap[open_[hit]] = offset[hit] + occupants.rear[which] - front[open_[hit]]
+        speed[open_[hit]] = occupants.speed[which]
+        offset = offset + lanes.length[row]
+        open_, offset = open_[~hit], offset[~hit]
     return Leaders(gap, speed)
 
 
-def obstacles(lanes: TrafficLanes, view: WorldView, own: frozenset[str]) -> tuple[Occupants, set[int]]:
+def find_followers(
+    lanes: TrafficLanes, row: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
+) -> Followers:
+    """The next occupant that moves behind places on lanes, on the lane itself and those that lead to it.
+
+    row, progress  (N,) of the reference points; rear  (N,) distance from there to the rear bumper, negative [m]
+    own  (N,) numbers in the fleet of those who ask
+    """
+    count = len(row)
+    gap, number = np.full(count, np.inf), np.full(count, -1)
+    if not len(occupants.row) or not count:
+        return Followers(gap, number)
+    order, place = occupants.order
+    open_, offset, at_row = np.arange(count), progress.copy(), row
+    for d in range(LOOK_BACK + 1):
+        limit = at_row * BIG + (progress[open_] if d == 0 else lanes.length[at_row] + 1.0)
+        at = np.searchsorted(place, limit, side="left" if d == 0 else "right") - 1
+        found = order[np.maximum(at, 0)]
+        hit = (at >= 0) & (occupants.row[found] == at_row) & (occupants.owner[found] != own[open_])
+        which = found[hit]
+        gap[open_[hit]] = offset[hit] + rear[open_[hit]] - occupants.front[which]
+        number[open_[hit]] = which
+        at_row = lanes.backward[at_row]
+        going = ~hit & (at_row >= 0) & (offset < LOOK_AHEAD)
+        open_, at_row = open_[going], at_row[going]
+        offset = offset[going] + lanes.length[at_row]
+        if not open_.size:
+            break
+    fixed = number >= 0
+    fixed[fixed] = occupants.owner[number[fixed]] == FIXED
+    gap[fixed], number[fixed] = np.inf, -1
+    return Followers(gap, number)
+
+
+def nobody() -> Occupants:
+    """No occupants."""
+    none = np.empty(0)
+    return Occupants(np.empty(0, dtype=np.int64), none, none, none, none, np.empty(0, dtype=np.int64))
+
+
+def obstacles(
+    lanes: TrafficLanes, view: WorldView, own: frozenset[str], near: Array | None = None
+) -> tuple[Occupants, set[int]]:
     """The outlines of all actors not in `own`, on every lane that they touch, and the lanes of those that move.
 
     In a junction, where roads lie over each other, an actor stands on all the lanes that pass beneath it.
+    near  (K, 2) places [m]: actors further away from all of them than anybody looks do not count
     """
-    rows = [row for row, name in enumerate(view.names) if name not in own]
-    if not rows:
-        return Occupants(*(np.empty(0, dtype=kind) for kind in (np.int64, float, float, float, np.int64))), set()
+    rows = np.array([row for row, name in enumerate(view.names) if name not in own], dtype=np.int64)
+    if near is not None and rows.size:
+        reach = LOOK_AHEAD + np.hypot(view.size[rows, 0], view.size[rows, 1])
+        square = np.sum((view.position[rows, None, :2] - near[None]) ** 2, axis=2)
+        rows = rows[np.any(square < reach[:, None] ** 2, axis=1)] if len(near) else rows[:0]
+    if not rows.size:
+        return nobody(), set()
     boxes = view.boxes[rows]
     corners = OUTLINE[None] * boxes[:, None, 3:5]
     cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
@@ -100,15 +184,11 @@ def obstacles(lanes: TrafficLanes, view: WorldView, own: frozenset[str]) -> tupl
     along = velocity[point, 0] * np.cos(heading) + velocity[point, 1] * np.sin(heading)
     speed = np.maximum(along * lanes.direction[row], 0.0)
     moving = np.hypot(*velocity[point].T) > STANDING
-    return Occupants(row, progress, progress, speed, np.full(len(row), -1)), set(row[moving].tolist())
+    found = Occupants(row, progress, progress, progress, speed, np.full(len(row), FOREIGN))
+    return found, set(row[moving].tolist())
 
 
-def together(one: Occupants, other: Occupants) -> Occupants:
-    """Both, as one."""
-    return Occupants(
-        np.concatenate([one.row, other.row]),
-        np.concatenate([one.key, other.key]),
-        np.concatenate([one.rear, other.rear]),
-        np.concatenate([one.speed, other.speed]),
-        np.concatenate([one.owner, other.owner]),
-    )
+def together(*parts: Occupants) -> Occupants:
+    """All of them, as one."""
+    names = ("row", "key", "rear", "front", "speed", "owner")
+    return Occupants(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

@@ -1,0 +1,66 @@
+"""Stop lines: where cars wait while a traffic light tells them to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from eidrive_scenario.roads.location import LaneKey
+from eidrive_scenario.roads.model import SignalPlace
+from eidrive_scenario.traffic.lanes import TrafficLanes
+from eidrive_scenario.traffic.leaders import FIXED, Occupants, nobody
+
+MustStop = Callable[[str], bool]
+"""Whether the traffic light of this id tells traffic to stop now."""
+
+
+class StopLines:
+    """The lights of a map on the lanes for which they are valid.
+
+    Cars wait at the light's s; a light on a connecting road holds them before the junction.
+    """
+
+    def __init__(self, lanes: TrafficLanes, must_stop: MustStop) -> None:
+        self._lanes = lanes
+        self._must_stop = must_stop
+        self._signals: list[str] = []
+        found: list[tuple[int, float, int]] = []
+        for signal in lanes.roads.signals.values():
+            if not signal.dynamic:
+                continue
+            for place in (signal.place, *signal.references):
+                found += [(row, progress, len(self._signals)) for row, progress in self._on_lanes(place)]
+            self._signals.append(signal.id)
+        self._row = np.array([row for row, _, _ in found], dtype=np.int64)
+        self._progress = np.array([progress for _, progress, _ in found])
+        self._signal = np.array([signal for _, _, signal in found], dtype=np.int64)
+        self._shown: tuple[bool, ...] = ()
+        self._closed = nobody()
+
+    def _on_lanes(self, place: SignalPlace) -> list[tuple[int, float]]:
+        lanes = self._lanes
+        road = lanes.roads.roads.get(place.road)
+        if road is None:
+            return []
+        section = road.section_at(place.s)
+        found = []
+        for number in section.lanes:
+            row = lanes.row[LaneKey(road.id, section.index, number)]
+            against = {"+": 1, "-": -1}.get(place.orientation, 0) == -lanes.direction[row]
+            valid = not place.validity or any(min(pair) <= number <= max(pair) for pair in place.validity)
+            if number and valid and not against and lanes.tables.lane_drivable[row]:
+                progress = float(lanes.progress(np.array([row]), np.array([place.s]))[0])
+                found.append((row, 0.0 if road.junction_id is not None else progress))
+        return found
+
+    def closed(self) -> Occupants:
+        """The lines at which traffic has to stop now, as things that stand there."""
+        shown = tuple(self._must_stop(signal) for signal in self._signals)
+        if shown != self._shown:
+            self._shown = shown
+            red = np.array(shown, dtype=bool)[self._signal]
+            row, progress = self._row[red], self._progress[red]
+            still = np.zeros(len(row))
+            self._closed = Occupants(row, progress, progress, progress, still, np.full(len(row), FIXED))
+        return self._closed
