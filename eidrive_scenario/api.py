@@ -24,7 +24,7 @@ from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand, LightState, Override, Visibility
-from eidrive_scenario.storyboard.condition import Condition, EntityCondition, compares, in_words
+from eidrive_scenario.storyboard.condition import Condition, EntityCondition, Measure, compares, in_words
 from eidrive_scenario.storyboard.distances import box_of, distance, frame_of, kind_of
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
@@ -68,6 +68,7 @@ __all__ = [
     "Layout",
     "LightState",
     "LinkEvent",
+    "Measure",
     "Message",
     "Motion",
     "Override",

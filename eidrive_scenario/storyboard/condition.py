@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.storyboard.stage import Stage
@@ -46,6 +47,16 @@ def in_words(rule: model.Rule) -> str:
     return WORDS[rule.value]
 
 
+class Measure(NamedTuple):
+    """What a condition compares at one instant; `of` is the entity, "" where it is about none."""
+
+    of: str
+    value: float
+    rule: model.Rule
+    limit: float
+    unit: str
+
+
 class Condition(ABC):
     """A predicate over the stage. Edges and delays are the Trigger's, not its own."""
 
@@ -67,12 +78,19 @@ class Condition(ABC):
         """The condition in words, without values."""
         return type(self.element).__name__
 
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """The quantities that it compares now, if it compares any."""
+        return ()
+
 
 class EntityCondition(Condition):
     """A condition on each of several triggering entities, joined by `any` or `all`.
 
     An entity that is not in the world fulfils nothing.
     """
+
+    unit: ClassVar[str] = ""
+    """Of the quantity that it compares."""
 
     def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element)
@@ -97,6 +115,20 @@ class EntityCondition(Condition):
         """Whom it is about, and what."""
         joined = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
         return f"{joined}: {self.describe_for()}"
+
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """The quantity of each entity that is in the world."""
+        found = [(name, self.quantity(stage, name)) for name in self.entities if name in stage.view]
+        return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in found if value is not None)
+
+    def quantity(self, stage: Stage, entity: str) -> float | None:
+        """What it compares for this entity, which is in the world; NaN where that is undefined now, None if nothing."""
+        return None
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """How the quantity is compared, and with what."""
+        element: Any = self.element
+        return element.rule, element.value
 
     @abstractmethod
     def holds_for(self, stage: Stage, entity: str) -> bool:

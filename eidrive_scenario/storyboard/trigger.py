@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import py_trees
 from py_trees.common import Status
@@ -31,7 +32,10 @@ class ConditionMonitor:
 
     def reset(self) -> None:
         """Forget all evaluations."""
-        self._last: bool | None = None
+        self.value: bool | None = None
+        """What the condition was when it was last asked, without edge and delay; None before the first time."""
+        self.result = False
+        """What it counted as then."""
         self._recorded = False
         self._history: deque[tuple[float, bool, str]] = deque()
         self._delayed = (False, "")
@@ -39,8 +43,10 @@ class ConditionMonitor:
     def evaluate(self, stage: Stage) -> bool:
         """Ask the condition once and answer with edge and delay. Called at most once per tick."""
         result = self._edge(self.condition.holds(stage))
-        if self.delay <= 0.0:
-            return result
+        self.result = result if self.delay <= 0.0 else self._late(stage, result)
+        return self.result
+
+    def _late(self, stage: Stage, result: bool) -> bool:
         if result != self._recorded:
             self._recorded = result
             self._history.append((stage.time, result, self.condition.explain(stage) if result else ""))
@@ -50,7 +56,7 @@ class ConditionMonitor:
         return self._delayed[0]
 
     def _edge(self, value: bool) -> bool:
-        before, self._last = self._last, value
+        before, self.value = self.value, value
         if self.edge == "none":
             return value
         if before is None or before == value:
@@ -82,12 +88,20 @@ class ConditionGroup:
         return bool(results) and all(results)
 
 
+class Witness(Protocol):
+    """Looks on as a trigger is asked."""
+
+    def saw(self, trigger: Trigger, stage: Stage, fired: bool) -> None:
+        """The trigger has been asked."""
+
+
 class Trigger:
     """An OR over condition groups."""
 
     def __init__(self, groups: Sequence[ConditionGroup]) -> None:
         self.groups = tuple(groups)
         self.why = ""
+        self.witness: Witness | None = None
         self.triggering: tuple[str, ...] = ()
         """The entities that fulfilled the conditions of the group that fired."""
 
@@ -97,6 +111,8 @@ class Trigger:
     def evaluate(self, stage: Stage) -> bool:
         """True where it fires; `why` then says what did it. Called at most once per tick."""
         fired = [group for group in self.groups if group.evaluate(stage)]
+        if self.witness is not None:
+            self.witness.saw(self, stage, bool(fired))
         if not fired:
             return False
         monitors = fired[0].monitors

@@ -30,10 +30,19 @@ class AngleCondition(EntityCondition):
     """An angle of the entity lies within a tolerance of a value [rad]."""
 
     element: model.AngleCondition
+    unit = "rad"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare it, the short way round the circle."""
-        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle)) <= self.element.angle_tolerance
+        return self.quantity(stage, entity) <= self.element.angle_tolerance
+
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """How far the angle is from the value."""
+        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle))
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """At most the tolerance."""
+        return model.Rule.LESS_OR_EQUAL, self.element.angle_tolerance
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The angle."""
@@ -53,12 +62,21 @@ class RelativeAngleCondition(EntityCondition):
     """An angle of the entity less that of another entity lies within a tolerance of a value [rad]."""
 
     element: model.RelativeAngleCondition
+    unit = "rad"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare it, the short way round the circle."""
+        return self.quantity(stage, entity) <= self.element.angle_tolerance
+
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """How far the angle is from the value."""
         if self.element.entity_ref not in stage.view:
-            return False
-        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle)) <= self.element.angle_tolerance
+            return math.nan
+        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle))
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """At most the tolerance."""
+        return model.Rule.LESS_OR_EQUAL, self.element.angle_tolerance
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The angle."""

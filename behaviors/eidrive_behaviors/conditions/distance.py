@@ -60,23 +60,25 @@ class DistanceCondition(EntityCondition):
     """Distance to a position [m]; positions relative to entities move with them."""
 
     element: model.DistanceCondition
+    unit = "m"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare its amount."""
-        return compares(abs(self._distance(stage, entity)), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The distance."""
-        value = abs(self._distance(stage, entity))
+        value = self.quantity(stage, entity)
         return f"{entity}: distance {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
 
     def describe_for(self) -> str:
         """Rule and limit."""
         return f"distance to {self._target()} {in_words(self.element.rule)} {self.element.value:g} m"
 
-    def _distance(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The amount of the distance."""
         place = place_of(stage, self.element.position, entity)
-        return math.nan if place is None else measured(stage, entity, place, self.element)
+        return math.nan if place is None else abs(measured(stage, entity, place, self.element))
 
     def _target(self) -> str:
         return type(self.element.position.chosen()).__name__
@@ -86,20 +88,24 @@ class RelativeDistanceCondition(EntityCondition):
     """Distance to another entity [m]."""
 
     element: model.RelativeDistanceCondition
+    unit = "m"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare its amount."""
-        value = abs(measured(stage, entity, self.element.entity_ref, self.element))
-        return compares(value, self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The distance."""
-        value = abs(measured(stage, entity, self.element.entity_ref, self.element))
+        value = self.quantity(stage, entity)
         return f"{entity}: {self._what()} {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
 
     def describe_for(self) -> str:
         """Rule and limit."""
         return f"{self._what()} {in_words(self.element.rule)} {self.element.value:g} m"
+
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The amount of the distance."""
+        return abs(measured(stage, entity, self.element.entity_ref, self.element))
 
     def _what(self) -> str:
         gap = " free" if self.element.freespace else ""
@@ -111,24 +117,29 @@ class ReachPositionCondition(EntityCondition):
     """Within a tolerance [m] of a position, seen from above."""
 
     element: model.ReachPositionCondition
+    unit = "m"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the distance between the reference point and the position."""
-        return self._distance(stage, entity) <= self.element.tolerance
+        return self.quantity(stage, entity) <= self.element.tolerance
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The distance."""
-        return (
-            f"{entity}: {self._distance(stage, entity):.2f} m from the position, tolerance {self.element.tolerance:g} m"
-        )
+        gap = self.quantity(stage, entity)
+        return f"{entity}: {gap:.2f} m from the position, tolerance {self.element.tolerance:g} m"
 
     def describe_for(self) -> str:
         """The tolerance."""
         return f"within {self.element.tolerance:g} m of {type(self.element.position.chosen()).__name__}"
 
-    def _distance(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The distance between the reference point and the position; infinite where that is nowhere."""
         place = place_of(stage, self.element.position, entity)
         if place is None:
             return math.inf
         here = stage.pose(entity)
         return math.hypot(place.pose.x - here.x, place.pose.y - here.y)
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """At most the tolerance."""
+        return model.Rule.LESS_OR_EQUAL, self.element.tolerance

@@ -29,21 +29,23 @@ class SpeedCondition(EntityCondition):
     """Speed [m/s], signed along the heading; with a direction the velocity's component along that axis."""
 
     element: model.SpeedCondition
+    unit = "m/s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the speed."""
-        return compares(self._speed(stage, entity), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The speed."""
-        value, rule = self._speed(stage, entity), in_words(self.element.rule)
+        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
         return f"{entity}: speed {value:.2f} m/s {rule} {self.element.value:g} m/s"
 
     def describe_for(self) -> str:
         """Rule and limit."""
         return f"speed {in_words(self.element.rule)} {self.element.value:g} m/s"
 
-    def _speed(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The speed."""
         if self.element.direction is None:
             return stage.speed(entity)
         return along(velocity_of(stage.view, entity), stage.pose(entity).h, self.element.direction)
@@ -53,14 +55,15 @@ class RelativeSpeedCondition(EntityCondition):
     """Own speed less another entity's [m/s]; with a direction along that axis of the other entity."""
 
     element: model.RelativeSpeedCondition
+    unit = "m/s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the difference."""
-        return compares(self._difference(stage, entity), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The difference."""
-        value, rule = self._difference(stage, entity), in_words(self.element.rule)
+        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
         return f"{entity}: {value:.2f} m/s faster than {self.element.entity_ref} {rule} {self.element.value:g} m/s"
 
     def describe_for(self) -> str:
@@ -68,7 +71,8 @@ class RelativeSpeedCondition(EntityCondition):
         rule = in_words(self.element.rule)
         return f"speed above that of {self.element.entity_ref} {rule} {self.element.value:g} m/s"
 
-    def _difference(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The difference."""
         other = self.element.entity_ref
         if other not in stage.view:
             return math.nan
@@ -83,21 +87,23 @@ class AccelerationCondition(EntityCondition):
     """Acceleration [m/s²]: its amount, or with a direction its component along that axis."""
 
     element: model.AccelerationCondition
+    unit = "m/s²"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the acceleration."""
-        return compares(self._acceleration(stage, entity), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The acceleration."""
-        value, rule = self._acceleration(stage, entity), in_words(self.element.rule)
+        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
         return f"{entity}: acceleration {value:.2f} m/s² {rule} {self.element.value:g} m/s²"
 
     def describe_for(self) -> str:
         """Rule and limit."""
         return f"acceleration {in_words(self.element.rule)} {self.element.value:g} m/s²"
 
-    def _acceleration(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The acceleration."""
         vector = stage.view.acceleration[stage.view.row(entity)].tolist()
         return along(vector, stage.pose(entity).h, self.element.direction)
 
@@ -106,6 +112,7 @@ class StandStillCondition(EntityCondition):
     """Has stood still for longer than a duration [s]."""
 
     element: model.StandStillCondition
+    unit = "s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare how long it stands."""
@@ -119,11 +126,20 @@ class StandStillCondition(EntityCondition):
         """The duration."""
         return f"stands still for {self.element.duration:g} s"
 
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """How long it stands."""
+        return span(stage, stage.actors[entity].standing_since)
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """Longer than the duration."""
+        return model.Rule.GREATER_THAN, self.element.duration
+
 
 class TraveledDistanceCondition(EntityCondition):
     """Has covered a distance since it entered the world [m]."""
 
     element: model.TraveledDistanceCondition
+    unit = "m"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the distance covered."""
@@ -137,10 +153,23 @@ class TraveledDistanceCondition(EntityCondition):
         """The limit."""
         return f"travelled ≥ {self.element.value:g} m"
 
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The distance covered."""
+        return stage.actors[entity].traveled
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """At least the distance."""
+        return model.Rule.GREATER_OR_EQUAL, self.element.value
+
 
 def lasted(stage: Stage, start: float | None, duration: float) -> bool:
     """True where something that began at `start` has gone on for longer than `duration` [s]."""
     return start is not None and stage.time - start > duration + 1e-6
+
+
+def span(stage: Stage, start: float | None) -> float:
+    """How long something has gone on [s]; NaN where it does not."""
+    return math.nan if start is None else stage.time - start
 
 
 def since(stage: Stage, start: float | None, what: str, otherwise: str) -> str:

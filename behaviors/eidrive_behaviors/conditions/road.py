@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_behaviors.conditions.motion import lasted, since
+from eidrive_behaviors.conditions.motion import lasted, since, span
 from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, model
 
 
@@ -10,6 +10,7 @@ class EndOfRoadCondition(EntityCondition):
     """Has been at the end of its road for a duration [s]."""
 
     element: model.EndOfRoadCondition
+    unit = "s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare how long."""
@@ -26,11 +27,20 @@ class EndOfRoadCondition(EntityCondition):
         """The duration."""
         return f"at the end of its road for {self.element.duration:g} s"
 
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """How long it is there."""
+        return span(stage, stage.actors[entity].end_of_road_since)
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """Longer than the duration."""
+        return model.Rule.GREATER_THAN, self.element.duration
+
 
 class OffroadCondition(EntityCondition):
     """Has been off the road with its reference point for longer than a duration [s]. Lanes `none` are no road."""
 
     element: model.OffroadCondition
+    unit = "s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare how long. The state is looked at here, so that runs without this condition need not pay for it."""
@@ -56,3 +66,11 @@ class OffroadCondition(EntityCondition):
     def describe_for(self) -> str:
         """The duration."""
         return f"off the road for {self.element.duration:g} s"
+
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """How long it is off the road."""
+        return span(stage, stage.actors[entity].off_road_since)
+
+    def threshold(self) -> tuple[model.Rule, float]:
+        """Longer than the duration."""
+        return model.Rule.GREATER_THAN, self.element.duration

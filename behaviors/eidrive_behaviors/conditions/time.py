@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from eidrive_scenario.api import Condition, Stage, compares, in_words, model
+from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
 
 
 class SimulationTimeCondition(Condition):
@@ -23,6 +23,10 @@ class SimulationTimeCondition(Condition):
     def describe(self) -> str:
         """Rule and limit."""
         return f"simulation time {in_words(self.element.rule)} {self.element.value:g} s"
+
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """The time."""
+        return (Measure("", stage.time, self.element.rule, self.element.value, "s"),)
 
 
 class TimeOfDayCondition(Condition):

@@ -14,14 +14,15 @@ class TimeHeadwayCondition(EntityCondition):
     """Distance to another entity over the own speed [s]; that of a standing entity is without end."""
 
     element: model.TimeHeadwayCondition
+    unit = "s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the headway."""
-        return compares(self._headway(stage, entity), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The headway."""
-        value = self._headway(stage, entity)
+        value = self.quantity(stage, entity)
         rule = in_words(self.element.rule)
         return f"{entity}: time headway to {self.element.entity_ref} {value:.2f} s {rule} {self.element.value:g} s"
 
@@ -29,7 +30,8 @@ class TimeHeadwayCondition(EntityCondition):
         """Rule and limit."""
         return f"time headway to {self.element.entity_ref} {in_words(self.element.rule)} {self.element.value:g} s"
 
-    def _headway(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The headway."""
         speed, gap = abs(stage.speed(entity)), abs(measured(stage, entity, self.element.entity_ref, self.element))
         return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
 
@@ -38,14 +40,15 @@ class TimeToCollisionCondition(EntityCondition):
     """Distance to an entity or a position over the speed of approach [s]; where they do not approach there is none."""
 
     element: model.TimeToCollisionCondition
+    unit = "s"
 
     def holds_for(self, stage: Stage, entity: str) -> bool:
         """Compare the time to collision."""
-        return compares(self._time(stage, entity), self.element.rule, self.element.value)
+        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The time to collision."""
-        value, rule = self._time(stage, entity), in_words(self.element.rule)
+        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
         return f"{entity}: time to collision with {self._target()} {value:.2f} s {rule} {self.element.value:g} s"
 
     def describe_for(self) -> str:
@@ -56,7 +59,8 @@ class TimeToCollisionCondition(EntityCondition):
         target = self.element.time_to_collision_condition_target
         return target.entity_ref.entity_ref if target.entity_ref is not None else "the position"
 
-    def _time(self, stage: Stage, entity: str) -> float:
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """The time to collision."""
         target = self.element.time_to_collision_condition_target
         kind = "longitudinal" if self.element.along_route else kind_of(self.element.relative_distance_type)
         row = stage.view.row(entity)

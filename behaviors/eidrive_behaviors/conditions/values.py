@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import Condition, Stage, compares, in_words, model
+from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
 
 WORDS = {"true": 1.0, "false": 0.0}
 
@@ -26,6 +26,12 @@ def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
         case "greaterOrEqual":
             return text >= limit
     return text <= limit
+
+
+def measured(text: str | None, rule: model.Rule, limit: str) -> tuple[Measure, ...]:
+    """What is compared, where both are numbers."""
+    first, second = _number(text or ""), _number(limit)
+    return () if first is None or second is None else (Measure("", first, rule, second, ""),)
 
 
 def _number(text: str) -> float | None:
@@ -53,6 +59,10 @@ class ParameterCondition(Condition):
         """Rule and limit."""
         return f"parameter {self.element.parameter_ref} {in_words(self.element.rule)} {self.element.value}"
 
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """Its value."""
+        return measured(stage.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+
 
 class VariableCondition(Condition):
     """The value of a variable."""
@@ -72,6 +82,10 @@ class VariableCondition(Condition):
         """Rule and limit."""
         return f"variable {self.element.variable_ref} {in_words(self.element.rule)} {self.element.value}"
 
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """Its value."""
+        return measured(stage.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+
 
 class UserDefinedValueCondition(Condition):
     """A value that somebody outside of the scenario gives; where nobody does it does not hold."""
@@ -90,6 +104,10 @@ class UserDefinedValueCondition(Condition):
     def describe(self) -> str:
         """Rule and limit."""
         return f"{self.element.name} {in_words(self.element.rule)} {self.element.value}"
+
+    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+        """The value."""
+        return measured(stage.user_values(self.element.name), self.element.rule, self.element.value)
 
 
 class TrafficSignalCondition(Condition):
