@@ -1,0 +1,301 @@
+"""Our reader against ASAM's schemas: the same judgement, valid or invalid, on every file and on 3,300 mutants of them.
+
+The schemas and the files are in the folder that EIDRIVE_CORPORA names. Where the two do not agree, a table that the
+test prints says on what, how often, and why; a disagreement that it does not explain fails.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import os
+import random
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_distribution, load_scenario
+from eidrive_scenario.openscenario.document import read_root
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.parsing import open_document
+
+CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
+pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with files and schemas")
+
+MUTANTS_OF_A_KIND = 300
+SEED = 20260131
+NOT_EXPLAINED = "not explained"
+SCHEMAS = {
+    ("1", "0"): "OpenSCENARIOv1.0.xsd",
+    ("1", "1"): "OpenSCENARIOv1.1.1.xsd",
+    ("1", "2"): "OpenSCENARIOv1.2.xsd",
+    ("1", "3"): "OpenSCENARIOv1.3.1.xsd",
+}
+VALUES = ["", "abc", "-1", "0", "1.5", "70000", "5000000000", "INF", "NaN", "+INF", "true", " 2 ", "0x1", ".5", "5."]
+VALUES += ["1e5", "--1", "nan", "1_0", "lessThan", "${1+1}", "${a<b}", "$", "$Nobody", "2020-01-01T24:00:00Z"]
+VALUES += ["2020-02-30T00:00:00", "2020-02-29T00:00:00+14:00"]
+
+
+OURS_ALONE = {
+    "unknown parameter": "the schema sees that a reference is well-formed, not whether its parameter is declared",
+    "declared twice": "the schema has no rule for names",
+    r"\$\w+ is '.*', which is no": "the schema does not put in parameters; this one's value is not of the type needed",
+    "the expression '.*' (is .*, which is not|has no)": "the schema does not calculate",
+    "the parameter '.*' is '.*', which is not": "the schema does not hold a parameter's value against its type",
+    "a constraint of the parameter '.*' is not": "the schema does not hold a constraint against the parameter's type",
+    "outside its constraints": "the schema does not compare; the standard has such a scenario not evaluated",
+    "is empty$": "up to 1.2 the schema lets an element choose none of its alternatives, which then means nothing",
+    "FileHeader has the rev": "the schema takes any number for the version, and a parameter too; it decides all else",
+    "the file is written for OpenSCENARIO": "the schema takes any number for the version",
+}
+"""What we refuse and the schema does not: a pattern of our message, and why."""
+THEIRS_ALONE = {
+    "Character content is not allowed, because the content type is empty": (
+        "the schema wants nothing at all in such an element; files have white space there, which is a warning"
+    ),
+}
+"""What the schema refuses and we do not: a pattern of its message, and why."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One file or mutant, as both see it."""
+
+    what: str
+    schema: tuple[str, ...]
+    """What the schema has against it."""
+    problems: tuple[str, ...]
+
+    @property
+    def agreed(self) -> bool:
+        """Whether both find it valid, or both find it invalid."""
+        return bool(self.schema) == bool(self.problems)
+
+    def explanations(self) -> set[tuple[str, str, str]]:
+        """Why they disagree: who refuses it, for what, and why the other does not; what is unexplained has no why."""
+        return {self._explained("we", message, OURS_ALONE) for message in self.problems} | {
+            self._explained("the schema", message, THEIRS_ALONE) for message in self.schema
+        }
+
+    @staticmethod
+    def _explained(who: str, message: str, known: dict[str, str]) -> tuple[str, str, str]:
+        found = ((who, pattern, why) for pattern, why in known.items() if re.search(pattern, message))
+        return next(found, (who, message, ""))
+
+
+class Judge:
+    """Both judges. A file is held against the schema of the version that it names; where that is no known one, against
+    the schema of the file that it was made from."""
+
+    def __init__(self, folder: Path) -> None:
+        self._schemas = {version: etree.XMLSchema(etree.parse(folder / name)) for version, name in SCHEMAS.items()}
+
+    def version_of(self, root: etree._Element) -> tuple[str, str] | None:
+        """The version that a file names, if it is a known one."""
+        header = root.find("FileHeader")
+        named = None if header is None else (header.get("revMajor", "").strip(), header.get("revMinor", "").strip())
+        return named if named in self._schemas else None
+
+    def judge(self, what: str, xml: bytes, otherwise: tuple[str, str]) -> Judged:
+        """Ask both about a file's bytes."""
+        root = etree.fromstring(xml)
+        schema = self._schemas[self.version_of(root) or otherwise]
+        valid = schema.validate(root)
+        complaints = () if valid else tuple(str(entry.message) for entry in schema.error_log)
+        findings = Findings()
+        read_root(open_document(xml), findings)
+        return Judged(what, complaints, tuple(problem.message for problem in findings.problems))
+
+
+Mutation = Callable[[etree._Element, random.Random, "Pool"], None]
+
+
+class Pool:
+    """Elements and attributes that occur anywhere, to put where they do not belong."""
+
+    def __init__(self, trees: list[etree._Element]) -> None:
+        nodes = [node for tree in trees for node in tree.iter(etree.Element)]
+        self.nodes = nodes
+        self.tags = sorted({str(node.tag) for node in nodes})
+        self.attributes = sorted({str(name) for node in nodes for name in node.attrib})
+
+
+def drop_element(node: etree._Element, _: random.Random, __: Pool) -> None:
+    parent = node.getparent()
+    if parent is not None:
+        parent.remove(node)
+
+
+def double_element(node: etree._Element, _: random.Random, __: Pool) -> None:
+    if node.getparent() is not None:
+        node.addnext(copy.deepcopy(node))
+
+
+def rename_element(node: etree._Element, dice: random.Random, pool: Pool) -> None:
+    node.tag = dice.choice([dice.choice(pool.tags), str(node.tag) + "s", str(node.tag).lower()])
+
+
+def move_element(node: etree._Element, dice: random.Random, _: Pool) -> None:
+    """To another place among its siblings, or to another parent that is not below it."""
+    parent = node.getparent()
+    if parent is None:
+        return
+    places = [one for one in node.getroottree().getroot().iter(etree.Element) if node not in one.iterancestors()]
+    target = parent if dice.random() < 0.5 else dice.choice([one for one in places if one is not node])
+    parent.remove(node)
+    target.insert(dice.randrange(len(target) + 1), node)
+
+
+def change_attribute(node: etree._Element, dice: random.Random, _: Pool) -> None:
+    if node.attrib:
+        node.set(dice.choice(list(node.attrib)), dice.choice(VALUES))
+
+
+def drop_attribute(node: etree._Element, dice: random.Random, _: Pool) -> None:
+    if node.attrib:
+        del node.attrib[dice.choice(list(node.attrib))]
+
+
+def rename_attribute(node: etree._Element, dice: random.Random, pool: Pool) -> None:
+    if node.attrib:
+        name = dice.choice(list(node.attrib))
+        value = node.attrib.pop(name)
+        node.set(dice.choice([dice.choice(pool.attributes), f"{name}s".split("}")[-1]]), value)
+
+
+def insert_element(node: etree._Element, dice: random.Random, pool: Pool) -> None:
+    node.insert(dice.randrange(len(node) + 1), copy.deepcopy(dice.choice(pool.nodes)))
+
+
+def add_attribute(node: etree._Element, dice: random.Random, pool: Pool) -> None:
+    node.set(dice.choice([*pool.attributes, "bogus"]), dice.choice(VALUES))
+
+
+def add_text(node: etree._Element, dice: random.Random, _: Pool) -> None:
+    node.text = (node.text or "") + dice.choice(["x", " ", "\n"])
+
+
+def change_version(node: etree._Element, dice: random.Random, _: Pool) -> None:
+    header = node.getroottree().getroot().find("FileHeader")
+    if header is not None:
+        header.set("revMinor", dice.choice("0123"))
+
+
+MUTATIONS: list[Mutation] = [
+    drop_element,
+    double_element,
+    rename_element,
+    move_element,
+    insert_element,
+    add_text,
+    change_attribute,
+    drop_attribute,
+    rename_attribute,
+    add_attribute,
+    change_version,
+]
+
+
+def files() -> list[Path]:
+    return sorted(CORPORA.rglob("*.xosc")) if CORPORA else []
+
+
+def name_of(path: Path) -> str:
+    assert CORPORA is not None
+    return path.relative_to(CORPORA).as_posix()
+
+
+def mutants(count: int, seed: int, changes: int = 1) -> Iterator[tuple[Path, str, bytes]]:
+    """`count` changed files for each kind of mutation, from all files alike; none that is as it was."""
+    dice = random.Random(seed)
+    trees = {path: etree.parse(path).getroot() for path in files()}
+    pool = Pool(list(trees.values()))
+    paths = list(trees)
+    for kind in MUTATIONS:
+        dice.shuffle(paths)
+        made = 0
+        while made < count:
+            path = paths[made % len(paths)]
+            tree = copy.deepcopy(trees[path])
+            for mutation in (kind, *dice.choices(MUTATIONS, k=changes - 1)):
+                mutation(dice.choice(list(tree.iter(etree.Element))), dice, pool)
+            xml = etree.tostring(tree)
+            if xml != etree.tostring(trees[path]):
+                made += 1
+                yield path, kind.__name__, xml
+
+
+@pytest.fixture(scope="module")
+def judge() -> Judge:
+    assert CORPORA is not None
+    return Judge(CORPORA / "schema")
+
+
+def table(judged: list[Judged]) -> list[str]:
+    """The disagreements, the most frequent first."""
+    lines: Counter[tuple[str, str, str]] = Counter()
+    examples: dict[tuple[str, str, str], str] = {}
+    for one in judged:
+        for explanation in () if one.agreed else one.explanations():
+            lines[explanation] += 1
+            examples.setdefault(explanation, one.what)
+    return [
+        f"{count:5}  {who} alone: {what}: {why or NOT_EXPLAINED} (as {examples[who, what, why]})"
+        for (who, what, why), count in lines.most_common()
+    ]
+
+
+def assert_explained(judged: list[Judged], capsys: pytest.CaptureFixture[str]) -> None:
+    lines = table(judged)
+    valid = sum(one.agreed and not one.problems for one in judged)
+    invalid = sum(one.agreed and bool(one.problems) for one in judged)
+    others = len(judged) - valid - invalid
+    lines.insert(0, f"{len(judged)} judged: {valid} valid for both, {invalid} invalid for both, {others} not alike")
+    with capsys.disabled():
+        sys.stdout.write("\n" + "\n".join(lines) + "\n")
+    assert [line for line in lines if NOT_EXPLAINED in line] == []
+
+
+def test_both_judge_every_file_alike(judge: Judge, capsys: pytest.CaptureFixture[str]) -> None:
+    """Five catalogs are written for 0.9, which has no schema here; that of 1.0 refuses them, and so do we."""
+    judged = [judge.judge(name_of(path), path.read_bytes(), ("1", "0")) for path in files()]
+    assert len(judged) > 150
+    assert sum(not one.agreed for one in judged) <= 1
+    assert_explained(judged, capsys)
+
+
+def test_both_judge_mutants_alike(judge: Judge, capsys: pytest.CaptureFixture[str]) -> None:
+    judged = []
+    for path, kind, xml in mutants(MUTANTS_OF_A_KIND, SEED):
+        version = judge.version_of(etree.parse(path).getroot()) or ("1", "0")
+        judged.append(judge.judge(f"{name_of(path)} {kind}", xml, version))
+    assert len(judged) == len(MUTATIONS) * MUTANTS_OF_A_KIND
+    assert sum(not one.schema for one in judged) > 500
+    assert sum(bool(one.schema) for one in judged) > 1500
+    assert_explained(judged, capsys)
+
+
+def test_mutants_bring_out_nothing_but_our_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file is loaded with its catalogs and the name of its road, or unfolded."""
+    assert CORPORA is not None
+    folders = sorted({str(path.parent) for path in CORPORA.rglob("*.xodr")})
+    monkeypatch.setenv("EIDRIVE_MAPS", os.pathsep.join(folders))
+    taken = refused = 0
+    for path, _, xml in itertools.chain(mutants(60, SEED + 1), mutants(30, SEED + 2, changes=3)):
+        tree = etree.fromstring(xml)
+        tree.getroottree().docinfo.URL = str(path)
+        for load in (load_scenario, load_distribution):
+            try:
+                load(tree)
+                taken += 1
+            except ScenarioError:
+                refused += 1
+    assert taken > 100
+    assert refused > 500
