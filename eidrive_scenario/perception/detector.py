@@ -3,17 +3,46 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.settings import SensorSettings
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.world.actor import ActorSpec
+
+
+@dataclass(frozen=True)
+class Installation:
+    """Where a detector works: the body that carries it, its sensors by name, the map, and the run's seed."""
+
+    spec: ActorSpec
+    sensors: Mapping[str, SensorSettings] = field(default_factory=dict)
+    roads: RoadNetwork | None = None
+    seed: int = 0
 
 
 class Detector(ABC):
-    """Turns the readings of one station into boxes in the world frame. Built anew for each station and run."""
+    """Turns the readings of one station into boxes in the world frame. Built anew for each station and run.
+
+    A class is registered in the entry points `eidrive_scenario.detectors`. It is built as `cls()`, or as
+    `cls(settings)` where it has a `settings_type`: an instance of that, read from the controller's property
+    `detector_settings`. It may raise SettingError while it is built. Then `install` is called once, and `detect` in
+    each tick in which all kinds of sensors in `needs` were read.
+    """
 
     needs: ClassVar[frozenset[str]] = frozenset()
     """The kinds of sensors it reads: truth, camera, lidar."""
+    gives_velocity: ClassVar[bool] = False
+    """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
+    settings_type: ClassVar[type[Settings] | None] = None
+    """What the property `detector_settings` may say; nothing where None."""
+
+    def install(self, installation: Installation) -> None:  # noqa: B027 - a hook that most do not need
+        """Learn where it works, before the first reading."""
 
     @abstractmethod
     def detect(self, readings: Readings) -> Detections:

@@ -15,6 +15,7 @@ class OracleDetector(Detector):
     """Exact boxes, classes and velocities of the objects that the truth sensor has in its line of sight, score 1."""
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
+    gives_velocity: ClassVar[bool] = True
 
     def detect(self, readings: Readings) -> Detections:
         truth = readings.truth

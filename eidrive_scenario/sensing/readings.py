@@ -67,6 +67,36 @@ class LidarReading:
 
 
 @dataclass(frozen=True)
+class GnssReading:
+    """Where a satellite receiver says the station's reference point is.
+
+    position (3,) in the world frame [m], covariance (3, 3) of its error [m²]
+    """
+
+    position: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class ImuReading:
+    """What an inertial unit measured in the body's frame, x forward, y left, z up.
+
+    acceleration (3,) of the reference point, gravity taken out [m/s²]; angular_rate (3,) about the axes [rad/s]
+    """
+
+    acceleration: Array
+    angular_rate: Array
+
+
+@dataclass(frozen=True)
+class SignalReading:
+    """A traffic light in sight: its id in the road network, and the state that it shows."""
+
+    id: str
+    state: str
+
+
+@dataclass(frozen=True)
 class Readings:
     """All sensors of one station; a sensor that was not due this tick is missing."""
 
@@ -75,3 +105,7 @@ class Readings:
     truth: TruthReading | None = None
     cameras: Mapping[str, CameraReading] = field(default_factory=dict)
     lidars: Mapping[str, LidarReading] = field(default_factory=dict)
+    gnss: GnssReading | None = None
+    imu: ImuReading | None = None
+    signals: tuple[SignalReading, ...] = ()
+    """The traffic lights in sight, where the station looks out for them."""
