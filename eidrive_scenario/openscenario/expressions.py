@@ -9,6 +9,7 @@ import ast
 import math
 import operator
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
@@ -100,7 +101,7 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
         operators=dict(_OPERATORS), functions=dict(FUNCTIONS), names=names | dict(CONSTANTS)
     )
     try:
-        tree = ast.parse(source, mode="eval")
+        tree = _parsed(source)
         _check(tree, text)
         result = evaluator.eval(source, previously_parsed=tree.body)
         if not isinstance(result, int | float) or not math.isfinite(result):
@@ -110,7 +111,7 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
         raise
     except (ArithmeticError, ValueError) as error:
         raise ExpressionError(f"the expression {text!r} has no value: {error}") from error
-    except (SyntaxError, TypeError, simpleeval.InvalidExpression, RecursionError, MemoryError) as error:
+    except (SyntaxError, Warning, TypeError, simpleeval.InvalidExpression, RecursionError, MemoryError) as error:
         raise ExpressionError(f"{text!r} is not an expression", HELP) from error
 
 
@@ -130,6 +131,13 @@ def _number(name: str, value: Value) -> float | int | bool:
     if isinstance(value, str):
         raise ExpressionError(f"${name} is {value!r}, which is no number")
     return value
+
+
+def _parsed(source: str) -> ast.Expression:
+    """The tree. What Python warns of, such as a number glued to a word, is wrong here, and no warning to our users."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return ast.parse(source, mode="eval")
 
 
 def _check(tree: ast.Expression, text: str) -> None:
