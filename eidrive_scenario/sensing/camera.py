@@ -2,35 +2,59 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.exposure import develop, metered
 from eidrive_scenario.sensing.mounting import mounting
+from eidrive_scenario.sensing.optics import Optics, lens_of
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
+Array = NDArray[np.float64]
+
 
 class Camera:
-    """A pinhole camera with square pixels, its principal point in the middle of the picture."""
+    """A camera with square pixels, its principal point in the middle of the picture.
 
-    def __init__(self, settings: CameraSettings, spec: ActorSpec) -> None:
+    Its noise and the drops before its lens are drawn by seed, station, name and tick.
+    """
+
+    def __init__(self, settings: CameraSettings, spec: ActorSpec, name: str = "camera", seed: int = 0) -> None:
         self.settings = settings
         self.mounting = mounting(settings, spec, "front")
-        self.fov = math.radians(settings.fov)
-        focal = settings.width / 2.0 / math.tan(self.fov / 2.0)
-        self.intrinsics = np.array(
-            [[focal, 0.0, settings.width / 2.0], [0.0, focal, settings.height / 2.0], [0.0, 0.0, 1.0]]
-        )
+        self._photographer = Photographer(settings)
+        self._key = (seed, "camera", spec.name, name)
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """A picture from the actor in this row."""
+        seed, *key = self._key
+        return self._photographer.take(scene, self.mounting.camera_pose(view, row), generator(seed, *key, view.tick))
+
+
+class Photographer:
+    """Takes pictures with a camera of these settings, from anywhere."""
+
+    def __init__(self, settings: CameraSettings) -> None:
+        self.settings = settings
+        self.intrinsics = lens_of(settings).intrinsics
+        self._optics = Optics(settings)
+
+    def take(
+        self, scene: Scene, pose: Array, draws: np.random.Generator, *, ignore: Iterable[str] = ()
+    ) -> CameraReading:
+        """A picture from `pose` (4, 4): camera to world, x right, y down, z forward; actors in `ignore` are not seen.
+
+        The same scene, pose and state of `draws` give the same picture.
+        """
         settings = self.settings
-        pose = self.mounting.camera_pose(view, row)
-        rgb, depth, segmentation = scene.camera(
-            pose, settings.width, settings.height, self.fov, settings.near, settings.far
-        )
-        return CameraReading(rgb, depth, segmentation, self.intrinsics, pose)
+        seen = self._optics.bent(scene.radiance(pose, self._optics.pinhole, ignore=ignore))
+        exposure = metered(seen.luminance, settings)
+        rgb = develop(seen.luminance, exposure, settings.noise, draws)
+        return CameraReading(rgb, seen.depth, seen.segmentation, self.intrinsics, pose, np.array(settings.distortion))

@@ -20,12 +20,16 @@ Sensor = TruthSensor | Camera | Lidar
 class Rig:
     """The sensors that sit on one actor. A sensor with a rate is read when its next period has begun.
 
+    `seed` is that of the noise of all sensors.
+
     Raises ValueError if there is more than one truth sensor.
     """
 
-    def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings]) -> None:
+    def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings], *, seed: int = 0) -> None:
         self.station = spec.name
-        self._sensors: dict[str, Sensor] = {name: _sensor(settings, spec) for name, settings in sensors.items()}
+        self._sensors: dict[str, Sensor] = {
+            name: _sensor(settings, spec, name, seed) for name, settings in sensors.items()
+        }
         self._periods: dict[str, int] = {}
         if sum(isinstance(sensor, TruthSensor) for sensor in self._sensors.values()) > 1:
             raise ValueError(f"station {spec.name!r} has more than one truth sensor")
@@ -88,12 +92,12 @@ def ego_state(view: WorldView, row: int) -> EgoState:
     )
 
 
-def _sensor(settings: SensorSettings, spec: ActorSpec) -> Sensor:
+def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> Sensor:
     match settings:
         case TruthSettings():
             return TruthSensor(settings, spec)
         case CameraSettings():
-            return Camera(settings, spec)
+            return Camera(settings, spec, name, seed)
         case LidarSettings():
             return Lidar(settings, spec)
     raise TypeError(f"no sensor reads {type(settings).__name__}")

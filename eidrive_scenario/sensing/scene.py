@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
 
@@ -28,10 +32,12 @@ class RayHits(Protocol):
 class Scene(Protocol):
     """The part of the world that sensors see."""
 
+    @property
+    def weather(self) -> Weather:
+        """The weather at present."""
+
     def cast(self, origins: Array, targets: Array) -> RayHits:
         """Rays from (M, 3) to (M, 3) [m]."""
 
-    def camera(
-        self, pose: Array, width: int, height: int, fov: float, near: float, far: float
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
-        """Colour, depth and segmentation of a pinhole camera: pose (4, 4) camera to world, fov horizontal [rad]."""
+    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+        """The light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
@@ -55,15 +56,80 @@ class TruthSettings(SensorSettings):
     visibility: float = Field(default=0.1, gt=0.0, le=1.0)
 
 
+class NoiseSettings(Settings):
+    """Of a camera's sensor, in electrons: what a pixel holds when it is full, and the deviation of reading it."""
+
+    full_well: PositiveFloat = 10_000.0
+    read_noise: NonNegativeFloat = 4.0
+
+
+def _distortion(value: Any) -> Any:
+    """Distortion as a list of up to five coefficients, in OpenCV's order."""
+    if isinstance(value, (list, tuple)):
+        if len(value) > 5:
+            raise ValueError("distortion has up to five coefficients: k1, k2, p1, p2, k3")
+        return tuple(value) + (0.0,) * (5 - len(value))
+    return value
+
+
+def _noise(value: Any) -> Any:
+    """`none` and `off` are no noise; YAML reads the latter as false."""
+    return None if value in ("none", "off", False) else value
+
+
 class CameraSettings(SensorSettings):
-    """A pinhole camera; `fov` is horizontal [degrees], `width` and `height` in pixels, `near` and `far` in metres."""
+    """A camera. Lengths in metres, `width` and `height` in pixels, times in seconds.
+
+    fov            horizontal, of the picture without distortion [degrees]
+    distortion     k1, k2, p1, p2, k3 of Brown and Conrady, as OpenCV has them
+    near, far      what is nearer or farther is not drawn
+    noise          of the sensor; None is a sensor without
+    exposure_time, gain   [s], [dB]; None is automatic, within longest_exposure and highest_gain
+    supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
+    """
 
     kind: Literal["camera"] = "camera"
-    width: PositiveInt = 800
-    height: PositiveInt = 600
+    width: int = Field(default=800, ge=2, le=8192)
+    height: int = Field(default=600, ge=2, le=8192)
     fov: float = Field(default=100.0, gt=0.0, lt=180.0)
+    distortion: Annotated[tuple[float, float, float, float, float], BeforeValidator(_distortion)] = (0.0,) * 5
     near: PositiveFloat = 0.1
-    far: PositiveFloat = 200.0
+    far: PositiveFloat = 500.0
+    noise: Annotated[NoiseSettings | None, BeforeValidator(_noise)] = NoiseSettings()
+    f_number: PositiveFloat = 1.8
+    exposure_time: PositiveFloat | None = None
+    gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None
+    longest_exposure: PositiveFloat = 0.02
+    highest_gain: float = Field(default=36.0, ge=0.0, le=80.0)
+    supersampling: int = Field(default=1, ge=1, le=4)
+
+    @model_validator(mode="after")
+    def _something_between(self) -> CameraSettings:
+        if self.near >= self.far:
+            raise ValueError(f"near {self.near:g} is not before far {self.far:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _lens_maps_one_to_one(self) -> CameraSettings:
+        """Every pixel must see one direction: the distorted radius grows with the true one as far as the corners."""
+        k1, k2, _, _, k3 = self.distortion
+        if not any(self.distortion):
+            return self
+        half = math.tan(math.radians(self.fov) / 2.0)
+        corner = 1.1 * half * math.hypot(1.0, self.height / self.width)
+        radius = distorted = 0.0
+        for step in range(1, 401):
+            radius = 4.0 * corner * step / 400
+            square = radius * radius
+            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3)))
+            if further <= distorted:
+                break
+            distorted = further
+            if distorted >= corner:
+                return self
+        raise ValueError(
+            f"this distortion folds the picture {math.degrees(math.atan(radius)):.0f} degrees off its axis"
+        )
 
 
 class LidarSettings(SensorSettings):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -16,6 +17,46 @@ class Picture(NamedTuple):
     """rgb (H, W, 3), depth (H, W) along the optical axis [m], inf where nothing is; segmentation (H, W): row or -1."""
 
     rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    segmentation: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """A camera without distortion, square pixels. Pixel (j, i) covers [j, j + 1) x [i, i + 1) of the picture's plane.
+
+    focal, centre_x, centre_y [px]; near, far along the optical axis [m]
+    """
+
+    width: int
+    height: int
+    focal: float
+    centre_x: float
+    centre_y: float
+    near: float = 0.1
+    far: float = 500.0
+
+    @classmethod
+    def of_fov(cls, width: int, height: int, fov: float, near: float = 0.1, far: float = 500.0) -> Pinhole:
+        """With a horizontal field of view [rad] and its axis in the middle."""
+        return cls(width, height, width / 2 / math.tan(fov / 2), width / 2, height / 2, near, far)
+
+    def finer(self, times: int) -> Pinhole:
+        """The same view on `times` as many pixels along each axis."""
+        lens = (self.focal * times, self.centre_x * times, self.centre_y * times)
+        return Pinhole(self.width * times, self.height * times, *lens, self.near, self.far)
+
+    @property
+    def intrinsics(self) -> Array:
+        """(3, 3) from camera coordinates to pixels."""
+        return np.array([[self.focal, 0.0, self.centre_x], [0.0, self.focal, self.centre_y], [0.0, 0.0, 1.0]])
+
+
+class Radiance(NamedTuple):
+    """The light that reaches a camera: luminance (H, W, 3) of linear sRGB [cd/m²]; depth and segmentation as in
+    Picture."""
+
+    luminance: NDArray[np.float32]
     depth: NDArray[np.float32]
     segmentation: NDArray[np.int32]
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.bodies import Body, quaternion
 from eidrive_scenario.world.bullet import bullet, connect
-from eidrive_scenario.world.camera import Array, Picture, metres, projection_matrix, sky, view_matrix
+from eidrive_scenario.world.camera import Array, Picture, Pinhole, Radiance, metres, projection_matrix, sky, view_matrix
 from eidrive_scenario.world.meshes import actor_mesh, shadow
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
 from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.scenery import Building, Scenery
+from eidrive_scenario.world.weather import Weather
 
 _AWAY = (0.0, 0.0, -10_000.0)
 _SUN = (0.45, -0.35, 0.82)
@@ -71,6 +72,18 @@ class Visuals:
         rgb = np.ascontiguousarray(np.asarray(colours, dtype=np.uint8).reshape(height, width, 4)[..., :3])
         np.copyto(rgb, sky(pose, width, height, fov), where=nothing[..., None])
         return Picture(rgb, depth, rows[seen])
+
+    def radiance(self, shown: Mapping[int, Body], pose: Array, pinhole: Pinhole, weather: Weather) -> Radiance:
+        """The light that reaches a camera."""
+        fov = 2 * math.atan(pinhole.width / 2 / pinhole.focal)
+        rgb, depth, rows = self.picture(shown, pose, pinhole.width, pinhole.height, fov, pinhole.near, pinhole.far)
+        up = max(math.sin(math.radians(weather.sun_elevation)), 0.002)
+        light = (rgb / np.float32(255.0)) ** np.float32(2.2) * np.float32(
+            30_000.0 * up * (1 - 0.7 * weather.cloud_cover)
+        )
+        through = np.exp(-weather.extinction * np.minimum(depth, np.float32(1e4)))[..., None]
+        light = light * through + (1 - through) * np.float32(12_000.0 * up)
+        return Radiance(light.astype(np.float32), depth, rows)
 
     def _arrange(self, shown: Mapping[int, Body]) -> NDArray[np.int32]:
         """Move the meshes to the actors; returns the row of each handle, -1 for what is no actor, also at index -1."""

@@ -15,7 +15,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.bullet import bullet, connect
-from eidrive_scenario.world.camera import Picture
+from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
 from eidrive_scenario.world.contacts import ContactTracker
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
@@ -23,6 +23,7 @@ from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.visuals import Visuals
+from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,7 @@ class World:
         self._roads = roads
         self._bodies: dict[str, Body] = {}
         self._driven: dict[str, DrivenBody] = {}
+        self._weather = Weather()
         self._friction = 1.0
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
@@ -133,6 +135,16 @@ class World:
         if not scale > 0.0:
             raise SettingError(Problem(f"the road's friction scale is {scale:g}", "give a number above 0"))
         self._friction = scale
+
+    @property
+    def weather(self) -> Weather:
+        """The weather at present."""
+        return self._weather
+
+    def set_weather(self, weather: Weather) -> None:
+        """Another weather from now on, its grip on the tyres included."""
+        self._weather = weather
+        self._friction = weather.friction_scale
 
     def add_building(
         self, name: str, centre: Vector3, size: Vector3, yaw: float = 0.0, colour: Vector3 | None = None
@@ -228,6 +240,15 @@ class World:
         hidden = frozenset(ignore)
         shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}
         return self._visuals.picture(shown, np.asarray(pose, dtype=float), width, height, fov, near, far)
+
+    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+        """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
+        if self._visuals is None:
+            self._visuals = Visuals(self._scenery)
+        rows = self.view().rows
+        hidden = frozenset(ignore)
+        shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}
+        return self._visuals.radiance(shown, np.asarray(pose, dtype=float), pinhole, self._weather)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)
