@@ -155,7 +155,7 @@ class Agent:
         return (message,)
 
 
-def build_rig(settings: AgentSettings, spec: ActorSpec) -> Rig:
+def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
     needs = registry("detectors").load(settings.detector).needs
     sensors = settings.rig_sensors(needs)
@@ -163,7 +163,7 @@ def build_rig(settings: AgentSettings, spec: ActorSpec) -> Rig:
     if missing:
         message = f"detector {settings.detector!r} of {spec.name!r} needs a sensor of kind {', '.join(sorted(missing))}"
         raise SettingError(Problem(message, "add it to the property 'sensors'"))
-    return Rig(spec, sensors)
+    return Rig(spec, sensors, seed=seed)
 
 
 def build_agent(

@@ -70,7 +70,7 @@ class Stations:
         settings = self._settings.get(spec.name)
         if settings is None:
             return
-        self._rigs[spec.name] = build_rig(settings, spec)
+        self._rigs[spec.name] = build_rig(settings, spec, seed=self._seed)
         self._agents[spec.name] = build_agent(
             settings, spec, self._roads, seed=self._seed, dt=self._dt, own_perception=self._own_perception
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -42,6 +42,7 @@ class Optics:
 
     def bent(self, seen: Radiance) -> Radiance:
         """The picture through the lens; depth and segmentation are those of the nearest ray, not blended."""
+        luminance: Any
         luminance, depth, segmentation = seen
         if self._finer > 1:
             size = (self.pinhole.width // self._finer, self.pinhole.height // self._finer)
@@ -63,7 +64,9 @@ def _bend(settings: CameraSettings) -> _Bend:
     columns, rows = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
     until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
-    rays = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), None, None, until)[:, 0]
+    same = np.eye(3)
+    found = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
+    rays = np.asarray(found, dtype=float)[:, 0]
     low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0
     (left, top), (right, bottom) = np.floor(low), np.ceil(high)
     straight = Pinhole(int(right - left), int(bottom - top), lens.focal, -left, -top, lens.near, lens.far)

@@ -46,8 +46,8 @@ class CameraReading:
     """A picture and where it was taken.
 
     rgb (H, W, 3) uint8, depth (H, W) float32 along the optical axis [m], segmentation (H, W) int32: row of the actor
-    in the world's view, -1 for everything else; intrinsics (3, 3) [px], for pixel (j, i) covering [j, j + 1) x
-    [i, i + 1); pose (4, 4) camera to world, camera frame x right, y down, z forward; distortion (5,): k1, k2, p1, p2, k3
+    in the world's view, -1 for everything else; intrinsics (3, 3) [px], where pixel (j, i) covers [j, j + 1) x
+    [i, i + 1); pose (4, 4) camera to world, camera frame x right, y down, z forward; distortion (5,) k1, k2, p1, p2, k3
     """
 
     rgb: NDArray[np.uint8]

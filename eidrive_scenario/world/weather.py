@@ -90,7 +90,7 @@ class Weather(Settings):
         if self.precipitation == "none" or self.precipitation_intensity == 0.0:
             return 0.0
         factor, power = RAIN_LAW if self.precipitation == "rain" else SNOW_LAW
-        return factor * self.precipitation_intensity**power * DECIBEL_PER_KM
+        return float(factor * self.precipitation_intensity**power * DECIBEL_PER_KM)
 
     @property
     def extinction(self) -> float:

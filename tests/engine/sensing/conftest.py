@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
 
@@ -29,7 +32,8 @@ class BoxScene:
     walls: list[tuple[float, ...]] = field(default_factory=list)
     ground: bool = False
     casts: list[int] = field(default_factory=list)
-    pictures: list[tuple[Array, int, int, float]] = field(default_factory=list)
+    pictures: list[tuple[Array, Pinhole]] = field(default_factory=list)
+    weather: Weather = field(default_factory=Weather)
 
     def cast(self, origins: Array, targets: Array) -> Hits:
         self.casts.append(len(origins))
@@ -48,14 +52,11 @@ class BoxScene:
             fractions.append(nearest)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions))
 
-    def camera(
-        self, pose: Array, width: int, height: int, fov: float, near: float, far: float
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
-        self.pictures.append((pose, width, height, fov))
-        return (
-            np.zeros((height, width, 3), np.uint8),
-            np.full((height, width), far, np.float32),
-            np.full((height, width), -1, np.int32),
+    def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
+        self.pictures.append((pose, pinhole))
+        shape = (pinhole.height, pinhole.width)
+        return Radiance(
+            np.full((*shape, 3), 1000.0, np.float32), np.full(shape, 50.0, np.float32), np.full(shape, -1, np.int32)
         )
 
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
+from eidrive_scenario.world.camera import Pinhole
 
 
 def test_a_sensor_with_a_rate_is_read_at_its_rate(boxes: Any) -> None:
@@ -83,7 +84,7 @@ def test_camera_pose_and_intrinsics(boxes: Any) -> None:
     np.testing.assert_allclose(picture.pose[:3, 3], [10, 22.5, 1.0], atol=1e-3)
     np.testing.assert_allclose(picture.intrinsics, [[400, 0, 400], [0, 400, 300], [0, 0, 1]])
     assert picture.rgb.shape == (600, 800, 3)
-    assert scene.pictures[0][1:] == (800, 600, math.pi / 2)
+    assert scene.pictures[0][1] == Pinhole(800, 600, pytest.approx(400.0), 400.0, 300.0)
 
 
 def test_pitch_turns_a_camera_down(boxes: Any) -> None:
