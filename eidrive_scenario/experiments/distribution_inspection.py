@@ -35,7 +35,8 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
         return DistributionFindings(error.problems)
     alone = inspect_scenario(unfolding.scenario, ignored)
     if alone.problems:
-        return DistributionFindings(alone.problems, (*unfolding.warnings, *alone.warnings), len(unfolding))
+        known = (*unfolding.warnings, *alone.warnings)
+        return DistributionFindings(alone.problems, known, len(unfolding), notes=alone.notes)
     problems: dict[Problem, None] = {}
     warnings = dict.fromkeys((*unfolding.warnings, *alone.warnings))
     telling = sorted(set(_telling(unfolding)))
@@ -50,7 +51,7 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
     if len(telling) > _MOST_LOADED:
         unread = f"{len(telling) - _MOST_LOADED} of the listed values were not tried"
         warnings[Problem(unread, "run them", unfolding.source)] = None
-    return DistributionFindings(tuple(problems), tuple(warnings), len(unfolding))
+    return DistributionFindings(tuple(problems), tuple(warnings), len(unfolding), notes=alone.notes)
 
 
 def _telling(unfolding: Unfolding) -> Iterator[int]:

@@ -1,0 +1,74 @@
+"""The distribution files of the corpora: how many runs they stand for, and that each value makes a scenario."""
+
+from __future__ import annotations
+
+import os
+import time
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ConstraintError
+from eidrive_scenario.experiments.distribution_inspection import inspect_distribution
+from eidrive_scenario.library import definition
+from eidrive_scenario.openscenario import load_distribution, load_scenario
+
+CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
+pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with distribution files")
+
+LARGEST = "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc"
+
+
+def distributions() -> list[Path]:
+    return [path for path in sorted(CORPORA.rglob("*.xosc")) if definition(path) == "distribution"] if CORPORA else []
+
+
+def test_all_files_are_counted() -> None:
+    """The sums are those that others counted: 121,060 runs in all variations of ALKS, 52,500 in the largest."""
+    counts = {path: len(load_distribution(path)) for path in distributions()}
+    assert len(counts) == 21
+    assert sum(count for path, count in counts.items() if path.parent.name == "alks") == 121_060
+    assert counts[next(path for path in counts if path.name == LARGEST)] == 52_500
+
+
+def test_the_largest_is_counted_at_once_and_walked_in_constant_memory() -> None:
+    path = next(path for path in distributions() if path.name == LARGEST)
+    started = time.perf_counter()
+    runs = load_distribution(path)
+    assert len(runs) == 52_500
+    assert time.perf_counter() - started < 2
+    seen = set()
+    tracemalloc.start()
+    for run in runs:
+        seen.add(hash(tuple(run.parameters.values())))
+        if run.number == 1000:
+            tracemalloc.reset_peak()
+            early = tracemalloc.get_traced_memory()[0]
+    late = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(seen) == 52_500, "no run comes twice"
+    assert late - early < 8 * 2**20, "the hashes themselves take about 5 MB"
+
+
+@pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
+def test_every_value_makes_a_scenario(path: Path) -> None:
+    """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""
+    findings = inspect_distribution(path)
+    assert findings.problems == ()
+    own = [warning for warning in findings.warnings if warning.source == str(path)]
+    assert all("outside its constraints" in warning.message for warning in own)
+    assert findings.runs == len(load_distribution(path))
+
+
+@pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
+def test_a_run_has_the_values_of_its_combination(path: Path) -> None:
+    runs = load_distribution(path)
+    for number in runs.spread(5):
+        run = runs[number]
+        with_defaults = load_scenario(run.scenario).parameters
+        try:
+            parameters = load_scenario(run.scenario, run.assignments).parameters
+        except ConstraintError:
+            continue
+        assert parameters == {**with_defaults, **run.parameters}
