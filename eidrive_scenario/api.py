@@ -1,6 +1,7 @@
 """The surface that extensions import: actions, conditions, criteria, detectors, channels. The engine never does."""
 
 from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.driving.overrides import Override
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import (
     EidriveError,
@@ -23,10 +24,11 @@ from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.commands import Commands, CustomCommand, LightState, Override, Visibility
+from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.condition import Condition, EntityCondition, Measure, compares, in_words
 from eidrive_scenario.storyboard.distances import box_of, distance, frame_of, kind_of
 from eidrive_scenario.storyboard.domains import Domain
+from eidrive_scenario.storyboard.environments import changed as changed_environment
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
 from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve
 from eidrive_scenario.storyboard.progress import Progress, Watch
@@ -38,6 +40,8 @@ from eidrive_scenario.storyboard.transition import Transition as ValueTransition
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [
@@ -47,6 +51,8 @@ __all__ = [
     "Actor",
     "ActorSpec",
     "AgentStep",
+    "AnimationState",
+    "Appearance",
     "Channel",
     "Commands",
     "Condition",
@@ -60,6 +66,7 @@ __all__ = [
     "Domain",
     "EidriveError",
     "EntityCondition",
+    "Environment",
     "Frame",
     "FusionMethod",
     "Goal",
@@ -100,6 +107,7 @@ __all__ = [
     "WorldView",
     "box_distance",
     "box_of",
+    "changed_environment",
     "compares",
     "count_lanes",
     "distance",

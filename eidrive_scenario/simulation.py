@@ -29,10 +29,14 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.specs import actor_spec
 
 PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
 """Exit codes of a run."""
+
+LEAST_FRICTION = 1e-3
+"""The standard allows a road without any friction; tyres need a little."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,7 @@ class RunSettings:
     parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
     dt              step [s]
     time_limit      [s] of simulated time, for files that do not end by themselves
+    user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
     """
 
     channel: str | Path | None = None
@@ -54,6 +59,7 @@ class RunSettings:
     dt: float = 0.05
     time_limit: float = 120.0
     weather: str | None = None
+    user_values: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -156,6 +162,9 @@ class Simulation:
         self._observers = tuple(observers)
         self._trace = TraceHash()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario))]
+        self._user_values = dict(self.settings.user_values)
+        self.storyboard.stage.user_values = self._user_values.get
+        self._environment: Environment | None = None
         self._exit: Verdict | None = None
         try:
             self._apply(self.storyboard.initial())
@@ -175,6 +184,10 @@ class Simulation:
         for observer in self._observers:
             observer.close()
 
+    def set_user_value(self, name: str, value: str) -> None:
+        """Give a value to the UserDefinedValueConditions of this name, from the next tick on."""
+        self._user_values[name] = value
+
     def run(self) -> RunResult:
         """Play to the end."""
         started = time.perf_counter()
@@ -189,7 +202,17 @@ class Simulation:
         view = self.world.view()
         steps = self.stations.act(self.world, view)
         commands = self.storyboard.tick(view)
-        frame = Frame(view, steps, self.storyboard.changes, self.stations.links)
+        self._environment = commands.environment or self._environment
+        frame = Frame(
+            view,
+            steps,
+            self.storyboard.changes,
+            self.stations.links,
+            commands.signals,
+            commands.appearances,
+            self._environment,
+            commands.monitors,
+        )
 
         self._trace.observe(frame)
         for observer in self._observers:
@@ -200,7 +223,7 @@ class Simulation:
         if end is None:
             self.stations.send(steps, view.time)
             self._apply(commands)
-            self.world.step(commands.placements, self.stations.controls(steps))
+            self.world.step(commands.placements, self.stations.controls(steps, commands.overrides))
         return frame, end
 
     def _end(self, frame: Frame) -> str | None:
@@ -225,6 +248,9 @@ class Simulation:
         for name in self.stations.drivers:
             self.world.set_driven(name, name in commands.driven)
         self.stations.goals = commands.goals
+        if commands.environment is not None:
+            self._environment = commands.environment
+            self.world.set_friction(max(commands.environment.friction, LEAST_FRICTION))
         for command in commands.custom:
             self._command(command)
 
@@ -268,6 +294,7 @@ class Simulation:
         for criterion in self.criteria:
             metrics.update(criterion.metrics())
         metrics.update(self.stations.metrics(frame.view.time))
+        metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(
@@ -282,7 +309,7 @@ class Simulation:
             trace_hash=self._trace.hexdigest(),
             simulated_s=frame.view.time,
             wall_s=wall_s,
-            warnings=tuple(self._warnings),
+            warnings=tuple(dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings)])),
             parameters=dict(self.scenario.parameters),
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from eidrive_scenario.driving.agent import Agent, build_agent, build_rig
+from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
 from eidrive_scenario.driving.step import AgentStep, Goal
 from eidrive_scenario.errors import Problem, SettingError, suggestion
@@ -56,6 +57,7 @@ class Stations:
         """What became of the messages that were said in the last tick."""
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
+        self._held: dict[str, HeldControls] = {}
         self._settings = _all_settings(scenario, detector, cooperate)
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None)
@@ -74,11 +76,14 @@ class Stations:
         self._agents[spec.name] = build_agent(
             settings, spec, self._roads, seed=self._seed, dt=self._dt, own_perception=self._own_perception
         )
+        if self._agents[spec.name].controller is not None:
+            self._held[spec.name] = HeldControls(spec, self._dt)
 
     def leave(self, name: str) -> None:
         """An actor has left the world."""
         self._agents.pop(name, None)
         self._rigs.pop(name, None)
+        self._held.pop(name, None)
 
     def use_channel(self, profile: str, *, source: str, line: int) -> None:
         """The file asks for a channel, at the start or on a trigger; an option given by the caller wins."""
@@ -96,9 +101,16 @@ class Stations:
             for name, agent in self._agents.items()
         }
 
-    def controls(self, steps: Mapping[str, AgentStep]) -> dict[str, Control]:
-        """The pedals and steering that the agents chose."""
-        return {name: step.control for name, step in steps.items() if step.control is not None}
+    def controls(
+        self, steps: Mapping[str, AgentStep], overrides: Mapping[str, Overrides] | None = None
+    ) -> dict[str, Control]:
+        """The pedals and steering that the agents chose, but for those that the scenario holds."""
+        held = overrides or {}
+        return {
+            name: self._held[name].apply(step.control, held.get(name, {}))
+            for name, step in steps.items()
+            if step.control is not None
+        }
 
     def send(self, steps: Mapping[str, AgentStep], now: float) -> None:
         """What the agents said goes on the air, each message on the link to each station that listens."""

@@ -8,14 +8,26 @@ from dataclasses import dataclass, field
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.storyboard.states import StateChange
 from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The truth, what each station did, what the storyboard did, and what became of the messages said before."""
+    """The truth, what each station did, what the storyboard did, and what became of the messages said before.
+
+    signals      what each traffic signal shows, by its id; those that nobody has set are missing
+    appearances  lights, animations and visibility of the actors where they differ from the usual
+    environment  time of day, weather and road; None until the scenario says something of them
+    monitors     the scenario's monitors by name
+    """
 
     view: WorldView
     steps: Mapping[str, AgentStep] = field(default_factory=dict)
     changes: tuple[StateChange, ...] = ()
     links: tuple[LinkEvent, ...] = ()
+    signals: Mapping[str, str] = field(default_factory=dict)
+    appearances: Mapping[str, Appearance] = field(default_factory=dict)
+    environment: Environment | None = None
+    monitors: Mapping[str, bool] = field(default_factory=dict)

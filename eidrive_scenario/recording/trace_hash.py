@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import struct
+from collections.abc import Mapping
 
 import numpy as np
 
+from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.environment import Environment
+
+_AROUND: Mapping[str, Codec] = {
+    "signals": codec(Mapping[str, str]),
+    "appearances": codec(Mapping[str, Appearance]),
+    "environment": codec(Environment),
+    "monitors": codec(Mapping[str, bool]),
+}
+"""What a frame says beside the actors; it enters where it changes, and so not at all where nobody says anything."""
 
 
 class TraceHash:
     """SHA-256 over every frame's actors, poses, velocities, contacts, state changes and fates of messages.
+
+    What signals, appearances, environment and monitors change to enters too.
 
     Floats enter with their 64 bits, little-endian, so a difference in the last place shows. The hash is the same in
     every process with the same scenario, seed, settings and installed versions on one kind of machine. Other processor
@@ -20,6 +35,7 @@ class TraceHash:
 
     def __init__(self) -> None:
         self._sha = hashlib.sha256()
+        self._around: dict[str, object] = dict.fromkeys(_AROUND)
 
     def observe(self, frame: Frame) -> None:
         """Take one frame in."""
@@ -40,6 +56,11 @@ class TraceHash:
             self._texts("link", link.sender, link.receiver, link.outcome, link.reason)
             arrives = float("inf") if link.arrives is None else link.arrives
             self._floats(link.number, link.sent, arrives, link.size)
+        for name, how in _AROUND.items():
+            before, now = self._around[name], getattr(frame, name)
+            if now is not before and now != before and (now or before):
+                self._texts(name, json.dumps(how.encode(now), sort_keys=True))
+            self._around[name] = now
 
     def hexdigest(self) -> str:
         """64 hexadecimal digits over the frames so far."""

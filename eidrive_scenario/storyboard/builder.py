@@ -72,6 +72,7 @@ class Builder:
                 condition.bind(self._stage)
             except ScenarioError as error:
                 self._problems += error.problems
+        self._problems += self._stage.signals.problems
         if self._problems:
             raise ScenarioError(sorted(dict.fromkeys(self._problems), key=lambda p: (p.source, p.line or 0)))
         return init, root

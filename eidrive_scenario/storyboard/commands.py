@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
+from eidrive_scenario.driving.overrides import Overrides
 from eidrive_scenario.driving.step import Goal
-from eidrive_scenario.openscenario import model
 from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.environment import Environment
 
 
 @dataclass(frozen=True)
@@ -19,42 +20,6 @@ class CustomCommand:
     content: str
     line: int
     source: str
-
-
-@dataclass(frozen=True)
-class Override:
-    """One pedal or the steering wheel held at a value.
-
-    control  throttle, brake, clutch, parkingBrake, steeringWheel or gear
-    value    share of the pedal in [0, 1], angle of the wheel [rad], or the gear's number
-    active   False gives the control back
-    """
-
-    control: str
-    value: float
-    active: bool = True
-
-
-@dataclass(frozen=True)
-class Visibility:
-    """Who can see an entity."""
-
-    graphics: bool = True
-    traffic: bool = True
-    sensors: bool = True
-
-
-@dataclass(frozen=True)
-class LightState:
-    """A light of a vehicle: its type (as the standard names it) and mode (on, off, flashing)."""
-
-    light: str
-    mode: str
-    intensity: float | None = None
-    """Luminous intensity [cd]."""
-
-
-Overrides: TypeAlias = dict[str, dict[str, Override]]
 
 
 @dataclass
@@ -68,9 +33,10 @@ class Commands:
     driven       actors whose own controller is active, lateral and longitudinal
     overrides    controls held per actor, all that are in force
     custom       CustomCommandActions that started in this tick
-    environment  the Environment that began to hold in this tick
-    signals      new states of traffic signals, by their id
-    lights, visibility  per actor, where they changed
+    environment  what began to hold in this tick, None where nothing changed
+    signals      what every traffic signal shows, by its id
+    monitors     the values of all monitors
+    appearances  how those actors look that differ from the usual
     """
 
     placements: dict[str, Placement] = field(default_factory=dict)
@@ -78,9 +44,9 @@ class Commands:
     additions: dict[str, Placement] = field(default_factory=dict)
     removals: set[str] = field(default_factory=set)
     driven: frozenset[str] = frozenset()
-    overrides: Mapping[str, Mapping[str, Override]] = field(default_factory=dict)
+    overrides: Mapping[str, Overrides] = field(default_factory=dict)
     custom: list[CustomCommand] = field(default_factory=list)
-    environment: model.Environment | None = None
-    signals: dict[str, str] = field(default_factory=dict)
-    lights: dict[str, list[LightState]] = field(default_factory=dict)
-    visibility: dict[str, Visibility] = field(default_factory=dict)
+    environment: Environment | None = None
+    signals: Mapping[str, str] = field(default_factory=dict)
+    monitors: Mapping[str, bool] = field(default_factory=dict)
+    appearances: Mapping[str, Appearance] = field(default_factory=dict)

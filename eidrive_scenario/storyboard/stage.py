@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
+from eidrive_scenario.driving.overrides import Override
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
-from eidrive_scenario.storyboard.commands import Commands, Override
+from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.progress import Progress
+from eidrive_scenario.storyboard.signals import Signals
+from eidrive_scenario.world.appearance import Appearance
+from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 E = TypeVar("E", bound=model.Element)
@@ -47,7 +51,11 @@ class Stage:
     view        the truth at this tick; before the first view (Init) it holds nobody
     dt          length of the step that begins now [s]; 0 in Init
     parameters, variables  by name, as text
-    signals     states of traffic signals, by id
+    monitors    by name
+    signals     the traffic signals and their controllers
+    appearances  of those actors that differ from the usual
+    environment  time of day, weather and road
+    warnings    what is odd about the scenario and yet can be done
     commands    to write to
     """
 
@@ -64,10 +72,17 @@ class Stage:
         self.progress = Progress()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
-        self.signals: dict[str, str] = {}
+        self.warnings: list[Problem] = []
+        network = scenario.document.road_network
+        self.signals = Signals(network.traffic_signals if network is not None else None, roads)
+        self.warnings += self.signals.warnings
+        declared = scenario.document.monitor_declarations
+        self.monitors: Mapping[str, bool] = (
+            {one.name: one.value for one in declared.monitor_declaration} if declared is not None else {}
+        )
+        self.appearances: Mapping[str, Appearance] = {}
         self.overrides: dict[str, dict[str, Override]] = {}
-        self.environment: model.Environment | None = None
-        self.environment_since = 0.0
+        self.environment = Environment()
         self.user_values: Callable[[str], str | None] = lambda _: None
         """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
         self.commands = Commands()
@@ -152,6 +167,14 @@ class Stage:
                 )
             )
         return entry
+
+    def appearance(self, name: str) -> Appearance:
+        """How an actor looks."""
+        return self.appearances.get(name) or Appearance()
+
+    def look(self, name: str, appearance: Appearance) -> None:
+        """Change how an actor looks."""
+        self.appearances = {**self.appearances, name: appearance}
 
     def occupy(self, actor: str | None, domains: Domain, occupant: Occupant, holder: Holder) -> None:
         """A behaviour begins to control domains of an actor; older ones on these domains end."""

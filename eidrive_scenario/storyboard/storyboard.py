@@ -54,6 +54,7 @@ class Storyboard:
 
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
+        self.stage.signals.advance(0.0)
         self.init.start()
         self._bring_trailers()
         for actor in self.stage.actors.values():
@@ -64,6 +65,7 @@ class Storyboard:
     def tick(self, view: WorldView) -> Commands:
         """Judge the triggers by this view, let the actions decide, and move what is scripted over to the next one."""
         self.stage.begin(view, self.dt)
+        self.stage.signals.advance(view.time)
         if self.root.state is None:
             self.root.stand_by()
             self.root.begin()
@@ -109,6 +111,8 @@ class Storyboard:
         commands.driven = frozenset(driven)
         commands.goals = {name: goal for name in driven if (goal := stage.actors[name].goal) is not None}
         commands.overrides = {name: dict(held) for name, held in stage.overrides.items() if held}
+        commands.signals, commands.appearances = stage.signals.states, stage.appearances
+        commands.monitors = stage.monitors
         return commands
 
 

@@ -31,6 +31,7 @@ PROPERTIES = (
     "drive_front",
     "yaw_inertia",
     "steering_rate",
+    "steering_ratio",
 )
 """The Properties of a Vehicle which `VehicleParameters.of` reads; each is a number, each may be missing."""
 
@@ -51,6 +52,8 @@ class VehicleParameters:
     """[rad]"""
     steering_rate: float
     """Of the front wheels [rad/s; 0.8]."""
+    steering_ratio: float
+    """Turn of the steering wheel over that of the front wheels [16]."""
     max_speed: float
     max_acceleration: float
     """That the drive gives at low speed [m/s²]."""
@@ -87,6 +90,7 @@ class VehicleParameters:
             yaw_inertia=_number(spec, "yaw_inertia", spec.mass * lever),
             max_steering=spec.max_steering,
             steering_rate=_number(spec, "steering_rate", 0.8),
+            steering_ratio=_number(spec, "steering_ratio", 16.0),
             max_speed=spec.max_speed,
             max_acceleration=spec.max_acceleration,
             max_deceleration=spec.max_deceleration,

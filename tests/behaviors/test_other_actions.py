@@ -115,7 +115,7 @@ def test_a_signal_changes_and_conditions_below_see_it_in_the_same_tick(scene: An
     played = scene(0.5, ("Ego", change, after(0.15)), ("Ego", nothing, green))
     assert played.commands[2].signals == {"17": "green"}
     assert played.when("event 1", "runningState") == pytest.approx(0.2)
-    assert played.commands[2].visibility == {"Ego": Visibility(sensors=False)}
+    assert played.commands[2].appearances["Ego"].visibility == Visibility(sensors=False)
 
 
 def test_the_environment_and_its_clock(scene: Any) -> None:
@@ -142,7 +142,8 @@ def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> Non
         ("Ego", light.format(1, "brakeLights", "on"), after(0.15)),
         ("Ego", light.format(1, "lowBeam", "off"), after(0.35)),
     )
-    assert played.commands[0].lights == {"Ego": [LightState("lowBeam", "on")]}
+    assert played.commands[0].appearances["Ego"].lights == {"lowBeam": LightState("lowBeam", "on", fade=1.0)}
+    assert set(played.commands[3].appearances["Ego"].lights) == {"lowBeam", "brakeLights"}
     assert played.when("action 0", "completeState") == pytest.approx(0.4)
     assert played.when("action 1", "completeState") == pytest.approx(1.1)
 

@@ -95,22 +95,31 @@ class OverrideControllerValueAction(ActionBehaviour):
         simple = (("throttle", action.throttle), ("clutch", action.clutch), ("steeringWheel", action.steering_wheel))
         for control, entry in simple:
             if entry is not None:
-                found.append(Override(control, entry.value, entry.active))
+                found.append(Override(control, entry.value, entry.active, max_rate=entry.max_rate))
         for control, brake in (("brake", action.brake), ("parkingBrake", action.parking_brake)):
             if brake is not None:
                 share = brake.brake_percent or brake.brake_force
-                found.append(Override(control, share.value if share is not None else brake.value or 0.0, brake.active))
+                found.append(
+                    Override(
+                        control,
+                        share.value if share is not None else brake.value or 0.0,
+                        brake.active,
+                        max_rate=share.max_rate if share is not None else None,
+                        newton=brake.brake_force is not None,
+                    )
+                )
         if action.gear is not None:
-            found.append(Override("gear", self._gear(action.gear), action.gear.active))
+            found.append(self._gear(action.gear))
         return found
 
     @staticmethod
-    def _gear(gear: model.OverrideGearAction) -> float:
+    def _gear(gear: model.OverrideGearAction) -> Override:
         if gear.manual_gear is not None:
-            return float(gear.manual_gear.number)
+            return Override("gear", float(gear.manual_gear.number), gear.active)
         if gear.automatic_gear is not None:
-            return GEARS[gear.automatic_gear.gear.value]
-        return gear.number or 0.0
+            position = gear.automatic_gear.gear.value
+            return Override("gear", GEARS[position], gear.active, parked=position == "p")
+        return Override("gear", gear.number or 0.0, gear.active)
 
     def describe(self) -> str:
         """Which controls."""

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, model
+from eidrive_scenario.api import ActionBehaviour, changed_environment, model
 
 
 class EnvironmentAction(ActionBehaviour):
-    """Sets the environment at once; its clock starts now."""
+    """Sets the environment at once; what it leaves out stays as it is. A time of day starts the clock anew."""
 
+    immediate = True
     action: model.EnvironmentAction
 
     def update(self) -> Status:
         """Set it."""
-        environment = self._environment()
-        self.stage.environment = environment
-        self.stage.environment_since = self.stage.time
-        self.stage.commands.environment = environment
+        stage = self.stage
+        stage.environment = changed_environment(stage.environment, self._environment(), max(stage.time, 0.0))
+        stage.commands.environment = stage.environment
         return Status.SUCCESS
 
     def _environment(self) -> model.Environment:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import datetime
 
 from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
 
@@ -33,38 +33,28 @@ class TimeOfDayCondition(Condition):
     """The date and time of the day in the simulated world.
 
     The clock starts with the environment's TimeOfDay and runs with the simulation where that is animated. Without an
-    environment that says so there is no time of day, and the condition does not hold.
+    environment that says so there is no time of day, and the condition does not hold. Where one of the two times has
+    a zone and the other has none, both count in that zone.
     """
 
     element: model.TimeOfDayCondition
 
     def holds(self, stage: Stage) -> bool:
         """Compare the clock."""
-        now = clock(stage)
+        now = stage.environment.clock(stage.time)
         if now is None:
             return False
         return compares((now - _like(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0)
 
     def explain(self, stage: Stage) -> str:
         """The clock."""
-        now = clock(stage)
+        now = stage.environment.clock(stage.time)
         shown = "unknown" if now is None else now.isoformat()
         return f"time of day {shown} {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
 
     def describe(self) -> str:
         """Rule and limit."""
         return f"time of day {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
-
-
-def clock(stage: Stage) -> datetime | None:
-    """The date and time in the simulated world, None where no environment states it."""
-    environment = stage.environment
-    if environment is None or environment.time_of_day is None:
-        return None
-    start = environment.time_of_day.date_time
-    if not environment.time_of_day.animation:
-        return start
-    return start + timedelta(seconds=stage.time - stage.environment_since)
 
 
 def _like(moment: datetime, other: datetime) -> datetime:

@@ -1,4 +1,4 @@
-"""Conditions on parameters, variables, traffic signals and values from outside."""
+"""Conditions on parameters, variables and values from outside."""
 
 from __future__ import annotations
 
@@ -108,21 +108,3 @@ class UserDefinedValueCondition(Condition):
     def measures(self, stage: Stage) -> tuple[Measure, ...]:
         """The value."""
         return measured(stage.user_values(self.element.name), self.element.rule, self.element.value)
-
-
-class TrafficSignalCondition(Condition):
-    """A signal shows a state."""
-
-    element: model.TrafficSignalCondition
-
-    def holds(self, stage: Stage) -> bool:
-        """Compare its state."""
-        return stage.signals.get(self.element.name) == self.element.state
-
-    def explain(self, stage: Stage) -> str:
-        """Its state."""
-        return f"signal {self.element.name} shows {stage.signals.get(self.element.name)}"
-
-    def describe(self) -> str:
-        """The state."""
-        return f"signal {self.element.name} shows {self.element.state}"

@@ -1,0 +1,69 @@
+"""Conditions on traffic signals and their controllers."""
+
+from __future__ import annotations
+
+from eidrive_scenario.api import Condition, Problem, ScenarioError, Stage, model, suggestion
+
+
+class TrafficSignalCondition(Condition):
+    """A signal shows a state: the same text, whatever its case, as no tool's states differ in that alone."""
+
+    element: model.TrafficSignalCondition
+
+    def bind(self, stage: Stage) -> None:
+        """Say what is odd about the signal's name."""
+        odd = stage.signals.unknown(self.element.name, self.element)
+        if odd is not None:
+            stage.warnings.append(odd)
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare its state."""
+        state = stage.signals.state(self.element.name)
+        return state is not None and _plain(state) == _plain(self.element.state)
+
+    def explain(self, stage: Stage) -> str:
+        """Its state."""
+        return f"signal {self.element.name} shows {stage.signals.state(self.element.name) or 'nothing'}"
+
+    def describe(self) -> str:
+        """The state."""
+        return f"signal {self.element.name} shows {self.element.state}"
+
+
+class TrafficSignalControllerCondition(Condition):
+    """A controller is in a phase."""
+
+    element: model.TrafficSignalControllerCondition
+
+    def bind(self, stage: Stage) -> None:
+        """Look the phase up. Raises ScenarioError if the controller does not have it."""
+        element = self.element
+        cycle = stage.signals.cycles.get(element.traffic_signal_controller_ref)
+        phases = [phase.name for phase in cycle.phases] if cycle is not None else [element.phase]
+        if element.phase not in phases:
+            what = f"{element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
+            raise ScenarioError(
+                Problem(
+                    f"TrafficSignalControllerCondition can never hold: {what}",
+                    suggestion(element.phase, phases),
+                    element.source,
+                    element.line,
+                )
+            )
+
+    def holds(self, stage: Stage) -> bool:
+        """Compare its phase."""
+        return stage.signals.phase(self.element.traffic_signal_controller_ref) == self.element.phase
+
+    def explain(self, stage: Stage) -> str:
+        """Its phase."""
+        name = self.element.traffic_signal_controller_ref
+        return f"signal controller {name} is in {stage.signals.phase(name) or 'no phase'}"
+
+    def describe(self) -> str:
+        """The phase."""
+        return f"signal controller {self.element.traffic_signal_controller_ref} is in {self.element.phase}"
+
+
+def _plain(state: str) -> str:
+    return state.strip().lower()

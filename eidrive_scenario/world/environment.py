@@ -1,0 +1,48 @@
+"""Time of day, weather and the state of the road, as the scenario says them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+
+@dataclass(frozen=True)
+class Environment:
+    """What holds now; None where the scenario has not said it.
+
+    date_time      ISO 8601, of the instant `clock_since` [s] of the run
+    clock_runs     False: the time of day stands still
+    friction       scales the grip of tyres, 1 on a dry road
+    wetness, clouds, precipitation   as the standard names them
+    precipitation_intensity [mm/h], precipitation_share in [0, 1] (files of 1.0)
+    fog_range      visual range [m];  illuminance of the sun [lx]
+    sun_azimuth, sun_elevation, wind_direction [rad];  wind_speed [m/s]
+    temperature [K], pressure [Pa]
+    """
+
+    name: str = ""
+    date_time: str | None = None
+    clock_runs: bool = False
+    clock_since: float = 0.0
+    friction: float = 1.0
+    wetness: str | None = None
+    clouds: str | None = None
+    sun_azimuth: float | None = None
+    sun_elevation: float | None = None
+    illuminance: float | None = None
+    fog_range: float | None = None
+    precipitation: str | None = None
+    precipitation_intensity: float | None = None
+    precipitation_share: float | None = None
+    wind_direction: float | None = None
+    wind_speed: float | None = None
+    temperature: float | None = None
+    pressure: float | None = None
+    dome_image: str | None = None
+
+    def clock(self, time: float) -> datetime | None:
+        """The date and time in the simulated world at a time of the run [s]."""
+        if self.date_time is None:
+            return None
+        start = datetime.fromisoformat(self.date_time)
+        return start + timedelta(seconds=time - self.clock_since) if self.clock_runs else start
