@@ -9,6 +9,9 @@ import typer
 
 from eidrive_scenario.errors import Problem, SettingError
 
+PRINTED = "-"
+"""Instead of a file: standard output."""
+
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
 
@@ -41,6 +44,13 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Folder for recording.mcap and result.json.")] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Leave out recording.mcap.")] = False,
     csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
+    log: Annotated[
+        str | None, typer.Option(metavar="FILE|-", help="File for what the storyboard does, and why; -: print it.")
+    ] = None,
+    explain: Annotated[
+        list[str] | None,
+        typer.Option(metavar="EVENT", help="Say why an event or act started, or why not; repeatable."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run, nothing else.")] = False,
 ) -> None:
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
@@ -48,7 +58,11 @@ def run(
     from eidrive_scenario.cli.verdicts import show
     from eidrive_scenario.experiments.single_run import as_json_text, play
     from eidrive_scenario.library import definition, resolve_scenario
+    from eidrive_scenario.recording import Explanation
     from eidrive_scenario.simulation import RunSettings
+
+    if json and log == PRINTED:
+        raise SettingError(Problem("--log - and --json would both print", "give the log a file"))
 
     parameters = _parameters(param or [])
     settings = RunSettings(
@@ -65,18 +79,23 @@ def run(
         marks = [] if isinstance(source, Path) else [f"run-{source.number}"]
         for each in range(seed, seed + repeat):
             mark = [*marks, f"seed-{each}"] if repeat > 1 else marks
+            explanations = [Explanation(name) for name in explain or ()]
             result = play(
                 source,
                 seed=each,
                 settings=settings,
                 out=out.joinpath(*mark) if out is not None else None,
                 record=not no_record,
-                csv=csv.with_stem("-".join([csv.stem, *mark])) if csv is not None else None,
+                csv=_marked(csv, mark) if csv is not None else None,
+                log=_marked(Path(log), mark) if log is not None and log != PRINTED else log,
+                explanations=explanations,
             )
             if json:
                 typer.echo(as_json_text(result))
             else:
                 show(result, varied="" if isinstance(source, Path) else str(source))
+            for explanation in explanations:
+                typer.echo("\n".join(explanation.lines()), err=json)
             code = max(code, result.exit_code)
         return code
 
@@ -86,6 +105,11 @@ def run(
     if max_runs is not None:
         raise SettingError(Problem(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path)))
     raise typer.Exit(play_seeds(path))
+
+
+def _marked(path: Path, mark: list[str]) -> Path:
+    """The file of one run among several."""
+    return path.with_stem("-".join([path.stem, *mark]))
 
 
 def _senders(text: str | None) -> tuple[str, ...] | None:

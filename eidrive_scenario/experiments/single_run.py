@@ -13,7 +13,7 @@ from typing import Any
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
-from eidrive_scenario.recording import CsvWriter, Recorder
+from eidrive_scenario.recording import CsvWriter, Explanation, Recorder, RunLog
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
 
@@ -29,11 +29,15 @@ def play(
     out: Path | None = None,
     record: bool = True,
     csv: Path | None = None,
+    log: str | Path | None = None,
+    explanations: Sequence[Explanation] = (),
 ) -> RunResult:
     """Run a scenario, given by path or library name, or one run out of a parameter value distribution.
 
     out     folder for `recording.mcap` (unless `record` is False) and `result.json`
     csv     file for one row per actor and tick
+    log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
+    explanations  what shall be explained afterwards; they look on
 
     Parameters in `settings` win over those of the distribution. Raises InputError for a wrong scenario, setting or
     place to write; ConstraintError for a run that the constraints of parameters rule out.
@@ -47,8 +51,11 @@ def play(
     else:
         path = resolve_scenario(source)
     scenario = load_for_seed(path, seed, settings.parameters)
-    observers: list[Observer] = []
+    observers: list[Observer] = [*explanations]
     with ExitStack() as stack:
+        if log is not None:
+            observers.append(RunLog(log))
+            stack.callback(observers[-1].close)
         if csv is not None:
             observers.append(CsvWriter(csv))
             stack.callback(observers[-1].close)
@@ -58,7 +65,11 @@ def play(
                 Recorder(out / RECORDING, metadata=_told(scenario, seed, number, settings), attachments=attachments)
             )
             stack.callback(observers[-1].close)
-        result = Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
+        simulation = Simulation(scenario, seed=seed, settings=settings, observers=observers)
+        with simulation:
+            for explanation in explanations:
+                explanation.watch(simulation.storyboard)
+            result = simulation.run()
     result = replace(result, run=number)
     if out is not None:
         with create(out / RESULT) as stream:

@@ -89,9 +89,9 @@ class ConditionGroup:
 
 
 class Witness(Protocol):
-    """Looks on as a trigger is asked."""
+    """Looks on as one trigger is asked."""
 
-    def saw(self, trigger: Trigger, stage: Stage, fired: bool) -> None:
+    def saw(self, stage: Stage) -> None:
         """The trigger has been asked."""
 
 
@@ -111,15 +111,14 @@ class Trigger:
     def evaluate(self, stage: Stage) -> bool:
         """True where it fires; `why` then says what did it. Called at most once per tick."""
         fired = [group for group in self.groups if group.evaluate(stage)]
+        if fired:
+            monitors = fired[0].monitors
+            self.why = " and ".join(monitor.why(stage) for monitor in monitors)
+            names = [name for monitor in monitors for name in getattr(monitor.condition, "fulfilled", ())]
+            self.triggering = tuple(dict.fromkeys(names))
         if self.witness is not None:
-            self.witness.saw(self, stage, bool(fired))
-        if not fired:
-            return False
-        monitors = fired[0].monitors
-        self.why = " and ".join(monitor.why(stage) for monitor in monitors)
-        names = [name for monitor in monitors for name in getattr(monitor.condition, "fulfilled", ())]
-        self.triggering = tuple(dict.fromkeys(names))
-        return True
+            self.witness.saw(stage)
+        return bool(fired)
 
     def reset(self) -> None:
         """Forget all evaluations, as before the first."""

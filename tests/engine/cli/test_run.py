@@ -112,3 +112,37 @@ def test_the_same_seed_gives_the_same_trace_in_another_process(eidrive: Eidrive,
     command = [sys.executable, "-m", "eidrive_scenario", "run", str(passing_by), "--json"]
     there = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert here["trace_hash"] == there["trace_hash"]
+
+
+def test_the_log_says_what_fired(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    result = eidrive("run", passing_by, "--log", tmp_path / "run.log", "--no-record")
+    assert result.exit_code == 0, result.output
+    lines = (tmp_path / "run.log").read_text(encoding="utf-8").splitlines()
+    assert lines == [
+        "    0.000 s  storyboard starts",
+        "    3.000 s  storyboard is stopped: simulation time 3.00 s ≥ 3 s",
+    ]
+    printed = eidrive("run", passing_by, "--log", "-")
+    assert printed.stdout.splitlines()[:2] == lines
+
+
+def test_each_run_has_a_log_of_its_own(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--log", tmp_path / "run.log", "--repeat", "2")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run-seed-1.log", "run-seed-2.log"]
+
+
+def test_explain(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--explain", "storyboard")
+    assert "the run stopped at 3.00 s: simulation time 3.00 s ≥ 3 s\n" in result.stdout
+    assert f"['end', {passing_by}:" in result.stdout
+    assert "true from 3.00 s on" in result.stdout
+    unknown = eidrive("run", passing_by, "--explain", "Cut")
+    assert unknown.exit_code == 2
+    assert "no event or act is named 'Cut'" in unknown.stderr
+
+
+def test_json_stays_alone_on_standard_output(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--json", "--explain", "storyboard")
+    assert json.loads(result.stdout)["passed"] is True
+    assert "the run stopped at 3.00 s" in result.stderr
+    assert eidrive("run", passing_by, "--json", "--log", "-").exit_code == 2

@@ -1,0 +1,73 @@
+"""What happened in a run, for human eyes: one line per change of the storyboard, with what fired and why."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import TextIO
+
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.output import create
+from eidrive_scenario.storyboard.elements import EMPTY
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+
+STANDARD_OUTPUT = "-"
+_KINDS = {"maneuverGroup": "maneuver group"}
+_VERBS = {
+    Transition.START: "starts",
+    Transition.END: "ends",
+    Transition.STOP: "is stopped",
+    Transition.SKIP: "is skipped",
+    None: "stands by",
+}
+
+
+class RunLog:
+    """Writes a line for each change: time [s], element, what became of it, and why.
+
+    Those above an element are named when it is first spoken of, and always where another has the same name. Raises
+    SettingError if the file cannot be written; `-` is standard output.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._own = str(path) != STANDARD_OUTPUT
+        self._stream: TextIO = io.TextIOWrapper(create(path), encoding="utf-8") if self._own else sys.stdout
+        self._named: dict[tuple[str, str], str] = {}
+        self._twice: set[tuple[str, str]] = set()
+        self._told: set[tuple[str, str]] = set()
+
+    def observe(self, frame: Frame) -> None:
+        """A line for each change of this frame; who starts at once need not be said to stand by."""
+        started = {change.path for change in frame.changes if change.transition is Transition.START}
+        for change in frame.changes:
+            if change.transition is not None or change.path not in started:
+                self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {in_words(change)}\n")
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._own:
+            self._stream.close()
+        else:
+            self._stream.flush()
+
+    def _title(self, change: StateChange) -> str:
+        kind = _KINDS.get(change.kind, change.kind)
+        if change.path == change.kind:
+            return kind
+        key = (change.kind, change.element)
+        known = self._named.setdefault(key, change.path)
+        if known != change.path:
+            self._twice.add(key)
+        above = change.path.rpartition("/")[0]
+        told = f" (in {above})" if above and (key not in self._told or key in self._twice) else ""
+        self._told.add(key)
+        return f"{kind} {change.element}{told}"
+
+
+def in_words(change: StateChange) -> str:
+    """What became of an element, and why."""
+    verb = _VERBS[change.transition]
+    if change.transition is Transition.END and change.after is State.STANDBY:
+        verb = "ends, and stands by again"
+    return f"{verb}: {change.why}" if change.why and change.why != EMPTY else verb

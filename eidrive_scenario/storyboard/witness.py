@@ -1,0 +1,155 @@
+"""What a trigger saw over a run, condition by condition: so that one can say afterwards why it fired, or why not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from eidrive_scenario.openscenario.model import Rule
+from eidrive_scenario.storyboard.condition import Measure
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger
+
+
+@dataclass
+class Times:
+    """Spans of time in which something went on: how many, and the first and the last of them [s]."""
+
+    count: int = 0
+    first: tuple[float, float] = (math.nan, math.nan)
+    last: tuple[float, float] = (math.nan, math.nan)
+    _open: bool = False
+
+    def note(self, going_on: bool, time: float) -> None:
+        """It goes on at this time, or it does not."""
+        if going_on:
+            begin = self.last[0] if self._open else time
+            self.last = (begin, time)
+            if not self._open:
+                self.count += 1
+            if self.count == 1:
+                self.first = self.last
+        self._open = going_on
+
+
+@dataclass
+class Nearest:
+    """The quantity of one entity when it was nearest to being right, and when that was [s]."""
+
+    measure: Measure
+    time: float
+    gap: float
+
+
+@dataclass
+class ConditionHistory:
+    """One condition of a trigger over a run.
+
+    true     when it was true, edge and delay left aside
+    edges    when its edge was seen, the delay left aside
+    counted  when it counted as true
+    nearest  by entity, what it compared when that was nearest to being right
+    """
+
+    monitor: ConditionMonitor
+    asked: int = 0
+    first_asked: float = math.nan
+    last_asked: float = math.nan
+    true_at_first: bool = False
+    true: Times = field(default_factory=Times)
+    edges: Times = field(default_factory=Times)
+    counted: Times = field(default_factory=Times)
+    nearest: dict[str, Nearest] = field(default_factory=dict)
+    undefined: set[str] = field(default_factory=set)
+    """Entities whose quantity was undefined or infinite at some evaluation."""
+    words: str = ""
+    """The condition with its values at the last evaluation, where it compares no number."""
+    _before: bool | None = None
+
+    def note(self, stage: Stage) -> None:
+        """The condition has just been asked."""
+        time, value = stage.time, bool(self.monitor.value)
+        if not self.asked:
+            self.first_asked, self.true_at_first = time, value
+        self.asked += 1
+        self.last_asked = time
+        self.true.note(value, time)
+        changed = self._before is not None and self._before != value
+        wanted = self.monitor.edge == "risingOrFalling" or (self.monitor.edge == "rising") == value
+        self.edges.note(changed and wanted, time)
+        self.counted.note(self.monitor.result, time)
+        self._before = value
+        measures = self.monitor.condition.measures(stage)
+        for measure in measures:
+            self._compare(measure, time)
+        if not measures:
+            self.words = self.monitor.condition.explain(stage)
+
+    def _compare(self, measure: Measure, time: float) -> None:
+        gap = gap_of(measure)
+        if not math.isfinite(gap):
+            self.undefined.add(measure.of)
+            return
+        known = self.nearest.get(measure.of)
+        if known is None or gap < known.gap:
+            self.nearest[measure.of] = Nearest(measure, time, gap)
+
+
+def gap_of(measure: Measure) -> float:
+    """How far a quantity is from what its rule asks for; negative where it is fulfilled and more, NaN if undefined."""
+    match measure.rule:
+        case Rule.GREATER_THAN | Rule.GREATER_OR_EQUAL:
+            return measure.limit - measure.value
+        case Rule.LESS_THAN | Rule.LESS_OR_EQUAL:
+            return measure.value - measure.limit
+        case Rule.EQUAL_TO:
+            return abs(measure.value - measure.limit)
+    return -abs(measure.value - measure.limit)
+
+
+@dataclass
+class GroupHistory:
+    """One condition group over a run.
+
+    held  when all its conditions counted as true
+    most  how many of them did at once at most, when first, and which were missing then
+    """
+
+    conditions: tuple[ConditionHistory, ...]
+    held: Times = field(default_factory=Times)
+    most: int = -1
+    most_at: float = math.nan
+    missing: tuple[ConditionHistory, ...] = ()
+
+    def note(self, stage: Stage) -> None:
+        """The group has just been asked."""
+        for condition in self.conditions:
+            condition.note(stage)
+        missing = tuple(condition for condition in self.conditions if not condition.monitor.result)
+        count = len(self.conditions) - len(missing)
+        self.held.note(not missing, stage.time)
+        if count > self.most:
+            self.most, self.most_at, self.missing = count, stage.time, missing
+
+
+class TriggerHistory:
+    """A witness of one trigger."""
+
+    def __init__(self, trigger: Trigger) -> None:
+        self.trigger = trigger
+        self.groups = tuple(_history(group) for group in trigger.groups)
+        trigger.witness = self
+
+    def saw(self, stage: Stage) -> None:
+        """Note what each condition was."""
+        for group in self.groups:
+            group.note(stage)
+
+    @property
+    def asked(self) -> int:
+        """How often the trigger was asked."""
+        return max((condition.asked for group in self.groups for condition in group.conditions), default=0)
+
+
+def _history(group: ConditionGroup) -> GroupHistory:
+    return GroupHistory(tuple(ConditionHistory(monitor) for monitor in group.monitors))
