@@ -85,6 +85,10 @@ class Crossings:
         """`name` holds a lane from now on."""
         self.holders.setdefault(row, {})[name] = -np.inf
 
+    def holds(self, name: str, row: int) -> bool:
+        """Whether `name` holds a lane."""
+        return name in self.holders.get(row, ())
+
     def release(self, name: str, row: int) -> None:
         """`name` has left a lane."""
         self.holders.get(row, {}).pop(name, None)

@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 
 STOP_LINE = 1.0
 """A car that waits for a junction stops this far before it [m]."""
-ROLLING = 2.0
-"""A leader at this speed clears the space behind a junction by itself [m/s]."""
+PATIENCE = 20.0
+"""A car that has waited so long before a junction is not overtaken by others any more [s]."""
 TOO_LATE = 4.0
 """A car that would have to brake harder than this passes a light that has just turned [m/s²]."""
 
@@ -147,7 +147,8 @@ class Fleet:
         self._cars.plan[index, 0] = row
         self._poses = None
         if self.lanes.in_junction[row] and not self.lanes.walkable[row]:
-            self._grant(index, 0)
+            self._crossings.take(row, spec.name)
+            self._cars.granted[index, 0] = True
         self._extend(index)
         return self._placement(index, teleport=True)
 
@@ -202,7 +203,7 @@ class Fleet:
         occupants = self.occupants()
         leaders = self._leaders(occupants)
         lights = self._lights()
-        self._update_crossings(leaders.or_nearer(lights), lights, begins)
+        self._update_crossings(leaders.or_nearer(lights), lights, begins, dt)
         desired = self._desired_speeds(begins)
         halted = leaders.or_nearer(lights).or_nearer(self._waits(begins))
         acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
@@ -230,13 +231,17 @@ class Fleet:
         return Occupants(row, at, at, at, np.zeros(len(row)), np.full(len(row), FIXED))
 
     def _leaders(self, occupants: Occupants) -> Leaders:
-        """The leaders of all cars; of those that change lanes, the nearer one of both lanes."""
+        """The leaders of all cars; of those that change lanes, the nearer one of both lanes.
+
+        The end of a lane does not stop a car that is leaving it: only by driving on it gets out of that lane.
+        """
         cars = self._cars
         leaders = find_leaders(self.lanes, cars.plan, cars.progress, cars.front, occupants)
         still, lane = self._changes.still_left(cars)
         if still.size:
             chain = self.lanes.chain(lane, PLANNED + 1)
-            other = find_leaders(self.lanes, chain, cars.progress[still], cars.front[still], occupants, own=still)
+            standing = occupants.without(FIXED)
+            other = find_leaders(self.lanes, chain, cars.progress[still], cars.front[still], standing, own=still)
             gap, speed = leaders.gap.copy(), leaders.speed.copy()
             nearer = Leaders(gap[still], speed[still]).or_nearer(other)
             gap[still], speed[still] = nearer.gap, nearer.speed
@@ -272,11 +277,11 @@ class Fleet:
         wait = self._distances_to_wait(begins) - self._cars.front - STOP_LINE
         return Leaders(np.maximum(wait, 1e-3), np.zeros(len(self)))
 
-    def _update_crossings(self, leaders: Leaders, lights: Leaders, begins: Array) -> None:
-        """Hand passages through junctions to the cars that come near and may have them, the nearest first.
+    def _update_crossings(self, leaders: Leaders, lights: Leaders, begins: Array, dt: float) -> None:
+        """Hand passages through junctions to the cars that come near and may have them: first come, first served.
 
-        Lanes that meet one beneath a foreign actor on the move are not handed out. Who is stopped by a light before the
-        junction gives back what it got.
+        Lanes that meet one beneath a foreign actor on the move are not handed out, nor what would hold up a car that
+        has lost its patience. Who is stopped by a light before the junction gives back what it got.
         """
         cars = self._cars
         names = list(self._index)
@@ -295,32 +300,33 @@ class Fleet:
         asking = []
         for index in np.flatnonzero(close & (gap > distance)).tolist():
             passage = self._passage(index)
-            beyond = begins[index, passage[-1]] + self.lanes.length[cars.plan[index, passage[-1]]]
-            behind = beyond - cars.rear[index]
-            room = gap[index] > behind + cars.drivers.standstill_gap[index] or leaders.speed[index] > ROLLING
-            if room:
-                asking.append((float(distance[index]), names[index], index, passage))
-        for _, name, index, passage in sorted(asking):
-            if all(self._crossings.free(int(cars.plan[index, d]), name, self._moving) for d in passage):
-                for d in passage:
-                    self._grant(index, d)
+            behind = distance[index] + self.lanes.length[passage].sum() - cars.rear[index]
+            if gap[index] > behind + cars.drivers.standstill_gap[index]:
+                since = int(cars.asked[index]) or self._ticks
+                cars.asked[index] = since
+                asking.append((since, float(distance[index]), names[index], index, passage))
+        kept_free: set[int] = set()
+        for since, _, name, index, passage in sorted(asking):
+            if all(self._crossings.free(row, name, self._moving | kept_free) for row in passage):
+                for row in passage:
+                    self._crossings.take(row, name)
+                cars.granted[index] |= np.isin(cars.plan[index], passage)
+                cars.asked[index] = 0
+            elif (self._ticks - since) * dt > PATIENCE:
+                kept_free.update(passage)
 
     def _passage(self, index: int) -> list[int]:
-        """Which lanes of a car's plan lead through the next junction that it may not enter yet."""
-        cars = self._cars
+        """The lanes through the next junction that a car may not enter yet, to the end of its last connecting road."""
+        cars, lanes = self._cars, self.lanes
         found: list[int] = []
-        for d in range(1, PLANNED + 1):
-            row = cars.plan[index, d]
-            if row >= 0 and self.lanes.in_junction[row] and not cars.granted[index, d]:
-                found.append(d)
+        for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
+            if row >= 0 and lanes.in_junction[row] and not granted:
+                found.append(row)
             elif found:
-                break
+                return found
+        while (ways := lanes.following(found[-1])) and lanes.road[ways[0]] == lanes.road[found[-1]]:
+            found.append(ways[0])
         return found
-
-    def _grant(self, index: int, d: int) -> None:
-        """Give a car a junction lane of its plan."""
-        self._cars.granted[index, d] = True
-        self._crossings.take(int(self._cars.plan[index, d]), self._cars.specs[index].name)
 
     def _desired_speeds(self, begins: Array) -> Array:
         """Each car's own speed or the limit, less before bends so that comfortable braking suffices."""
@@ -391,5 +397,6 @@ class Fleet:
                 pick = int(generator(self._seed, "traffic", name, turn).integers(len(choices)))
                 cars.turns[index] += 1
             cars.plan[index, len(plan)] = choices[pick]
+            cars.granted[index, len(plan)] = self._crossings.holds(cars.specs[index].name, choices[pick])
             plan.append(choices[pick])
             ahead += lengths[choices[pick]]

@@ -24,6 +24,8 @@ LAST_CHANCE = 50.0
 """Within this distance from its lane's end a car changes however slow it is [m]."""
 DECIDE_EACH = 0.5
 """A driver thinks of changing lanes as often [s]."""
+SETTLED = 0.3
+"""This near the centre of its lane a car may think of the next change [m]."""
 ROOM = 60.0
 """Of two cars that would change into the same lane at once, this near each other, only one does [m]."""
 
@@ -47,7 +49,12 @@ class LaneChanges:
         found: list[tuple[float, int, int]] = []
         ends_in = lanes.ends_at[row] - cars.progress[who]
         room = self.length(cars.speed[who])
-        able = ~cars.changing[who] & ~cars.walks[who] & ~lanes.in_junction[row] & ~cars.granted[who].any(axis=1)
+        able = (
+            (np.abs(cars.offset[who]) < SETTLED)
+            & ~cars.walks[who]
+            & ~lanes.in_junction[row]
+            & ~cars.granted[who].any(axis=1)
+        )
         able &= to_junction[who] > room + cars.front[who]
         able &= (cars.speed[who] > SLOWEST) | (ends_in < LAST_CHANCE)
         for to_left, beside in ((True, lanes.left), (False, lanes.right)):

@@ -52,6 +52,13 @@ class Occupants:
         order = np.argsort(place, kind="stable")
         return order, place[order]
 
+    def without(self, owner: int) -> Occupants:
+        """Those that belong to somebody else."""
+        kept = self.owner != owner
+        return Occupants(
+            self.row[kept], self.key[kept], self.rear[kept], self.front[kept], self.speed[kept], self.owner[kept]
+        )
+
 
 @dataclass(frozen=True)
 class Leaders:
