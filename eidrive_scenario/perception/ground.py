@@ -1,0 +1,108 @@
+"""Which points of a sweep are the ground."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.randomness import generator
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+SECTORS = 24
+BIN = 2.0
+"""Width of a bin along the range [m]."""
+NEAR = 30.0
+"""The plane is fitted to points within this distance [m]."""
+TRIALS = 60
+"""With half of the points on the ground, the odds that 60 pairs hold none with both there are 0.75^60 = 3e-8."""
+STEEPEST = 0.25
+"""Slope of the plane at most."""
+ON_PLANE = 0.12
+"""Points this near to the plane support it [m]."""
+BEND = 0.02
+"""How fast the ground may leave the plane, or come back to it, along the way outwards."""
+ROUGHNESS = 0.1
+"""By how much it may do so at once [m]."""
+CLEARANCE = 0.25
+"""What is higher above the ground is not ground [m]."""
+
+
+def ground_height(points: Array, foot: float) -> Array:
+    """(N,) height of the ground under each of the points (N, 3) of a level frame [m].
+
+    First a plane through `foot`, the height of the ground below the sensor, by RANSAC (Fischler and Bolles 1981) over
+    the lowest points of the bins of each sector. Then the lowest points are followed outwards in each sector, as roads
+    are not planes; one that leaves the ground before it faster than roads bend is none. After Himmelsbach, von
+    Hundelshausen and Wünsche, Fast segmentation of 3D point clouds for ground vehicles, IV 2010, with lowest points in
+    place of lines. Sectors are centred on the frame's x axis, so that a mirrored scene has mirrored ones.
+    """
+    if not len(points):
+        return np.empty(0)
+    distance = np.hypot(points[:, 0], points[:, 1])
+    turn = np.arctan2(points[:, 1], points[:, 0]) * (SECTORS / (2.0 * math.pi))
+    sector = np.rint(turn).astype(np.int64) % SECTORS
+    bins = int(distance.max() / BIN) + 1
+    cell = sector * bins + (distance / BIN).astype(np.int64)
+    low = _lowest(points[:, 2], cell)
+    near = low[distance[low] < NEAR]
+    slope = _plane(points[near, :2], points[near, 2] - foot)
+    plane = foot + points[:, :2] @ slope
+    offset, where = np.full((SECTORS, bins), np.inf), np.zeros((SECTORS, bins))
+    offset.ravel()[cell[low]] = points[low, 2] - plane[low]
+    where.ravel()[cell[low]] = distance[low]
+    is_ground = _followed(offset, where)
+    order = np.argsort(sector, kind="stable")
+    bounds = np.searchsorted(sector[order], np.arange(SECTORS + 1))
+    for number in range(SECTORS):
+        mine = order[bounds[number] : bounds[number + 1]]
+        known = is_ground[number]
+        if mine.size and known.any():
+            along = np.concatenate([[0.0], where[number, known]])
+            plane[mine] += np.interp(distance[mine], along, np.concatenate([[0.0], offset[number, known]]))
+    return plane
+
+
+def _lowest(z: Array, cell: Integers) -> Integers:
+    """The row of the lowest point of each cell."""
+    order = np.lexsort((z, cell))
+    first: Integers = order[np.concatenate([[True], np.diff(cell[order]) > 0])]
+    return first
+
+
+def _plane(plan: Array, rise: Array) -> Array:
+    """(2,) slopes of the plane through the origin that most of the points (K, 2) with their rises (K,) support."""
+    if len(plan) < 2:
+        return np.zeros(2)
+    pairs = generator(0, "ground plane").integers(0, len(plan), size=(TRIALS, 2))
+    a, b = plan[pairs[:, 0]], plan[pairs[:, 1]]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    usable = np.abs(area) > 1.0
+    za, zb = rise[pairs[:, 0]], rise[pairs[:, 1]]
+    slopes = np.stack([za * b[:, 1] - zb * a[:, 1], zb * a[:, 0] - za * b[:, 0]], axis=1)
+    slopes[usable] /= area[usable, None]
+    slopes = slopes[usable & (np.hypot(slopes[:, 0], slopes[:, 1]) <= STEEPEST)]
+    slopes = np.concatenate([np.zeros((1, 2)), slopes])
+    support = np.count_nonzero(np.abs(rise - slopes @ plan.T) <= ON_PLANE, axis=1)
+    best: Array = slopes[int(np.argmax(support))]
+    for _ in range(2):
+        on = np.abs(rise - plan @ best) <= ON_PLANE
+        if np.count_nonzero(on) < 3:
+            break
+        best = np.asarray(np.linalg.lstsq(plan[on], rise[on], rcond=None)[0], dtype=np.float64)
+    return best
+
+
+def _followed(offset: Array, where: Array) -> NDArray[np.bool_]:
+    """(SECTORS, bins) whether the lowest point of a bin is ground: offsets from the plane, and distances."""
+    found = np.zeros(offset.shape, dtype=bool)
+    last, at = np.zeros(SECTORS), np.zeros(SECTORS)
+    for number in range(offset.shape[1]):
+        step = where[:, number] - at
+        fits = np.abs(offset[:, number] - last) <= BEND * step + ROUGHNESS
+        found[:, number] = fits
+        last, at = np.where(fits, offset[:, number], last), np.where(fits, where[:, number], at)
+    return found

@@ -1,0 +1,103 @@
+"""A LiDAR's points in a level frame, and the pattern of its rays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.sensing.readings import LidarReading
+from eidrive_scenario.sensing.settings import LidarSettings
+
+Array = NDArray[np.float64]
+
+LEAST_STEP = math.radians(0.02)
+"""Rays nearer to each other than this count as one column or ring [rad]."""
+USUAL_STEP = math.radians(1.0)
+"""Where the points are too few to tell [rad]."""
+
+
+@dataclass(frozen=True)
+class LevelFrame:
+    """A frame under a sensor: x along the sensor's heading in the plane, y to the left, z as in the world.
+
+    Its origin in the plane is the sensor's place; `height` is the sensor's height in the world [m].
+    """
+
+    x: float
+    y: float
+    height: float
+    yaw: float
+
+    @classmethod
+    def of(cls, pose: Array) -> LevelFrame:
+        """The level frame of a sensor pose (4, 4) whose x axis looks ahead."""
+        x, y, z = pose[:3, 3].tolist()
+        return cls(x, y, z, math.atan2(pose[1, 0], pose[0, 0]))
+
+    def points(self, reading: LidarReading) -> Array:
+        """(N, 3) the points of a sweep of this sensor in this frame."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        level = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ reading.pose[:3, :3]
+        points: Array = reading.points @ level.T
+        points[:, 2] += self.height
+        return points
+
+    def to_world(self, plan: Array) -> Array:
+        """(..., 2) points of this frame in the world."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return np.stack(
+            [self.x + cos * plan[..., 0] - sin * plan[..., 1], self.y + sin * plan[..., 0] + cos * plan[..., 1]],
+            axis=-1,
+        )
+
+    def to_local(self, plan: Array) -> Array:
+        """(..., 2) points of the world in this frame."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        x, y = plan[..., 0] - self.x, plan[..., 1] - self.y
+        return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
+
+    def boxes_to_world(self, boxes: Array) -> Array:
+        """(N, 7) boxes of this frame in the world."""
+        moved = boxes.copy()
+        moved[:, :2] = self.to_world(boxes[:, :2])
+        moved[:, 6] = np.pi - (np.pi - boxes[:, 6] - self.yaw) % (2.0 * np.pi)
+        return moved
+
+    def covariance_to_world(self, covariance: Array) -> Array:
+        """(N, 2, 2) covariances in the plane, turned to the world's axes."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        turn = np.array([[cos, -sin], [sin, cos]])
+        return np.asarray(turn @ covariance @ turn.T)
+
+
+class Pattern(NamedTuple):
+    """Angles between neighbouring rays, across and up, and that of the highest ring above the horizon [rad]."""
+
+    azimuth: float
+    elevation: float
+    highest: float
+
+
+def pattern_from_settings(settings: LidarSettings) -> Pattern:
+    """The pattern of a sensor whose settings are known."""
+    columns = max(1, round(settings.points_per_second / settings.channels / settings.rotation))
+    spread = math.radians(settings.upper_fov - settings.lower_fov)
+    return Pattern(2.0 * math.pi / columns, spread / max(settings.channels - 1, 1), math.radians(settings.upper_fov))
+
+
+def pattern_from_points(points: Array) -> Pattern:
+    """The pattern that a sweep (N, 3) in the sensor frame shows: medians of the gaps between its columns and rings."""
+    if len(points) < 2:
+        return Pattern(USUAL_STEP, USUAL_STEP, math.pi / 2.0)
+    elevation = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))
+    return Pattern(_step(np.arctan2(points[:, 1], points[:, 0])), _step(elevation), float(elevation.max()))
+
+
+def _step(angles: Array) -> float:
+    gaps = np.diff(np.sort(angles))
+    gaps = gaps[gaps > LEAST_STEP]
+    return float(np.median(gaps)) if gaps.size else USUAL_STEP

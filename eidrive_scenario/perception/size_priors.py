@@ -1,0 +1,37 @@
+"""How large what moves on roads usually is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class SizePrior(NamedTuple):
+    """Length, width and height of a class [m], how much they vary (standard deviations), and its share of traffic."""
+
+    mean: tuple[float, float, float]
+    deviation: tuple[float, float, float]
+    share: float
+
+
+PRIORS: Mapping[str, SizePrior] = {
+    "car": SizePrior((4.6, 1.85, 1.55), (0.35, 0.12, 0.15), 0.60),
+    "van": SizePrior((5.7, 2.1, 2.4), (0.5, 0.15, 0.25), 0.10),
+    "truck": SizePrior((8.2, 2.6, 3.5), (1.2, 0.25, 0.4), 0.08),
+    "bus": SizePrior((11.3, 2.7, 3.4), (1.0, 0.35, 0.5), 0.04),
+    "motorbike": SizePrior((2.2, 0.8, 1.5), (0.2, 0.15, 0.2), 0.03),
+    "bicycle": SizePrior((1.8, 0.6, 1.65), (0.15, 0.12, 0.2), 0.05),
+    "pedestrian": SizePrior((0.55, 0.55, 1.72), (0.15, 0.15, 0.15), 0.10),
+}
+"""Round figures for European traffic; two-wheelers with their riders."""
+
+UNKNOWN = SizePrior((1.0, 1.0, 1.2), (0.6, 0.6, 0.6), 0.01)
+"""For a class that the table does not have."""
+
+LARGEST = (14.0, 4.5, 4.8)
+"""What exceeds this is no road user [m]."""
+
+
+def prior_of(name: str) -> SizePrior:
+    """The prior of a class, UNKNOWN where the table has none."""
+    return PRIORS.get(name, UNKNOWN)
