@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.crossings import Crossings
-from eidrive_scenario.traffic.idm import IntelligentDriver, ballistic
+from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver, ballistic
 from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanges
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
 from eidrive_scenario.traffic.leaders import (
@@ -87,6 +87,34 @@ class Fleet:
     def specs(self) -> list[ActorSpec]:
         """The bodies of the cars."""
         return self._cars.specs
+
+    @property
+    def drivers(self) -> Drivers:
+        """The parameters of the cars' drivers."""
+        return self._cars.drivers
+
+    @property
+    def boxes(self) -> Array:
+        """(N, 7) x y z l w h yaw of the cars' bounding boxes now [m, rad]."""
+        poses, body = self.poses, np.array([(*spec.offset, *spec.size) for spec in self.specs]).reshape(-1, 6)
+        cos, sin = np.cos(poses[:, 3]), np.sin(poses[:, 3])
+        x = poses[:, 0] + cos * body[:, 0] - sin * body[:, 1]
+        y = poses[:, 1] + sin * body[:, 0] + cos * body[:, 1]
+        return np.column_stack([x, y, poses[:, 2] + body[:, 2], body[:, 3:], poses[:, 3]])
+
+    def spec(self, name: str) -> ActorSpec:
+        """The body of a car."""
+        return self._cars.specs[self._index[name]]
+
+    def positions(self, names: Sequence[str]) -> tuple[Array, Array]:
+        """x and y of cars [m]."""
+        rows = [self._index[name] for name in names]
+        return self.poses[rows, 0], self.poses[rows, 1]
+
+    def places(self, names: Sequence[str]) -> tuple[NDArray[np.int64], Array]:
+        """Lane rows and progress of cars [m]."""
+        rows = [self._index[name] for name in names]
+        return self._cars.row[rows], self._cars.progress[rows]
 
     def __contains__(self, name: str) -> bool:
         return name in self._index

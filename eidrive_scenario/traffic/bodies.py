@@ -1,0 +1,191 @@
+"""Who background traffic is made of: bodies and drivers, drawn by the shares that a scenario states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.library import library_path
+from eidrive_scenario.openscenario import Scenario, model, read_document
+from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.settings import Settings, parse_settings
+from eidrive_scenario.traffic.idm import IntelligentDriver
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.specs import actor_spec
+
+T = TypeVar("T")
+
+MODULE = "eidrive.traffic"
+"""A controller with this `module` states the parameters of the drivers of background traffic."""
+
+STAND_INS = {
+    VehicleCategory.SEMITRAILER: VehicleCategory.TRUCK,
+    VehicleCategory.TRAILER: VehicleCategory.TRUCK,
+    VehicleCategory.TRAIN: VehicleCategory.BUS,
+    VehicleCategory.TRAM: VehicleCategory.BUS,
+}
+"""What drives on the road in place of what cannot drive there by itself."""
+
+ON_FOOT = IntelligentDriver(time_gap=0.5, standstill_gap=0.5, acceleration=0.6, deceleration=1.0)
+"""The same model for people who walk one behind the other."""
+WALKING = 1.34
+"""Mean free speed of pedestrians [m/s]; Weidmann, Transporttechnik der Fussgänger, ETH Zürich (1993)."""
+
+
+class DriverSettings(Settings):
+    """What a controller of module `eidrive.traffic` may say in its properties; units as in IntelligentDriver.
+
+    speed_factor  mean of the share of the limit to which these drivers keep
+    """
+
+    module: str = MODULE
+    time_gap: float | None = None
+    standstill_gap: float | None = None
+    acceleration: float | None = None
+    deceleration: float | None = None
+    speed_factor: float = 1.0
+
+    def driver(self, usual: IntelligentDriver) -> IntelligentDriver:
+        """The usual driver with these parameters."""
+        names = ("time_gap", "standstill_gap", "acceleration", "deceleration")
+        return replace(usual, **{name: value for name in names if (value := getattr(self, name)) is not None})
+
+
+@dataclass(frozen=True)
+class Participant:
+    """A body, still without a name of its own, and how it is driven."""
+
+    spec: ActorSpec
+    driver: IntelligentDriver
+    speed_factor: float = 1.0
+
+    @property
+    def walks(self) -> bool:
+        """True for a pedestrian."""
+        return self.spec.category == "pedestrian"
+
+
+@dataclass(frozen=True)
+class Weighted(Generic[T]):
+    """Things with shares."""
+
+    things: Sequence[T]
+    weights: Sequence[float]
+
+    def draw(self, rng: np.random.Generator) -> T:
+        """One of them."""
+        shares = np.cumsum(self.weights)
+        return self.things[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
+
+
+class Mixture:
+    """What a TrafficDefinition or a TrafficDistribution describes; without either, the library's cars.
+
+    Raises ScenarioError for shares that are negative or all 0, and for entities that neither drive nor walk.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        definition: model.TrafficDefinition | None,
+        distribution: model.TrafficDistribution | None,
+    ) -> None:
+        self._scenario = scenario
+        self._groups: Weighted[Weighted[Participant]] | None = None
+        self._categories: Weighted[VehicleCategory] = Weighted([VehicleCategory.CAR], [1.0])
+        self._roles: Weighted[Role] = Weighted([Role.NONE], [1.0])
+        self._drivers: Weighted[DriverSettings] = Weighted([DriverSettings()], [1.0])
+        if distribution is not None:
+            entries = distribution.traffic_distribution_entry
+            self._groups = self._weighted([self._group(entry) for entry in entries], entries)
+        elif definition is not None:
+            categories = definition.vehicle_category_distribution.vehicle_category_distribution_entry
+            self._categories = self._weighted([entry.category for entry in categories], categories)
+            if definition.vehicle_role_distribution is not None:
+                roles = definition.vehicle_role_distribution.vehicle_role_distribution_entry
+                self._roles = self._weighted([entry.role for entry in roles], roles)
+            controllers = definition.controller_distribution.controller_distribution_entry
+            self._drivers = self._weighted([self._settings(entry) for entry in controllers], controllers)
+
+    def draw(self, rng: np.random.Generator) -> Participant:
+        """One participant."""
+        if self._groups is not None:
+            return self._groups.draw(rng).draw(rng)
+        category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
+        bodies = library_bodies(STAND_INS.get(category, category))
+        fitting = [body for body, its_role in bodies if its_role is role] or [
+            body for body, its_role in bodies if its_role is Role.NONE
+        ]
+        fitting = fitting or [body for body, _ in bodies]
+        return _participant(fitting[int(rng.integers(len(fitting)))], settings)
+
+    @property
+    def categories(self) -> frozenset[str]:
+        """The categories of all bodies that it can draw."""
+        if self._groups is None:
+            pairs = zip(self._categories.things, self._categories.weights, strict=True)
+            wanted = [STAND_INS.get(category, category) for category, weight in pairs if weight > 0.0]
+            return frozenset(body.category for category in wanted for body, _ in library_bodies(category))
+        return frozenset(member.spec.category for group in self._groups.things for member in group.things)
+
+    def _group(self, entry: model.TrafficDistributionEntry) -> Weighted[Participant]:
+        members = entry.entity_distribution.entity_distribution_entry
+        return self._weighted([self._member(member.scenario_object_template) for member in members], members)
+
+    def _member(self, template: model.ScenarioObjectTemplate) -> Participant:
+        entity: model.Element = template.chosen()
+        if isinstance(entity, model.CatalogReference):
+            entity = self._scenario.resolved(entity)
+        if not isinstance(entity, model.Vehicle | model.Pedestrian):
+            what = f"traffic cannot be made of a {type(entity).__name__}"
+            raise ScenarioError(Problem(what, "give a Vehicle or a Pedestrian", template.source, template.line))
+        settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
+        return _participant(actor_spec(entity.name, entity), settings)
+
+    def _settings(self, holder: model.ControllerDistributionEntry | model.ObjectController) -> DriverSettings:
+        """The driver that a controller of ours describes, the usual one for a controller of others."""
+        controller: model.Element | None = holder.controller
+        if holder.catalog_reference is not None:
+            controller = self._scenario.resolved(holder.catalog_reference)
+        if not isinstance(controller, model.Controller) or controller.properties is None:
+            return DriverSettings()
+        properties = {entry.name: entry.value for entry in controller.properties.property}
+        if properties.get("module") != MODULE:
+            return DriverSettings()
+        return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line)
+
+    def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> Weighted[T]:
+        weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
+        if min(weights) < 0.0 or not sum(weights) > 0.0:
+            where = entries[0]
+            what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are no shares"
+            raise ScenarioError(Problem(what, "give weights of at least 0, not all 0", where.source, where.line))
+        return Weighted(things, weights)
+
+
+def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:
+    usual = ON_FOOT if spec.category == "pedestrian" else _driver_of(spec)
+    return Participant(spec, settings.driver(usual), settings.speed_factor)
+
+
+def _driver_of(spec: ActorSpec) -> IntelligentDriver:
+    """The usual driver, with no more acceleration than the vehicle has."""
+    usual = IntelligentDriver()
+    return replace(usual, acceleration=min(usual.acceleration, spec.max_acceleration))
+
+
+@cache
+def library_bodies(category: VehicleCategory) -> tuple[tuple[ActorSpec, Role], ...]:
+    """The vehicles of a category in the library's catalog, each with its role (NONE for everyday vehicles)."""
+    document = read_document(library_path() / "catalogs" / "vehicles.xosc")
+    vehicles = document.catalog.vehicle if document.catalog is not None else ()
+    return tuple(
+        (actor_spec(vehicle.name, vehicle), Role.NONE if vehicle.role in (None, Role.CIVIL) else vehicle.role)
+        for vehicle in vehicles
+        if vehicle.vehicle_category is category
+    )
