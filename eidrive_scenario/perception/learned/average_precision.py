@@ -1,0 +1,92 @@
+"""Average precision and recall of detections in pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.learned.suppression import covered, overlap
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+LEAST_OVERLAP = 0.5
+
+
+@dataclass(frozen=True)
+class Matches:
+    """What the detections of one class in one picture came to.
+
+    scores (N,); correct (N,) the detection found an object; counted (N,) False for what fell on an ignored object;
+    found (M,) whether each object of the picture, ignored ones included, was found
+    """
+
+    scores: Array
+    correct: Bools
+    counted: Bools
+    found: Bools
+
+
+def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: float = LEAST_OVERLAP) -> Matches:
+    """Detections (N, 4) against objects (M, 4) of one class; `ignored` (M,) need not be found and do no harm.
+
+    Best detection first, each takes the object that it overlaps most among those still free, if by `least`. One that
+    takes an ignored object, or lies by half in one, does not count.
+    """
+    order = np.argsort(-scores, kind="stable")
+    shares = overlap(boxes[order], objects)
+    inside = covered(boxes[order], objects[ignored])
+    correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
+    found = np.zeros(len(objects), dtype=bool)
+    for rank in range(len(order)):
+        free = np.where(found, -1.0, shares[rank])
+        wanted = np.where(ignored, -1.0, free)
+        best = int(np.argmax(wanted)) if len(wanted) else -1
+        if best >= 0 and wanted[best] >= least:
+            found[best] = correct[rank] = True
+            continue
+        other = int(np.argmax(free)) if len(free) else -1
+        if other >= 0 and free[other] >= least:
+            found[other] = True
+            counted[rank] = False
+        elif inside.shape[1] and inside[rank].max() >= 0.5:
+            counted[rank] = False
+    return Matches(scores[order], correct, counted, found)
+
+
+def average_precision(matches: Sequence[Matches], objects: int) -> float:
+    """Area under precision over recall, all points, the detections of the whole set sorted by score; NaN without any
+    object.
+
+    At each recall counts the best precision at that recall or a greater one (Everingham et al., The PASCAL VOC
+    challenge: a retrospective, 2015, section 4.2).
+    """
+    recall, precision = precision_recall(matches, objects)
+    if objects == 0:
+        return float("nan")
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    steps = np.diff(recall, prepend=0.0)
+    return float((steps * envelope).sum())
+
+
+def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, Array]:
+    """Recall and precision (K,) over the detections of the whole set, best score first."""
+    if not matches:
+        return np.empty(0), np.empty(0)
+    counted = np.concatenate([entry.counted for entry in matches])
+    scores = np.concatenate([entry.scores for entry in matches])[counted]
+    correct = np.concatenate([entry.correct for entry in matches])[counted]
+    order = np.argsort(-scores, kind="stable")
+    right = np.cumsum(correct[order])
+    return right / max(objects, 1), right / np.arange(1, len(order) + 1)
+
+
+def recall_at(matches: Sequence[Matches], objects: int, score: float) -> float:
+    """Share of the objects found by detections of at least this score; NaN without any object."""
+    if objects == 0:
+        return float("nan")
+    found = sum(int((entry.correct & entry.counted & (entry.scores >= score)).sum()) for entry in matches)
+    return found / objects

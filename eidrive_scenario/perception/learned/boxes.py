@@ -1,0 +1,51 @@
+"""Boxes as tensors: overlap measures for training, in centre form (cx cy w h) or as corners (x1 y1 x2 y2)."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+
+def corners(boxes: Tensor) -> Tensor:
+    """(…, 4) cx cy w h to x1 y1 x2 y2."""
+    centre, half = boxes[..., :2], boxes[..., 2:] / 2.0
+    return torch.cat([centre - half, centre + half], dim=-1)
+
+
+def centred(boxes: Tensor) -> Tensor:
+    """(…, 4) x1 y1 x2 y2 to cx cy w h."""
+    low, high = boxes[..., :2], boxes[..., 2:]
+    return torch.cat([(low + high) / 2.0, high - low], dim=-1)
+
+
+def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
+    """(…, N, M) intersection over union of corners (…, N, 4) and (…, M, 4)."""
+    low = torch.maximum(first[..., :, None, :2], second[..., None, :, :2])
+    high = torch.minimum(first[..., :, None, 2:], second[..., None, :, 2:])
+    shared = (high - low).clamp(min=0.0).prod(dim=-1)
+    area_first = (first[..., 2:] - first[..., :2]).prod(dim=-1)
+    area_second = (second[..., 2:] - second[..., :2]).prod(dim=-1)
+    return shared / (area_first[..., :, None] + area_second[..., None, :] - shared).clamp(min=1e-9)
+
+
+def complete_iou(first: Tensor, second: Tensor) -> Tensor:
+    """(N,) CIoU of boxes (N, 4) in centre form, row by row.
+
+    Overlap less the squared distance of the centres over the diagonal of the hull, less a term for unlike shapes
+    (Zheng et al., Distance-IoU loss, AAAI 2020, eq. 6, 10 and 11).
+    """
+    a, b = corners(first), corners(second)
+    shared = (torch.minimum(a[:, 2:], b[:, 2:]) - torch.maximum(a[:, :2], b[:, :2])).clamp(min=0.0).prod(dim=1)
+    union = first[:, 2:].prod(dim=1) + second[:, 2:].prod(dim=1) - shared + 1e-9
+    iou = shared / union
+    hull = torch.maximum(a[:, 2:], b[:, 2:]) - torch.minimum(a[:, :2], b[:, :2])
+    diagonal = hull.square().sum(dim=1) + 1e-9
+    apart = (first[:, :2] - second[:, :2]).square().sum(dim=1)
+    angle_first = torch.atan(first[:, 2] / first[:, 3].clamp(min=1e-9))
+    angle_second = torch.atan(second[:, 2] / second[:, 3].clamp(min=1e-9))
+    unlike = 4.0 / math.pi**2 * (angle_second - angle_first).square()
+    with torch.no_grad():
+        weight = unlike / (1.0 - iou + unlike + 1e-9)
+    return iou - apart / diagonal - weight * unlike

@@ -1,0 +1,160 @@
+"""A user's own network, as an ONNX or a TorchScript file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
+
+Floats = NDArray[np.float32]
+Layout = Literal["yolov5", "yolov8", "boxes_scores", "detections"]
+
+LAYOUTS = (
+    "yolov5 (1, N, 5 + C): cx cy w h objectness, probability of each class; "
+    "yolov8 (1, 4 + C, N): cx cy w h, probability of each class; "
+    "boxes_scores: (1, N, 4) x1 y1 x2 y2 and (1, N, C); detections (N, 6): x1 y1 x2 y2 score class"
+)
+
+
+class ForeignNetwork(ImageNetwork):
+    """A network from a file `.onnx` (by OpenCV) or `.pt` (TorchScript, by torch).
+
+    It gets (1, 3, H, W) float32, red green blue in [0, 1], and gives boxes in pixels of that in one of the layouts
+    `yolov5`, `yolov8`, `boxes_scores` and `detections`; None tells them by their shape. It is tried on an empty picture
+    while it is built. Raises SettingError if it cannot be read, does not take this size or gives what fits no layout.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        classes: Sequence[str],
+        input_size: tuple[int, int],
+        confidence: float,
+        layout: Layout | None = None,
+        threads: int = 1,
+    ) -> None:
+        super().__init__(classes, input_size, confidence)
+        self._path = path
+        self._compute = (_onnx if path.suffix == ".onnx" else _torchscript)(path, threads)
+        blank = np.zeros((input_size[1], input_size[0], 3), dtype=np.uint8)
+        outputs = self._outputs(blank)
+        self._layout: Layout = layout or self._told_by_shape(outputs)
+        try:
+            self._candidates(outputs)
+        except (ValueError, IndexError) as error:
+            shapes = ", ".join(str(output.shape) for output in outputs)
+            message = f"weights {path.name!r} give {shapes}, which is not {self._layout!r} for {len(classes)} classes"
+            raise SettingError(Problem(message, f"layouts: {LAYOUTS}", str(path))) from error
+
+    def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
+        return self._candidates(self._outputs(picture))
+
+    def _outputs(self, picture: NDArray[np.uint8]) -> list[Floats]:
+        pixels = np.ascontiguousarray(picture.transpose(2, 0, 1)[None], dtype=np.float32) / np.float32(255.0)
+        try:
+            return self._compute(pixels)
+        except (cv2.error, RuntimeError) as error:
+            width, height = self.input_size
+            reason = " ".join(str(error).split())[:160]
+            message = f"weights {self._path.name!r} do not take pictures of {width} x {height}: {reason}"
+            raise SettingError(Problem(message, "say the network's own with 'input_size'", str(self._path))) from error
+
+    def _told_by_shape(self, outputs: list[Floats]) -> Layout:
+        count = len(self.classes)
+        shapes = [output.shape for output in outputs]
+        fits: list[Layout] = []
+        if len(shapes) == 2 and sorted(shape[-1] for shape in shapes) == sorted((4, count)):
+            fits.append("boxes_scores")
+        if len(shapes) == 1:
+            if shapes[0][-1] == 5 + count:
+                fits.append("yolov5")
+            if len(shapes[0]) >= 2 and shapes[0][-2] == 4 + count:
+                fits.append("yolov8")
+            if shapes[0][-1] == 6:
+                fits.append("detections")
+        if len(fits) == 1:
+            return fits[0]
+        given = ", ".join(str(shape) for shape in shapes)
+        if not fits:
+            message = f"weights {self._path.name!r} give {given}, which fits no layout for {count} classes"
+            raise SettingError(Problem(message, f"check 'classes'; layouts: {LAYOUTS}", str(self._path)))
+        message = f"weights {self._path.name!r} give {given}, which could be {' or '.join(fits)}"
+        raise SettingError(Problem(message, "say which with 'layout'", str(self._path)))
+
+    def _candidates(self, outputs: list[Floats]) -> Candidates:
+        count = len(self.classes)
+        if self._layout == "boxes_scores":
+            boxes, shares = (output.reshape(-1, output.shape[-1]) for output in outputs)
+            if boxes.shape[1] != 4:
+                boxes, shares = shares, boxes
+        elif self._layout == "detections":
+            table = outputs[0].reshape(-1, 6)
+            boxes, shares = table[:, :4], np.zeros((len(table), count), dtype=np.float32)
+            numbers = table[:, 5].astype(np.int64)
+            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
+                raise ValueError("a class number is beyond the classes")
+            shares[np.arange(len(table)), numbers] = table[:, 4]
+        elif self._layout == "yolov5":
+            table = outputs[0].reshape(-1, 5 + count)
+            boxes, shares = _corners(table[:, :4]), table[:, 5:] * table[:, 4:5]
+        else:
+            table = outputs[0].reshape(4 + count, -1).T
+            boxes, shares = _corners(table[:, :4]), table[:, 4:]
+        if boxes.shape[1] != 4 or shares.shape != (len(boxes), count):
+            raise ValueError("the shapes do not fit")
+        numbers = shares.argmax(axis=1)
+        scores = shares[np.arange(len(shares)), numbers]
+        sure = scores >= self.confidence
+        return Candidates(boxes[sure].astype(float), scores[sure].astype(float), numbers[sure].astype(np.int64))
+
+
+def _corners(boxes: Floats) -> Floats:
+    centre, half = boxes[:, :2], boxes[:, 2:] / 2.0
+    return np.concatenate([centre - half, centre + half], axis=1)
+
+
+def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
+    cv2.setNumThreads(threads)
+    try:
+        network = cv2.dnn.readNetFromONNX(str(path))
+        names = network.getUnconnectedOutLayersNames()
+    except cv2.error as error:
+        raise _unreadable(path, "an ONNX model", error) from error
+
+    def compute(pixels: Floats) -> list[Floats]:
+        network.setInput(pixels)
+        return [np.asarray(output, dtype=np.float32) for output in network.forward(names)]
+
+    return compute
+
+
+def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
+    import torch
+
+    torch.set_num_threads(threads)
+    try:
+        network: Any = torch.jit.load(str(path), map_location="cpu").eval()  # type: ignore[no-untyped-call]
+    except (RuntimeError, ValueError, OSError) as error:
+        raise _unreadable(path, "a TorchScript model", error) from error
+
+    def compute(pixels: Floats) -> list[Floats]:
+        with torch.inference_mode():
+            given = network(torch.from_numpy(pixels))
+        outputs = given if isinstance(given, (list, tuple)) else [given]
+        if not all(isinstance(output, torch.Tensor) for output in outputs):
+            raise RuntimeError("it gives something else than tensors")
+        return [output.float().numpy() for output in outputs]
+
+    return compute
+
+
+def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
+    reason = " ".join(str(error).split())[:160]
+    return SettingError(Problem(f"weights {path.name!r} are not {kind}: {reason}", "export the model again", str(path)))

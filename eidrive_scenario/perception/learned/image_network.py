@@ -1,0 +1,86 @@
+"""The seam between a network and its pictures: what is found in one picture, whatever computes it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.learned.classes import suppression_groups
+from eidrive_scenario.perception.learned.suppression import suppress
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LARGEST_OVERLAP = 0.5
+"""Of two boxes of like class that overlap by more, the better one counts."""
+MOST_CANDIDATES = 1000
+
+
+@dataclass(frozen=True)
+class ImageDetections:
+    """What a network found in a picture: boxes (N, 4) x1 y1 x2 y2 [px of the picture], best first, scores (N,)."""
+
+    boxes: Array
+    scores: Array
+    classes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Boxes before suppression: (N, 4) x1 y1 x2 y2 [px of the network's input], scores (N,), class numbers (N,)."""
+
+    boxes: Array
+    scores: Array
+    classes: Integers
+
+
+class ImageNetwork(ABC):
+    """Finds objects in pictures of any size, which it takes to its own size without keeping their shape.
+
+    classes  names in the order of the outputs;  input_size  width and height of the network's input [px]
+    """
+
+    def __init__(self, classes: Sequence[str], input_size: tuple[int, int], confidence: float) -> None:
+        self.classes = tuple(classes)
+        self.input_size = input_size
+        self.confidence = confidence
+        self._groups = suppression_groups(self.classes)
+
+    def find(self, picture: NDArray[np.uint8]) -> ImageDetections:
+        """The objects in a picture (H, W, 3), red green blue."""
+        height, width = picture.shape[:2]
+        candidates = self.candidates(resized(picture, self.input_size))
+        if len(candidates.scores) > MOST_CANDIDATES:
+            best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
+            candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
+        groups = self._groups[candidates.classes]
+        kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
+        scale = np.array([width / self.input_size[0], height / self.input_size[1]] * 2)
+        boxes = candidates.boxes[kept] * scale
+        boxes[:, 0::2] = boxes[:, 0::2].clip(0.0, width)
+        boxes[:, 1::2] = boxes[:, 1::2].clip(0.0, height)
+        names = tuple(self.classes[number] for number in candidates.classes[kept].tolist())
+        return ImageDetections(boxes, candidates.scores[kept], names)
+
+    @abstractmethod
+    def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
+        """All boxes of at least the least confidence in a picture of the network's own size."""
+
+
+def resized(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The picture in the size width x height, each new pixel the mean of what it covers where it shrinks."""
+    height, width = picture.shape[:2]
+    if (width, height) == size:
+        return picture
+    shrinks = width >= size[0] and height >= size[1]
+    return np.asarray(
+        cv2.resize(picture, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR), np.uint8
+    )

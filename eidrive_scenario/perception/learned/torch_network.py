@@ -1,0 +1,82 @@
+"""The project's own networks on a CPU."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from eidrive_scenario.perception.learned.blocks import fold
+from eidrive_scenario.perception.learned.boxes import corners
+from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
+from eidrive_scenario.perception.learned.ssd import decode, default_boxes
+from eidrive_scenario.perception.learned.weights import load
+from eidrive_scenario.perception.learned.yolov5 import STRIDES, YoloV5
+
+
+class TorchNetwork(ImageNetwork):
+    """`yolov5` or `ssd`, by what the file of weights says. Raises SettingError if that does not fit.
+
+    On a given machine and number of threads the same picture gives the same bits.
+    """
+
+    def __init__(self, path: Path, confidence: float, threads: int = 1) -> None:
+        description, network = load(path)
+        super().__init__(description.classes, description.input_size, confidence)
+        torch.set_num_threads(threads)
+        fold(network)
+        self.name = description.network
+        self._network = network
+        width, height = description.input_size
+        self._defaults = default_boxes(height, width)
+
+    def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
+        with torch.inference_mode():
+            pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)[None]
+            outputs = self._network(pixels.to(torch.float32).div_(255.0))
+            if isinstance(self._network, YoloV5):
+                boxes, scores, classes = yolo_candidates(self._network, outputs, self.confidence)
+            else:
+                boxes, scores, classes = ssd_candidates(outputs, self._defaults, self.confidence)
+            return Candidates(boxes.double().numpy(), scores.double().numpy(), classes.numpy())
+
+
+def yolo_candidates(network: YoloV5, outputs: list[Tensor], confidence: float) -> tuple[Tensor, Tensor, Tensor]:
+    """Boxes (N, 4) as corners, scores (N,) and classes (N,) of the first picture; score = objectness · class.
+
+    Decodes like `YoloV5.decode`, but only the cells whose objectness alone reaches the confidence.
+    """
+    least = _logit(confidence)
+    boxes, scores, classes = [], [], []
+    for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
+        anchor, line, column = torch.nonzero(raw[0, ..., 4] >= least, as_tuple=True)
+        share = raw[0, anchor, line, column].sigmoid()
+        centre = (2.0 * share[:, :2] - 0.5 + torch.stack([column, line], dim=1)) * stride
+        size = (2.0 * share[:, 2:4]).square() * network.anchors[scale][anchor]
+        best, number = share[:, 5:].max(dim=1)
+        boxes.append(corners(torch.cat([centre, size], dim=1)))
+        scores.append(share[:, 4] * best)
+        classes.append(number)
+    box, score, number = torch.cat(boxes), torch.cat(scores), torch.cat(classes)
+    sure = score >= confidence
+    return box[sure], score[sure], number[sure]
+
+
+def ssd_candidates(
+    outputs: tuple[Tensor, Tensor], defaults: Tensor, confidence: float
+) -> tuple[Tensor, Tensor, Tensor]:
+    """The same for `ssd`. A class reaches the confidence only if its logit exceeds that of the background by enough."""
+    encoded, logits = outputs[0][0], outputs[1][0]
+    likely = (logits[:, 1:].amax(dim=1) - logits[:, 0] >= _logit(confidence)).nonzero()[:, 0]
+    score, number = logits[likely].softmax(dim=1)[:, 1:].max(dim=1)
+    boxes = corners(decode(encoded[likely], defaults[likely]))
+    sure = score >= confidence
+    return boxes[sure], score[sure], number[sure]
+
+
+def _logit(probability: float) -> float:
+    return math.log(probability / (1.0 - probability))
