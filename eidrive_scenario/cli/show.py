@@ -45,18 +45,26 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         typer.echo(line)
 
 
-def tree(scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library.")]) -> None:
-    """Print a scenario's storyboard as a tree, triggers in words."""
+def tree(
+    scenario: Annotated[str, typer.Argument(help="An .xosc file, or a name of the library.")],
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it into this file instead.")] = None,
+) -> None:
+    """Print a scenario's storyboard as a tree, triggers in words, or draw it."""
     from eidrive_scenario.cli.storyboard_tree import storyboard_tree
     from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
+    from eidrive_scenario.reporting.storyboard_picture import write_storyboard_picture
     from eidrive_scenario.roads import RoadNetwork
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
     loaded = load_scenario(resolve_scenario(scenario))
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
-    console().print(storyboard_tree(Storyboard(loaded, roads, dt=0.05, seed=0)))
+    storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
+    if svg is not None:
+        typer.echo(str(write_storyboard_picture(storyboard, svg)))
+    else:
+        console().print(storyboard_tree(storyboard))
 
 
 def view(

@@ -85,3 +85,10 @@ def test_report_without_runs(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("report", tmp_path, "-o", tmp_path / "report")
     assert result.exit_code == 2
     assert "no result.json in" in result.stderr
+
+
+def test_tree_as_a_picture(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "tree.svg"
+    result = eidrive("tree", passing_by, "--svg", picture)
+    assert (result.exit_code, result.stdout.strip()) == (0, str(picture))
+    assert "simulation time ≥ 3 s" in picture.read_text(encoding="utf-8")

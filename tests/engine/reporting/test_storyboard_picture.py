@@ -1,0 +1,166 @@
+"""The picture of a storyboard: every element in its column, nothing on top of anything else, arrows to who waits."""
+
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.reporting.storyboard_boxes import Role, init_boxes, stop_lines, story_boxes
+from eidrive_scenario.reporting.storyboard_layout import Layout, lay_out
+from eidrive_scenario.reporting.storyboard_picture import storyboard_picture, write_storyboard_picture
+from eidrive_scenario.reporting.text_width import broken, width_of
+from eidrive_scenario.storyboard.storyboard import Storyboard
+
+HEAD = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="tree" author="test"/>
+<VariableDeclarations><VariableDeclaration name="v" variableType="integer" value="0"/></VariableDeclarations>
+<CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions/></Init><Story name="story &lt;1&gt;">"""
+TAIL = "</Story>{stop}</Storyboard></OpenSCENARIO>"
+ACTION = """<Action name="{}"><GlobalAction><VariableAction variableRef="v"><SetAction value="1"/></VariableAction>
+</GlobalAction></Action>"""
+
+
+def condition(inside: str, edge: str = "none") -> str:
+    value = f"<ByValueCondition>{inside}</ByValueCondition>"
+    return f'<Condition name="c" delay="0" conditionEdge="{edge}">{value}</Condition>'
+
+
+def after(name: str, kind: str = "event") -> str:
+    return condition(
+        f'<StoryboardElementStateCondition storyboardElementType="{kind}" storyboardElementRef="{name}" '
+        'state="endTransition"/>'
+    )
+
+
+TIME = condition('<SimulationTimeCondition rule="greaterThan" value="3"/>', "rising")
+
+
+def event(name: str, *groups: str, count: int = 1) -> str:
+    trigger = "".join(f"<ConditionGroup>{group}</ConditionGroup>" for group in groups)
+    start = f"<StartTrigger>{trigger}</StartTrigger>" if groups else ""
+    action = ACTION.format(f"{name} action")
+    return f'<Event name="{name}" priority="parallel" maximumExecutionCount="{count}">{action}{start}</Event>'
+
+
+def act(name: str, *maneuvers: str) -> str:
+    inside = "".join(f'<Maneuver name="{name} m{n}">{events}</Maneuver>' for n, events in enumerate(maneuvers))
+    return (
+        f'<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="1">'
+        f'<Actors selectTriggeringEntities="false"/>{inside}</ManeuverGroup></Act>'
+    )
+
+
+def storyboard(*acts: str, stop: str = "") -> Storyboard:
+    return Storyboard(load_scenario((HEAD + "".join(acts) + TAIL.format(stop=stop)).encode()), None, dt=0.1)
+
+
+CHAIN = act(
+    "one",
+    event("a", TIME)
+    + event("b", after("a"))
+    + event("c", after("a") + TIME, after("b"))
+    + event("d", after("c action", "action")),
+)
+
+
+@pytest.fixture
+def layout() -> Layout:
+    """Two acts; in the first, events that wait for each other."""
+    return lay_out(story_boxes(storyboard(CHAIN, act("two", event("x"), event("y", count=3)))), 10.0, 20.0)
+
+
+def test_what_stands_in_the_boxes() -> None:
+    (story,) = story_boxes(storyboard(CHAIN))
+    (one,) = story.children
+    (group,) = one.children
+    assert [(line.lead, line.text) for line in group.lines] == [("maneuver", "one m0")]
+    c = group.children[2]
+    assert [(line.role, line.lead, line.text) for line in c.lines] == [
+        (Role.START, "when", "event a in endTransition"),
+        (Role.START, "and", "simulation time > 3 s becomes true"),
+        (Role.START, "or when", "event b in endTransition"),
+    ]
+    assert [child.title for child in c.children] == ["c action"]
+
+
+def test_who_waits_for_whom() -> None:
+    (story,) = story_boxes(storyboard(CHAIN))
+    waits = {box.title: [path[-1] for path in box.waits_for] for box in story.walk() if box.kind == "event"}
+    assert waits == {"a": [], "b": ["a"], "c": ["a", "b"], "d": ["c"]}
+
+
+def test_remarks() -> None:
+    (story,) = story_boxes(storyboard(act("two", event("y", count=3))))
+    assert [box.remark for box in story.walk() if box.kind == "event"] == ["parallel, up to 3 times"]
+
+
+def test_no_box_covers_another(layout: Layout) -> None:
+    boxes = [box for story in layout.stories for box in story.walk()]
+    assert len(boxes) == 1 + 2 + 2 + 2 + 6 + 6
+    for one, other in combinations(boxes, 2):
+        beside = one.x + one.width < other.x or other.x + other.width < one.x
+        assert beside or one.y + one.height < other.y or other.y + other.height < one.y, (one.box.path, other.box.path)
+    assert max(box.x + box.width for box in boxes) == layout.width
+    assert max(box.y + box.height for box in boxes) < layout.height
+
+
+def test_children_stand_right_of_their_parents_and_begin_at_their_height(layout: Layout) -> None:
+    for story in layout.stories:
+        for box in story.walk():
+            assert all(child.x > box.x + box.width for child in box.children)
+            assert not box.children or box.children[0].y == box.y
+
+
+def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: Layout) -> None:
+    ways = [(arrow.source.box.title, arrow.target.box.title) for arrow in layout.arrows]
+    assert sorted(ways) == [("a", "b"), ("a", "c"), ("b", "c"), ("c", "d")]
+    for one, other in combinations(layout.arrows, 2):
+        if one.lane == other.lane:
+            spans = sorted(sorted((arrow.source.y, arrow.target.y)) for arrow in (one, other))
+            assert spans[0][1] < spans[1][0]
+    events = layout.columns["event"]
+    group = max(box.x + box.width for story in layout.stories for box in story.walk() if box.box.kind == "maneuver")
+    assert all(group < arrow.lane < events for arrow in layout.arrows)
+
+
+def test_the_text_of_a_line_fits_into_its_box(layout: Layout) -> None:
+    for story in layout.stories:
+        for box in story.walk():
+            for line in box.lines:
+                assert line.indent + width_of(line.text, 11.5) <= box.width - 20
+
+
+def test_the_picture_names_everything_and_is_well_formed(tmp_path: Path) -> None:
+    made = storyboard(CHAIN, stop=f"<StopTrigger><ConditionGroup>{TIME}</ConditionGroup></StopTrigger>")
+    path = write_storyboard_picture(made, tmp_path / "new" / "tree.svg")
+    root = etree.parse(path).getroot()
+    texts = ["".join(node.itertext()) for node in root.iter("{*}text")]
+    for name in ("story <1>", "one", "one group", "a", "b", "c", "d", "a action", "The run stops when"):
+        assert name in texts
+    assert len(root.findall(".//{*}g[@class='arrow']")) == 4
+    assert storyboard_picture(made) == storyboard_picture(made)
+
+
+def test_a_run_without_stop_trigger() -> None:
+    assert [(line.lead, line.text) for line in stop_lines(storyboard(CHAIN))] == [("when", "every story has ended")]
+
+
+def test_init_has_a_card_for_everyone() -> None:
+    path = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+    cards = init_boxes(Storyboard(load_scenario(path), None, dt=0.1))
+    assert [card.title for card in cards] == ["global actions", "Ego", "Parked"]
+    assert [line.text for line in cards[1].lines][1] == "speed to 10 m/s, at once"
+
+
+@pytest.mark.parametrize("width", [20.0, 60.0, 400.0])
+def test_broken_lines_keep_all_letters_and_the_width(width: float) -> None:
+    text = "Ego: time headway to TheVehicleThatCutsIn_2 ≥ 0.7 s becomes true"
+    lines = broken(text, width, 12)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+    assert all(width_of(line, 12) <= width for line in lines)
+
+
+def test_long_words_are_cut_where_their_parts_begin() -> None:
+    assert broken("CutInAndBrakeStory", 100, 13) == ["CutInAndBrake", "Story"]
