@@ -26,13 +26,17 @@ DRIVABLE = frozenset(
 
 @dataclass(frozen=True)
 class Header:
-    """The file's header; `geo_reference` is its projection text (PROJ), empty where there is none."""
+    """The file's header; `geo_reference` is its projection text (PROJ), empty where there is none.
+
+    offset  where the file's origin lies in the projection's plane: x, y, z [m], and its turn [rad]
+    """
 
     name: str = ""
     revision: tuple[int, int] = (1, 4)
     vendor: str = ""
     date: str = ""
     geo_reference: str = ""
+    offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

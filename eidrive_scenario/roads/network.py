@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
@@ -10,11 +11,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from eidrive_scenario.errors import Problem
 from eidrive_scenario.roads import poses
 from eidrive_scenario.roads.distance import RoadDistances
+from eidrive_scenario.roads.geo_reference import parse_geo_reference
+from eidrive_scenario.roads.geodesy import GeoReference
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
 from eidrive_scenario.roads.links import LaneLinks
-from eidrive_scenario.roads.location import Array, Integers, LaneKey, LaneLocation, LaneLocations, Pose, Poses
+from eidrive_scenario.roads.location import (
+    Array,
+    Integers,
+    LaneKey,
+    LaneLocation,
+    LaneLocations,
+    Pose,
+    Poses,
+    PositionError,
+)
 from eidrive_scenario.roads.locator import REACH, Locator
 from eidrive_scenario.roads.model import (
     Header,
@@ -72,6 +85,20 @@ class RoadNetwork:
         return build_graph(self.tables, self.links)
 
     @cached_property
+    def geo_reference(self) -> GeoReference:
+        """Where the map lies on the globe. Raises PositionError if the file does not say it, or in unknown words."""
+        text = self.header.geo_reference
+        if not text:
+            raise PositionError(
+                Problem("the road network has no geoReference", "add <geoReference> to its <header>", self.source)
+            )
+        try:
+            return parse_geo_reference(text)
+        except ValueError as error:
+            remedy = "write <geoReference> as a PROJ text, such as +proj=utm +zone=32 +datum=WGS84"
+            raise PositionError(Problem(str(error), remedy, self.source)) from error
+
+    @cached_property
     def _locator(self) -> Locator:
         return Locator(self.tables)
 
@@ -83,6 +110,13 @@ class RoadNetwork:
         return road
 
     # Road and lane coordinates to the world
+
+    def geographic(self, latitude: float, longitude: float) -> tuple[float, float]:
+        """x and y [m] of a point on the globe in WGS 84 [rad]. Raises PositionError, as `geo_reference` does."""
+        x, y = self.geo_reference.plane(latitude, longitude)
+        dx, dy, _, turn = self.header.offset
+        x, y, cos, sin = x - dx, y - dy, math.cos(turn), math.sin(turn)
+        return x * cos + y * sin, y * cos - x * sin
 
     def road_pose_at(self, road_id: str, s: float, t: float = 0.0) -> Pose:
         """The pose at road coordinates; heading of the reference line. Raises PositionError."""

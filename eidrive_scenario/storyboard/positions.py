@@ -10,6 +10,7 @@ from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.geographic import height_of_level, plane_coordinates
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Stage
@@ -133,7 +134,14 @@ def _trajectory(frame: model.TrajectoryPosition, stage: Stage, actor: str | None
 
 
 def _geo(frame: model.GeoPosition, stage: Stage, actor: str | None) -> Place:
-    raise _missing(frame, "is not understood yet", "give the place as a WorldPosition or LanePosition")
+    """By the road network's projection. Relative angles, and missing ones, refer to the lane there."""
+    roads = _roads(frame, stage)
+    x, y = plane_coordinates(frame, roads, stage)
+    height = frame.altitude if frame.altitude is not None else frame.height
+    z = height_of_level(frame, roads, x, y) if height is None else height - roads.header.offset[2]
+    here = roads.locate_at(x, y, z=z)
+    base = roads.pose(here) if here is not None else Pose(x, y, 0.0, 0.0, 0.0, 0.0)
+    return Place(_oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
 
 FRAMES: dict[type[model.Element], Callable[[Any, Stage, str | None], Place]] = {

@@ -65,9 +65,10 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
         _check_links(road, roads, junctions, findings)
     signals = read_signals(elements, findings)
     controllers = read_controllers(root, signals, findings)
+    header = _read_header(root, findings)
     if findings.problems:
         raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
-    return RoadMap(source, _read_header(root), roads, junctions, signals, controllers, tuple(objects))
+    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects))
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
@@ -93,7 +94,7 @@ def _parse(text: bytes, source: str) -> etree._Element:
     return root
 
 
-def _read_header(root: etree._Element) -> Header:
+def _read_header(root: etree._Element, findings: Findings) -> Header:
     header = root.find("header")
     if header is None:
         return Header()
@@ -106,7 +107,15 @@ def _read_header(root: etree._Element) -> Header:
         vendor=header.get("vendor", ""),
         date=header.get("date", ""),
         geo_reference=(header.findtext("geoReference") or "").strip(),
+        offset=_read_offset(header.find("offset"), findings),
     )
+
+
+def _read_offset(element: etree._Element | None, findings: Findings) -> tuple[float, float, float, float]:
+    if element is None:
+        return 0.0, 0.0, 0.0, 0.0
+    x, y, z, turn = (findings.number(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    return x, y, z, turn
 
 
 def _read_road(number: str, element: etree._Element, findings: Findings) -> Road:

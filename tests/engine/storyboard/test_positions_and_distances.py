@@ -110,7 +110,7 @@ def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: A
         ({"lane_position": model.LanePosition(road_id="1", lane_id="-5", s=3)}, "its lanes there: 1, -1, -2"),
         ({"lane_position": model.LanePosition(road_id="1", lane_id="-1", s=300)}, "that road is 200.00 m long"),
         ({"relative_lane_position": model.RelativeLanePosition(entity_ref="A", d_lane=-3, ds=0)}, "names lane -4"),
-        ({"geo_position": model.GeoPosition(latitude_deg=1, longitude_deg=2)}, "not understood"),
+        ({"geo_position": model.GeoPosition(latitude_deg=1, longitude_deg=2)}, "has no geoReference; add"),
     ],
 )
 def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text: Any) -> None:

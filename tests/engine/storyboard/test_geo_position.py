@@ -1,0 +1,106 @@
+"""Places on the globe: a street along the middle meridian of a UTM zone, and one above another."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_scenario, model
+from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.storyboard.positions import resolve
+from eidrive_scenario.storyboard.stage import Stage
+
+LATITUDE, METRES_PER_DEGREE = 48.0, 111_190.32
+"""Arc of the WGS 84 meridian per degree around 48°N: a (1 - e²) (1 - e² sin² 48°)^(-3/2) π / 180 [m]."""
+NORTHING = 5_316_300.0
+
+
+@pytest.fixture
+def globe(stage: Stage) -> Stage:
+    """A street to the north from about (0, 0), z = 10, below another one, z = 17, in shifted coordinates."""
+    road = """<road name="" length="400" id="{number}" junction="-1"><link/>
+      <planView><geometry s="0" x="0" y="0" hdg="1.5707963267948966" length="400"><line/></geometry></planView>
+      <elevationProfile><elevation s="0" a="{z}" b="0" c="0" d="0"/></elevationProfile>
+      <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving">
+      <width sOffset="0" a="8" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>"""
+    text = f"""<OpenDRIVE><header revMajor="1" revMinor="6"><geoReference>+proj=utm +zone=32 +datum=WGS84</geoReference>
+      <offset x="499996" y="{NORTHING}" z="100" hdg="0"/></header>
+      {road.format(number=1, z=10)}{road.format(number=2, z=17)}</OpenDRIVE>"""
+    roads = RoadNetwork.parse(text)
+    return Stage(stage.scenario, roads, dt=0.1, seed=0, nobody=stage.view)
+
+
+def at(stage: Any, **frame: Any) -> tuple[Pose, Any]:
+    place = resolve(model.Position(geo_position=model.GeoPosition(**frame)), stage, "A")
+    return place.pose, place.location
+
+
+def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: Stage) -> None:
+    """On the middle meridian x is the false easting, and the map is smaller than the globe by 0.9996."""
+    first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
+    assert first.x == pytest.approx(4.0, abs=1e-6)
+    assert (location.road, location.lane) == ("1", -1)
+    north, _ = at(globe, latitude_deg=LATITUDE + 100.0 / METRES_PER_DEGREE, longitude_deg=9.0)
+    assert north.y - first.y == pytest.approx(99.96, abs=2e-3)
+    assert north.x == pytest.approx(first.x, abs=1e-6)
+
+
+def test_missing_and_relative_angles_refer_to_the_lane(globe: Stage) -> None:
+    place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
+    assert at(globe, **place)[0].h == pytest.approx(math.pi / 2)
+    relative = model.Orientation(type=model.ReferenceContext.RELATIVE, h=0.3)
+    assert at(globe, **place, orientation=relative)[0].h == pytest.approx(math.pi / 2 + 0.3)
+    absolute = model.Orientation(type=model.ReferenceContext.ABSOLUTE, h=0.3)
+    assert at(globe, **place, orientation=absolute)[0].h == pytest.approx(0.3)
+
+
+def test_the_ground_the_level_or_the_altitude_say_how_high(globe: Stage) -> None:
+    place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
+    assert at(globe, **place)[0].z == pytest.approx(10.0)
+    pose, location = at(globe, **place, vertical_road_selection=1)
+    assert (pose.z, location.road) == (pytest.approx(17.0), "2")
+    pose, location = at(globe, **place, altitude=118.0)
+    assert (pose.z, location.road) == (pytest.approx(18.0), "2")
+    assert at(globe, **place, height=111.0)[0].z == pytest.approx(11.0)
+    with pytest.raises(ScenarioError, match="road level 2, and there are 2"):
+        at(globe, **place, vertical_road_selection=2)
+
+
+def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: Stage) -> None:
+    expected, _ = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
+    old, _ = at(globe, latitude=math.radians(LATITUDE), longitude=math.radians(9.0))
+    assert old[:3] == pytest.approx(expected[:3], abs=1e-6)
+    assert globe.warnings == []
+    mistaken, _ = at(globe, latitude=LATITUDE, longitude=9.0)
+    assert mistaken[:3] == pytest.approx(expected[:3], abs=1e-6)
+    assert "taken as degrees" in str(globe.warnings[0])
+
+
+def test_a_latitude_beyond_the_pole(globe: Stage) -> None:
+    with pytest.raises(ScenarioError, match="latitudes end at"):
+        at(globe, latitude_deg=91.0, longitude_deg=9.0)
+    with pytest.raises(ScenarioError, match="lacks latitude or longitude"):
+        at(globe, latitude_deg=48.0)
+
+
+def test_a_place_far_from_all_roads_is_still_a_place(globe: Stage) -> None:
+    pose, location = at(globe, latitude_deg=48.1, longitude_deg=9.0)
+    assert location is None
+    assert (pose.x, pose.z, pose.h) == (pytest.approx(4.0, abs=1e-6), 0.0, 0.0)
+
+
+def test_a_file_of_1_1_with_radians_loads() -> None:
+    """The attributes of that version are required there; those of today are unknown to it."""
+    frame = '<GeoPosition latitude="0.8" longitude="0.1" height="3"/>'
+    text = f"""<OpenSCENARIO>
+      <FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="x" author="y"/>
+      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entityRef="A">
+      <AddEntityAction><Position>{frame}</Position></AddEntityAction></EntityAction></GlobalAction></Actions></Init>
+      <StopTrigger/></Storyboard></OpenSCENARIO>"""
+    with pytest.raises(ScenarioError, match="entity 'A', which is not there"):
+        load_scenario(text.encode())
+    with pytest.raises(ScenarioError, match="latitudeDeg"):
+        load_scenario(text.replace("latitude=", "latitudeDeg=").encode())

@@ -1,0 +1,197 @@
+"""Signal controllers: phases, delays, states; and the names of signals."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.signals import Signals
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+  <road name="" length="100" id="1" junction="-1"><link/>
+    <planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>
+    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
+      <right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
+    </laneSection></lanes>
+    <signals><signal s="50" t="-5" id="7" name="" dynamic="yes" orientation="+" type="1000001" subtype="-1"/>
+      <signal s="60" t="-5" id="8" name="" dynamic="yes" orientation="+" type="1000002" subtype="-1"/></signals></road>
+  <controller id="c1" name="crossing"><control signalId="7"/><control signalId="8"/></controller></OpenDRIVE>"""
+
+
+def phase(name: str, duration: float, group: str | None = None, **states: str) -> model.Phase:
+    return model.Phase(
+        name=name,
+        duration=duration,
+        traffic_signal_state=tuple(
+            model.TrafficSignalState(traffic_signal_id=key.lstrip("s"), state=value) for key, value in states.items()
+        ),
+        traffic_signal_group_state=model.TrafficSignalGroupState(state=group) if group is not None else None,
+    )
+
+
+def controller(
+    *phases: model.Phase, name: str = "c1", reference: str | None = None, delay: float | None = None
+) -> model.TrafficSignalController:
+    return model.TrafficSignalController(name=name, phase=phases, reference=reference, delay=delay)
+
+
+def signals(*controllers: model.TrafficSignalController, roads: RoadNetwork | None = None) -> Signals:
+    return Signals(model.TrafficSignals(traffic_signal_controller=controllers), roads)
+
+
+CYCLE = (phase("go", 10, s7="green"), phase("caution", 3, s7="yellow"), phase("stop", 7, s7="red"))
+SILENT = (phase("go", 10), phase("caution", 3), phase("stop", 7))
+
+
+def course(found: Signals, times: list[float], name: str = "c1") -> list[str | None]:
+    shown = []
+    for time in times:
+        found.advance(time)
+        shown.append(found.phase(name))
+    return shown
+
+
+def test_phases_follow_each_other_and_begin_again() -> None:
+    found = signals(controller(*CYCLE))
+    assert course(found, [0, 9.95, 10, 12.95, 13, 19.95, 20, 29.95, 30, 193]) == [
+        *("go", "go", "caution", "caution", "stop", "stop", "go", "go", "caution", "stop")
+    ]
+    assert found.state("7") == "red"
+
+
+def test_phases_change_in_the_tick_of_their_time_though_ticks_are_no_binary_numbers() -> None:
+    found = signals(controller(*(phase(f"p{number}", 0.1) for number in range(3))))
+    assert course(found, [tick * 0.1 for tick in range(3000)]) == [f"p{tick % 3}" for tick in range(3000)]
+
+
+def test_who_refers_to_another_is_behind_it_from_the_start() -> None:
+    found = signals(controller(*CYCLE), controller(*CYCLE, name="c2", reference="c1", delay=5))
+    assert course(found, [0, 4.95, 5, 14.95, 15, 18, 25], "c2") == [
+        *("stop", "stop", "go", "go", "caution", "stop", "go")
+    ]
+    chain = signals(
+        controller(*CYCLE),
+        controller(*CYCLE, name="c2", reference="c1", delay=5),
+        controller(*CYCLE, name="c3", reference="c2", delay=20),
+    )
+    assert course(chain, [0, 5, 15], "c3") == ["stop", "go", "caution"]
+
+
+def test_an_action_begins_a_phase_and_the_cycle_goes_on_from_there() -> None:
+    found = signals(controller(*CYCLE), controller(*SILENT, name="c2", reference="c1", delay=5))
+    found.advance(0.0)
+    found.set_phase("c1", "stop", 4.0)
+    assert (found.phase("c1"), found.state("7")) == ("stop", "red")
+    assert course(found, [10.95, 11, 20.95, 21]) == ["stop", "go", "go", "caution"]
+    # c1's first phase begins at 11 s, c2's 5 s later
+    assert course(found, [15.95, 16, 26], "c2") == ["stop", "go", "caution"]
+    found.set_phase("c2", "go", 30.0)
+    assert course(found, [39.95, 40], "c2") == ["go", "caution"]
+    assert course(found, [31], "c1") == ["go"]
+
+
+def test_a_phase_without_end_stays() -> None:
+    endless = (phase("go", 2), phase("dark", math.inf), phase("never", 1))
+    found = signals(controller(*endless), controller(*endless, name="late", reference="c1", delay=3))
+    assert course(found, [0, 2, 1e6]) == ["go", "dark", "dark"]
+    assert course(found, [2.9, 3, 5], "late") == [None, "go", "dark"]
+    found.set_phase("c1", "never", 7.0)
+    assert course(found, [7.5, 8, 10]) == ["never", "go", "dark"]
+
+
+def test_phases_of_no_length_are_passed_over() -> None:
+    found = signals(controller(phase("none", 0), phase("go", 2), phase("nothing", 0)))
+    assert course(found, [0, 1, 2, 3]) == ["go"] * 4
+    assert course(signals(controller(phase("a", 0), phase("b", 0))), [0, 5]) == ["a", "a"]
+
+
+def test_what_is_set_by_hand_holds_until_the_next_phase() -> None:
+    found = signals(controller(*CYCLE))
+    found.advance(0.0)
+    found.set_state("7", "flashing")
+    found.advance(9.0)
+    assert found.state("7") == "flashing"
+    found.advance(10.0)
+    assert found.state("7") == "yellow"
+
+
+def test_a_group_is_what_the_road_network_says_and_single_signals_win() -> None:
+    roads = RoadNetwork.parse(ROAD)
+    found = signals(controller(phase("go", 5, group="green", s8="red")), roads=roads)
+    found.advance(0.0)
+    assert found.states == {"7": "green", "8": "red"}
+    by_name = signals(controller(phase("go", 5, group="green"), name="crossing"), roads=roads)
+    by_name.advance(0.0)
+    assert by_name.states == {"7": "green", "8": "green"}
+    of_1_2 = model.Phase(
+        name="go", duration=5, traffice_signal_group_state=model.TrafficSignalGroupState(state="red;off")
+    )
+    old = signals(controller(of_1_2), roads=roads)
+    old.advance(0.0)
+    assert old.states == {"7": "red;off", "8": "red;off"}
+
+
+def test_the_states_are_one_object_until_something_changes() -> None:
+    found = signals(controller(*CYCLE))
+    found.advance(0.0)
+    before = found.states
+    found.advance(5.0)
+    found.set_state("7", "green")
+    assert found.states is before
+    found.set_state("7", "red")
+    assert (found.states["7"], before["7"]) == ("red", "green")
+
+
+def test_signals_by_the_spellings_of_scenario_runner() -> None:
+    """CARLA's y points to the right: the signal at (50, -5) stands at 50,5 there."""
+    found = signals(roads=RoadNetwork.parse(ROAD))
+    assert found.identify("id=8") == "8"
+    assert found.identify("pos=50.5,4.0") == "7"
+    assert found.identify("pos=50.5, 7.5") == "pos=50.5, 7.5"
+    assert found.identify("pos=here") == "pos=here"
+    found.set_state("pos=50,5", "RED")
+    assert found.state("7") == "RED"
+    assert found.must_stop("7")
+    assert not found.must_stop("8")
+
+
+def test_an_unknown_signal_is_told_with_the_nearest_one() -> None:
+    roads = RoadNetwork.parse(ROAD.replace('id="7" name', 'id="north" name').replace('Id="7"', 'Id="north"'))
+    found = signals(roads=roads)
+    element = model.TrafficSignalStateAction(name="nord", state="red")
+    assert "did you mean 'north'" in str(found.unknown("nord", element))
+    assert found.unknown("north", element) is None
+
+
+@pytest.mark.parametrize(
+    ("controllers", "expected"),
+    [
+        ([controller(phase("go", -1))], "a phase of -1 s"),
+        ([controller(phase("go", math.nan))], "a phase of nan s"),
+        ([controller(*CYCLE, reference="c1", delay=-5)], "a delay of -5 s"),
+        (
+            [controller(*CYCLE, reference="c2", delay=1), controller(*CYCLE, name="c2", reference="c1", delay=1)],
+            "'c1' is its own reference",
+        ),
+    ],
+)
+def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalController], expected: str) -> None:
+    assert any(expected in str(problem) for problem in signals(*controllers).problems)
+
+
+@pytest.mark.parametrize(
+    ("controllers", "expected"),
+    [
+        ([controller(*CYCLE, delay=5)], "delay to no controller"),
+        ([controller(*CYCLE, reference="c9", delay=5)], "'c9', which has no phases here"),
+        ([controller(*CYCLE), controller(*CYCLE, name="c2", reference="c1")], "without a delay"),
+        ([controller(*CYCLE), controller(phase("go", 5), name="c2", reference="c1", delay=1)], "5 s for its phases"),
+    ],
+)
+def test_declarations_that_are_odd(controllers: list[model.TrafficSignalController], expected: str) -> None:
+    found = signals(*controllers)
+    assert found.problems == ()
+    assert any(expected in str(problem) for problem in found.warnings)
