@@ -52,7 +52,7 @@ def _nearest(history: ConditionHistory) -> Iterator[str]:
         measure = nearest.measure
         of = f"{name}: " if name else ""
         unit = f" {measure.unit}" if measure.unit else ""
-        yield f"{of}nearest to it with {_number(measure.value)}{unit}, at {nearest.time:.2f} s"
+        yield f"{of}came nearest with {_number(measure.value)}{unit}, at {nearest.time:.2f} s"
     for name in sorted(history.undefined - history.nearest.keys()):
         yield f"{f'{name}: ' if name else ''}undefined or infinite at all evaluations"
     condition = history.monitor.condition

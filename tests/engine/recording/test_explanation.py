@@ -85,7 +85,7 @@ def test_how_near_a_distance_came(explained: Explained) -> None:
     lines = explained(event(when(NEAR)))
     assert lines[0] == "event go (story/act/group/maneuver/go) never started"
     assert "never true in 20 evaluations from 0.00 s to 1.90 s" in lines
-    assert "Ego: nearest to it with 31 m, at 1.90 s" in lines
+    assert "Ego: came nearest with 31 m, at 1.90 s" in lines
 
 
 def test_what_was_there_from_the_first_evaluation_has_no_edge(explained: Explained) -> None:
@@ -122,7 +122,7 @@ def test_the_condition_that_was_missing(explained: Explained) -> None:
     missing = "Ego: straight distance to Other < 20 m"
     assert f"group 1 of 2: 1 of 2 conditions at most, first at 1.10 s, without: {missing}" in lines
     assert "group 2 of 2: it never held" in lines
-    assert "nearest to it with 1.90 s, at 1.90 s" in lines
+    assert "came nearest with 1.90 s, at 1.90 s" in lines
 
 
 def test_who_is_not_in_the_world(explained: Explained) -> None:
@@ -159,7 +159,7 @@ def test_an_act_that_never_ran_is_what_matters(explained: Explained) -> None:
     lines = explained(event(when(NEAR)), start=start)
     assert lines[1] == "it never stood by, as the act around it did not run; so this is about the act:"
     assert lines[2] == "act act (story/act) never started"
-    assert lines[-1] == "nearest to it with 1.90 s, at 1.90 s"
+    assert lines[-1] == "came nearest with 1.90 s, at 1.90 s"
 
 
 def test_an_act_that_was_stopped_meanwhile(explained: Explained) -> None:
