@@ -1,5 +1,6 @@
 """The surface that extensions import: actions, conditions, criteria, detectors, channels. The engine never does."""
 
+from eidrive_scenario import traffic
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.overrides import Override
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
@@ -129,5 +130,6 @@ __all__ = [
     "resolve",
     "route_of",
     "suggestion",
+    "traffic",
     "wrap_angle",
 ]

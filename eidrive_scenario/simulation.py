@@ -242,7 +242,7 @@ class Simulation:
             self.world.remove(name)
             self.stations.leave(name)
         for name, placement in commands.additions.items():
-            spec = actor_spec(name, self.scenario.entities[name])
+            spec = commands.bodies.get(name) or actor_spec(name, self.scenario.entities[name])
             self.world.add(spec, placement)
             self.stations.join(spec)
         for name in self.stations.drivers:

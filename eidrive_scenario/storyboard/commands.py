@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.overrides import Overrides
 from eidrive_scenario.driving.step import Goal
-from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 
@@ -29,6 +29,7 @@ class Commands:
     placements   next pose of every scripted actor
     goals        what driven actors shall do; an actor without an entry follows its own settings
     additions    actors that enter the world, and where
+    bodies       of those that enter and are no entities of the scenario: background traffic
     removals     actors that leave it
     driven       actors whose own controller is active, lateral and longitudinal
     overrides    controls held per actor, all that are in force
@@ -42,6 +43,7 @@ class Commands:
     placements: dict[str, Placement] = field(default_factory=dict)
     goals: dict[str, Goal] = field(default_factory=dict)
     additions: dict[str, Placement] = field(default_factory=dict)
+    bodies: dict[str, ActorSpec] = field(default_factory=dict)
     removals: set[str] = field(default_factory=set)
     driven: frozenset[str] = frozenset()
     overrides: Mapping[str, Overrides] = field(default_factory=dict)

@@ -10,11 +10,13 @@ from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
+from eidrive_scenario.storyboard.background import StageTraffic
 from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.progress import Progress
 from eidrive_scenario.storyboard.signals import Signals
+from eidrive_scenario.traffic.instances import Centre
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
@@ -55,6 +57,7 @@ class Stage:
     signals     the traffic signals and their controllers
     appearances  of those actors that differ from the usual
     environment  time of day, weather and road
+    traffic     background traffic
     warnings    what is odd about the scenario and yet can be done
     commands    to write to
     """
@@ -90,6 +93,13 @@ class Stage:
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
             for name, entity in scenario.entities.items()
         }
+        self.traffic = StageTraffic(
+            roads,
+            seed=seed,
+            centre=self._centre,
+            taken=frozenset(self.actors),
+            must_stop=self.signals.must_stop,
+        )
         self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
 
     @property
@@ -129,6 +139,18 @@ class Stage:
         """Speed along the heading in this view [m/s]; of what was just placed, the speed that it was given."""
         row = self.view.rows.get(name)
         return float(self.view.speed[row]) if row is not None else self.actors[name].motion.speed
+
+    def _centre(self, name: str) -> Centre | None:
+        """Where an entity is and moves, for the traffic around it; None while it is not in the world."""
+        actor = self.actors.get(name)
+        if actor is None or not actor.present:
+            return None
+        row = self.view.rows.get(name)
+        if row is None:
+            pose = actor.motion.pose
+            return Centre(pose.x, pose.y, pose.h, actor.motion.speed)
+        x, y, _ = self.view.position[row].tolist()
+        return Centre(x, y, float(self.view.yaw[row]), float(self.view.speed[row]))
 
     def enter(self, name: str, place: Place) -> None:
         """Put an actor at a place; it enters the world if it was not there."""

@@ -91,6 +91,7 @@ class Storyboard:
                 back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
                 back.motion.jumped, back.motion.speed = front.motion.jumped, front.motion.speed
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.jumped)
+        self.stage.traffic.step(view, self.dt, commands)
         return self._finished(commands)
 
     def _bring_trailers(self) -> None:

@@ -138,10 +138,11 @@ class Swarm(Instance):
             rim = fit & (share >= RIM)
             choices = [rim & inwards, rim, fit]
         given = None if self.speeds is None else float(speed[0]) if len(speed) else None
-        for choice in choices:
-            if choice.any():
-                return traffic.bring_in(self, participant, sites.some(choice), speed[choice], rng, given)
-        return False
+        return any(
+            traffic.bring_in(self, participant, sites.some(choice), speed[choice], rng, given)
+            for choice in choices
+            if choice.any()
+        )
 
     def _direction(self, rng: np.random.Generator, centre: Centre, sites: Sites) -> Flags:
         if self.directions is None:
@@ -208,7 +209,6 @@ class Sink(Instance):
     radius: float
     rate: float
     categories: frozenset[str] | None
-    started: float
     _next: float = field(default=-math.inf, init=False)
 
     def wants(self, traffic: BackgroundTraffic) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import overlap
+from eidrive_scenario.roads import LaneLocation
 from eidrive_scenario.traffic.bodies import Participant
 from eidrive_scenario.traffic.cars import PLANNED
 from eidrive_scenario.traffic.fleet import Fleet
@@ -25,6 +26,8 @@ SPACING = 5.0
 """Distance between the places along a lane [m]."""
 WIDEST = 2.55
 """No more than the widest vehicle that roads are made for needs to fit into a lane [m]; Directive 96/53/EC."""
+REACH = 30.0
+"""A position further away from every lane than this is the position of no traffic [m]."""
 AIR = 0.5
 """Between the box of who appears and all others [m]."""
 
@@ -69,6 +72,17 @@ class Sites:
             self.width[which],
         )
 
+    def joined(self, other: Sites) -> Sites:
+        """These and others."""
+        return Sites(
+            np.concatenate([self.row, other.row]),
+            np.concatenate([self.progress, other.progress]),
+            np.concatenate([self.x, other.x]),
+            np.concatenate([self.y, other.y]),
+            np.concatenate([self.heading, other.heading]),
+            np.concatenate([self.width, other.width]),
+        )
+
 
 Covers = Callable[[Sites], Flags]
 """Which of some places belong to an area."""
@@ -95,6 +109,25 @@ class Ground:
     def for_body(self, participant: Participant) -> Sites:
         """The places where this one fits."""
         return self.walking if participant.walks else self.driving
+
+
+def around(
+    lanes: TrafficLanes, sites: Sites, x: float, y: float, radius: float, location: LaneLocation | None
+) -> Sites:
+    """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
+
+    Where that is none at all, the nearest place that is no further away than a point may lie from its road.
+    """
+    distance = np.hypot(sites.x - x, sites.y - y)
+    found = sites.some(distance <= radius)
+    if location is not None:
+        row, progress = lanes.of(location)
+        if np.any(sites.row == row):
+            here = Sites.at(lanes, np.array([row]), np.array([progress]))
+            return found.joined(here)
+    if not len(found) and len(sites) and distance.min() <= REACH:
+        return sites.some(np.array([int(np.argmin(distance))]))
+    return found
 
 
 def free(fleet: Fleet, sites: Sites, participant: Participant, speed: Array, foreign: Array) -> Flags:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
 from eidrive_scenario.api import EntityCondition, Stage, box_of, model, overlap
 
 TYPES: dict[str, type[model.Element]] = {
@@ -41,10 +46,28 @@ class CollisionCondition(EntityCondition):
             for name in (contact.first, contact.second)
             if entity in (contact.first, contact.second)
         }
-        return [
+        named = [
             name
             for name in self._others(stage)
             if name != entity and (name in begun or overlap(box, box_of(stage, name)))
+        ]
+        return named if self.element.by_type is None else [*named, *self._traffic(stage, box, begun)]
+
+    def _traffic(self, stage: Stage, box: Sequence[float], begun: set[str]) -> list[str]:
+        """Background traffic of the type that touches a box: it has no entities, but it counts as such."""
+        assert self.element.by_type is not None
+        kind, view = self.element.by_type.type.value, stage.view
+        rows = [view.rows[name] for name in stage.traffic.names if name in view]
+        if not rows or kind not in ("vehicle", "pedestrian"):
+            return []
+        boxes = view.boxes[rows]
+        reach = np.hypot(boxes[:, 3], boxes[:, 4]) + math.hypot(box[3], box[4])
+        near = np.hypot(boxes[:, 0] - box[0], boxes[:, 1] - box[1]) < 0.5 * reach
+        return [
+            view.names[row]
+            for row, close in zip(rows, near.tolist(), strict=True)
+            if (view.categories[row] == "pedestrian") == (kind == "pedestrian")
+            and (view.names[row] in begun or (close and overlap(box, view.boxes[row])))
         ]
 
     def _others(self, stage: Stage) -> list[str]:
