@@ -164,7 +164,7 @@ class Outline:
 
     @cached_property
     def at_start(self) -> frozenset[str]:
-        """The entities that Init puts into the world."""
+        """The entities that Init puts into the world, and those that are there anyway as the road network has them."""
         actions = self.scenario.storyboard.init.actions
         teleported = {
             name
@@ -178,7 +178,10 @@ class Outline:
             if action.entity_action is not None and action.entity_action.add_entity_action is not None
             for name in self.members(action.entity_action.entity_ref)
         }
-        return frozenset(teleported | added | self.trailers)
+        entities = self.scenario.document.entities
+        objects = entities.scenario_object if entities else ()
+        external = {one.name for one in objects if one.external_object_reference is not None}
+        return frozenset(teleported | added | external | self.trailers)
 
     @cached_property
     def placed(self) -> frozenset[str]:

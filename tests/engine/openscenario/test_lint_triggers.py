@@ -283,3 +283,9 @@ def test_criteria_in_the_stop_trigger_are_no_conditions(check: Check) -> None:
 
 def test_a_storyboard_without_end(check: Check) -> None:
     assert check(act(event("go")), stop="") == ["no-stop-trigger"]
+
+
+def test_what_the_road_network_has_need_not_be_placed(check: Check, scenario_xml: Callable[..., bytes]) -> None:
+    post = '<ScenarioObject name="Ego"><ExternalObjectReference name="post"/></ScenarioObject>'
+    near = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
+    assert check(act(event("go", near)), init="", entities=post) == []
