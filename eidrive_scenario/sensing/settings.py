@@ -59,7 +59,7 @@ class TruthSettings(SensorSettings):
 class NoiseSettings(Settings):
     """Of a camera's sensor, in electrons: what a pixel holds when it is full, and the deviation of reading it."""
 
-    full_well: PositiveFloat = 10_000.0
+    full_well: PositiveFloat = 12_000.0
     read_noise: NonNegativeFloat = 4.0
 
 
@@ -96,10 +96,10 @@ class CameraSettings(SensorSettings):
     near: PositiveFloat = 0.1
     far: PositiveFloat = 500.0
     noise: Annotated[NoiseSettings | None, BeforeValidator(_noise)] = NoiseSettings()
-    f_number: PositiveFloat = 1.8
+    f_number: PositiveFloat = 1.6
     exposure_time: PositiveFloat | None = None
     gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None
-    longest_exposure: PositiveFloat = 0.02
+    longest_exposure: PositiveFloat = 0.03
     highest_gain: float = Field(default=36.0, ge=0.0, le=80.0)
     supersampling: int = Field(default=1, ge=1, le=4)
 

@@ -1,178 +1,173 @@
-"""What cameras see: meshes in a pybullet client of their own, made when the first picture is asked for."""
+"""What cameras see: the models of roads, buildings and actors, made when the first picture is asked for."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads import surface_meshes
-from eidrive_scenario.world.bodies import Body, quaternion
-from eidrive_scenario.world.bullet import bullet, connect
-from eidrive_scenario.world.camera import Array, Picture, Pinhole, Radiance, metres, projection_matrix, sky, view_matrix
-from eidrive_scenario.world.meshes import actor_mesh, shadow
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.bodies import Body
+from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.ground import GroundUnder
+from eidrive_scenario.world.meshes import actor_mesh
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
 from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
 from eidrive_scenario.world.meshes.solids import polygon
+from eidrive_scenario.world.render.lamps import Beam
+from eidrive_scenario.world.render.model import Array, Instance, Light, Model, merged, model, placed
+from eidrive_scenario.world.render.props import Props
+from eidrive_scenario.world.render.renderer import render
 from eidrive_scenario.world.scenery import Building, Scenery
 from eidrive_scenario.world.weather import Weather
 
-_AWAY = (0.0, 0.0, -10_000.0)
-_SUN = (0.45, -0.35, 0.82)
-_BESIDE_ROADS = 400.0
+_BESIDE_ROADS = 1500.0
 """How far the ground goes on around the roads [m]."""
 _BELOW_ROADS = 0.06
 """How far the ground lies below the roads, lest it shows through [m]."""
-_MOST_VERTICES = 3 * 20_000
-"""In one mesh; pybullet refuses much more."""
+_LIT_WINDOWS = 0.3
+"""Share of a building's windows with a light behind them at night."""
+WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
+HEADLIGHT: Light = (6_500.0, 6_000.0, 4_900.0)
+TAILLIGHT: Light = (300.0, 9.0, 6.0)
+"""Luminance of what shines at night [cd/m²]."""
 
 
 class Visuals:
-    """Bodies without a collision shape, one for each material of each actor, moved there before each picture.
-
-    pybullet would draw the collision boxes of the physics client too, hence a client that has only meshes.
-    """
+    """All that can be drawn, placed anew for each picture."""
 
     def __init__(self, scenery: Scenery) -> None:
-        self._client = connect()
         self._scenery = scenery
-        self._parts: dict[str, tuple[Body, list[int]]] = {}
+        self._props = Props()
         self._shown_buildings = 0
-        self._draw_ground()
+        self._ground = self._ground_parts()
+        self._buildings: list[Instance] = []
+        self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
-    def close(self) -> None:
-        """Give the client back."""
-        bullet.disconnect(physicsClientId=self._client)
-
-    def picture(
-        self, shown: Mapping[int, Body], pose: Array, width: int, height: int, fov: float, near: float, far: float
-    ) -> Picture:
-        """The picture of a camera; `shown` are the actors that can be seen, by their rows."""
-        rows = self._arrange(shown)
-        _, _, colours, buffer, handles = bullet.getCameraImage(
-            width,
-            height,
-            viewMatrix=view_matrix(pose),
-            projectionMatrix=projection_matrix(width, height, fov, near, far),
-            lightDirection=_SUN,
-            lightColor=(1.0, 1.0, 1.0),
-            lightAmbientCoeff=0.62,
-            lightDiffuseCoeff=0.55,
-            lightSpecularCoeff=0.08,
-            shadow=0,
-            renderer=bullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
-        seen = np.asarray(handles, dtype=np.int32).reshape(height, width)
-        depth = metres(np.asarray(buffer, dtype=np.float32).reshape(height, width), near, far)
-        nothing = seen < 0
-        np.copyto(depth, np.float32(np.inf), where=nothing)
-        rgb = np.ascontiguousarray(np.asarray(colours, dtype=np.uint8).reshape(height, width, 4)[..., :3])
-        np.copyto(rgb, sky(pose, width, height, fov), where=nothing[..., None])
-        return Picture(rgb, depth, rows[seen])
-
-    def radiance(self, shown: Mapping[int, Body], pose: Array, pinhole: Pinhole, weather: Weather) -> Radiance:
-        """The light that reaches a camera."""
-        fov = 2 * math.atan(pinhole.width / 2 / pinhole.focal)
-        rgb, depth, rows = self.picture(shown, pose, pinhole.width, pinhole.height, fov, pinhole.near, pinhole.far)
-        up = max(math.sin(math.radians(weather.sun_elevation)), 0.002)
-        light = (rgb / np.float32(255.0)) ** np.float32(2.2) * np.float32(
-            30_000.0 * up * (1 - 0.7 * weather.cloud_cover)
-        )
-        through = np.exp(-weather.extinction * np.minimum(depth, np.float32(1e4)))[..., None]
-        light = light * through + (1 - through) * np.float32(12_000.0 * up)
-        return Radiance(light.astype(np.float32), depth, rows)
-
-    def _arrange(self, shown: Mapping[int, Body]) -> NDArray[np.int32]:
-        """Move the meshes to the actors; returns the row of each handle, -1 for what is no actor, also at index -1."""
+    def radiance(
+        self, bodies: Mapping[int, Body], hidden: Iterable[str], pose: Array, pinhole: Pinhole, weather: Weather
+    ) -> Radiance:
+        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine."""
         for building in self._scenery.buildings[self._shown_buildings :]:
-            self._draw_building(building)
+            self._buildings.append(_building_instance(building))
         self._shown_buildings = len(self._scenery.buildings)
-        bodies = {body.name: body for body in shown.values()}
-        for name, (body, handles) in list(self._parts.items()):
-            if bodies.get(name) is not body:
-                self._move(handles, _AWAY, (0.0, 0.0, 0.0, 1.0))
-        for body in shown.values():
-            known = self._parts.get(body.name)
-            if known is None or known[0].spec != body.spec:
-                self._parts[body.name] = (body, self._draw_actor(body))
-            elif known[0] is not body:
-                self._parts[body.name] = (body, known[1])
-        highest = max((max(handles) for _, handles in self._parts.values()), default=0)
-        rows = np.full(max(highest, bullet.getNumBodies(physicsClientId=self._client)) + 2, -1, dtype=np.int32)
-        for row, body in shown.items():
-            handles = self._parts[body.name][1]
-            self._move(handles, _foot(body), quaternion(body.yaw, body.pitch, body.roll))
-            rows[handles[:-1]] = row
-        return rows
+        dark = weather.lamps_on
+        actors = {body.name: _actor_instance(row, body, self.glow_of(body, weather)) for row, body in bodies.items()}
+        glowing = {"window_lit": WINDOW_LIGHT} if dark and weather.sun_elevation < 3.0 else {}
+        houses = [Instance(each.model, each.rotation, each.position, -1, glowing) for each in self._buildings]
+        beams = [beam for body in bodies.values() for beam in self.beams_of(body, weather)]
+        left_out = frozenset(hidden)
+        props = self._props.instances()
+        drawn = [*self._ground, *houses, *props, *(each for name, each in actors.items() if name not in left_out)]
+        casters = [*houses, *props, *actors.values()]
+        ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
+        return render(drawn, casters, beams, weather, pose, pinhole, ground)
+
+    def glow_of(self, body: Body, weather: Weather) -> Mapping[str, Light]:
+        """What an actor's materials emit [cd/m²]."""
+        if weather.lamps_on and _has_lamps(body.spec):
+            return {"headlight": HEADLIGHT, "taillight": TAILLIGHT}
+        return {}
+
+    def beams_of(self, body: Body, weather: Weather) -> Sequence[Beam]:
+        """The headlamps of an actor that are on."""
+        if not (weather.lamps_on and _has_lamps(body.spec)):
+            return ()
+        rotation, foot = _stance(body)
+        length, _, height = body.spec.size
+        lamp = np.array([length / 2, 0.0, min(0.7, 0.45 * height)])
+        return (Beam(foot + rotation @ lamp, rotation),)
+
+    def _add(self, triangles: Array, colour: Colour, material: str = "matt", label: int = -1) -> list[int]:
+        """Put up triangles (K, 3, 3) of one colour and material; returns their handles."""
+        return [self._props.add(triangles, colour, material, label)]
 
     def _move(self, handles: Sequence[int], at: Sequence[float], turn: Sequence[float]) -> None:
+        """Put parts elsewhere: position, and quaternion x, y, z, w."""
+        x, y, z, w = turn
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
         for handle in handles:
-            bullet.resetBasePositionAndOrientation(handle, at, turn, physicsClientId=self._client)
+            self._props.move(handle, rotation, np.asarray(at, dtype=float))
 
-    def _draw_actor(self, body: Body) -> list[int]:
-        """The handles of an actor's materials, and last that of its shadow."""
-        spec = body.spec
-        own = spec.colour or paint(spec.name, spec.shape)
-        handles: list[int] = []
-        for material, triangles in actor_mesh(spec).items():
-            handles += self._add(triangles, own if material == "paint" else MATERIALS[material])
-        return handles + self._add(shadow(spec), MATERIALS["shadow"])
+    def _glow(self, handles: Sequence[int], light: Light) -> None:
+        """Let parts emit this luminance [cd/m²], linear red, green, blue; (0, 0, 0) is off."""
+        for handle in handles:
+            self._props.glow(handle, light)
 
-    def _draw_building(self, building: Building) -> None:
-        own = building.colour or by_name(building.name, FACADES)
-        foot = (building.centre[0], building.centre[1], building.centre[2] - building.size[2] / 2)
-        for material, triangles in building_mesh(building.size).items():
-            handles = self._add(triangles, own if material == "wall" else MATERIALS[material])
-            self._move(handles, foot, quaternion(building.yaw, 0.0, 0.0))
-
-    def _draw_ground(self) -> None:
+    def _ground_parts(self) -> list[Instance]:
+        """Roads, their markings, and the land around, cut along a grid."""
         low, high = np.zeros(3), np.zeros(3)
+        parts: list[Model] = []
         if self._scenery.roads is not None:
             meshes = surface_meshes(self._scenery.roads)
-            for mesh in meshes:
-                self._add(mesh.vertices[mesh.faces], mesh.colour)
+            parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.colour}) for mesh in meshes]
             points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
             low, high = points.min(axis=0), points.max(axis=0)
         (x0, y0, z), (x1, y1, _) = (low - _BESIDE_ROADS).tolist(), (high + _BESIDE_ROADS).tolist()
         z += _BESIDE_ROADS - _BELOW_ROADS
-        ground = MATERIALS["grass" if self._scenery.roads is not None else "asphalt"]
-        self._add(polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)]), ground)
-
-    def _add(self, triangles: Array, colour: Colour) -> list[int]:
-        """Bodies that show triangles (K, 3, 3), each with its own flat shade; one, unless there are very many."""
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        solid = lengths[:, 0] > 1e-12
-        corners = triangles[solid].reshape(-1, 3)
-        normals = np.repeat(normals[solid] / lengths[solid], 3, axis=0)
-        handles = []
-        for start in range(0, len(corners), _MOST_VERTICES):
-            part = slice(start, start + _MOST_VERTICES)
-            shape = bullet.createVisualShape(
-                bullet.GEOM_MESH,
-                vertices=corners[part].tolist(),
-                indices=list(range(len(corners[part]))),
-                normals=normals[part].tolist(),
-                rgbaColor=(*colour, 1.0),
-                specularColor=(0.1, 0.1, 0.1),
-                physicsClientId=self._client,
-            )
-            handles.append(bullet.createMultiBody(0, -1, shape, useMaximalCoordinates=1, physicsClientId=self._client))
-        return handles
+        kind = "grass" if self._scenery.roads is not None else "asphalt"
+        land = model({kind: polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])}, {})
+        pieces = [land, *(merged(parts).parts() if parts else ())]
+        return [Instance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
 
 
-def _foot(body: Body) -> tuple[float, float, float]:
-    """The centre of the bottom of an actor's box in the world."""
+def _has_lamps(spec: ActorSpec) -> bool:
+    return spec.wheelbase > 0.0 and spec.shape != "bicycle"
+
+
+def _actor_instance(row: int, body: Body, glow: Mapping[str, Light]) -> Instance:
+    spec = body.spec
+    rotation, foot = _stance(body)
+    shape = _actor_model(spec.shape, spec.size, spec.offset, spec.wheelbase, spec.wheel_radius, _paint(spec))
+    return Instance(shape, rotation, foot, row, glow)
+
+
+def _paint(spec: ActorSpec) -> Colour:
+    return spec.colour or paint(spec.name, spec.shape)
+
+
+@lru_cache(maxsize=256)
+def _actor_model(
+    shape: str,
+    size: tuple[float, float, float],
+    offset: tuple[float, float, float],
+    wheelbase: float,
+    wheel_radius: float,
+    colour: Colour,
+) -> Model:
+    spec = ActorSpec("", shape, "", size, offset, wheelbase=wheelbase, wheel_radius=wheel_radius)
+    return model(actor_mesh(spec), {"paint": colour})
+
+
+def _stance(body: Body) -> tuple[Array, Array]:
+    """Rotation (3, 3) of an actor, and the centre of the bottom of its box in the world."""
     ox, oy, oz = body.spec.offset
-    oz -= body.spec.size[2] / 2
-    cy, sy, cp, sp = math.cos(body.yaw), math.sin(body.yaw), math.cos(body.pitch), math.sin(body.pitch)
-    cr, sr = math.cos(body.roll), math.sin(body.roll)
-    ahead, aside = ox * cp + oy * sp * sr + oz * sp * cr, oy * cr - oz * sr
-    return (
-        body.x + cy * ahead - sy * aside,
-        body.y + sy * ahead + cy * aside,
-        body.z - ox * sp + oy * cp * sr + oz * cp * cr,
-    )
+    rotation = rotation_matrix(body.yaw, body.pitch, body.roll)
+    foot: Array = np.array([body.x, body.y, body.z]) + rotation @ (ox, oy, oz - body.spec.size[2] / 2)
+    return rotation, foot
+
+
+def _building_instance(building: Building) -> Instance:
+    """A building; behind some of its windows, by its name, somebody has a light on."""
+    own = building.colour or by_name(building.name, FACADES)
+    mesh = dict(building_mesh(building.size))
+    windows = mesh.pop("window", None)
+    if windows is not None and len(windows):
+        digest = hashlib.blake2b(building.name.encode(), digest_size=8).digest()
+        draws = np.random.Generator(np.random.Philox(key=int.from_bytes(digest, "little")))
+        lit = np.repeat(draws.random(len(windows) // 2) < _LIT_WINDOWS, 2)
+        mesh |= {name: part for name, part in (("window", windows[~lit]), ("window_lit", windows[lit])) if len(part)}
+    colours = {"wall": own, "window_lit": MATERIALS["window"]}
+    foot = np.array([*building.centre[:2], building.centre[2] - building.size[2] / 2])
+    turn = rotation_matrix(building.yaw, 0.0, 0.0)
+    return Instance(placed(model(mesh, colours), turn, foot), np.eye(3), np.zeros(3))

@@ -20,6 +20,7 @@ from eidrive_scenario.world.contacts import ContactTracker
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
 from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
+from eidrive_scenario.world.render.tones import toned, white_level
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.visuals import Visuals
@@ -78,9 +79,7 @@ class World:
 
     def close(self) -> None:
         """Give the pybullet client back; the world cannot be used any more."""
-        if self._visuals is not None:
-            self._visuals.close()
-            self._visuals = None
+        self._visuals = None
         if self._client >= 0:
             bullet.disconnect(physicsClientId=self._client)
             self._client = -1
@@ -231,24 +230,21 @@ class World:
     ) -> Picture:
         """What a camera sees: rgb, depth and segmentation.
 
-        pose (4, 4) camera to world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in
-        `ignore` are not drawn. The first picture of a world makes all meshes; a world without pictures never does.
+        An ideal camera, with automatic exposure and without noise; `radiance` is for others. pose (4, 4) camera to
+        world, x right, y down, z forward; fov horizontal [rad]; near and far [m]; actors in `ignore` are not drawn.
+        The first picture of a world makes all models; a world without pictures never does.
         """
-        if self._visuals is None:
-            self._visuals = Visuals(self._scenery)
-        rows = self.view().rows
-        hidden = frozenset(ignore)
-        shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}
-        return self._visuals.picture(shown, np.asarray(pose, dtype=float), width, height, fov, near, far)
+        seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
+        rgb = toned(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
+        return Picture(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
         if self._visuals is None:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows
-        hidden = frozenset(ignore)
-        shown = {rows[name]: body for name, body in self._bodies.items() if name not in hidden}
-        return self._visuals.radiance(shown, np.asarray(pose, dtype=float), pinhole, self._weather)
+        bodies = {rows[name]: body for name, body in self._bodies.items()}
+        return self._visuals.radiance(bodies, ignore, np.asarray(pose, dtype=float), pinhole, self._weather)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

@@ -1,0 +1,64 @@
+"""How surfaces answer light, by the name of their material."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+
+class Finish(NamedTuple):
+    """mirror    share of light that it throws back like a mirror when seen from straight above
+    grain     how much its albedo varies from place to place
+    soaks     whether rain darkens it and lies on it
+    returns   luminance towards a lamp beside the camera for each lx that it gives there [cd/m²/lx]
+    """
+
+    mirror: float = 0.0
+    grain: float = 0.0
+    soaks: bool = False
+    returns: float = 0.0
+
+
+FINISHES: dict[str, Finish] = {
+    "matt": Finish(),
+    "road": Finish(grain=0.22, soaks=True),
+    "soil": Finish(grain=0.35),
+    "marking": Finish(grain=0.10, soaks=True, returns=0.15),
+    "paint": Finish(mirror=0.05),
+    "glass": Finish(mirror=0.10),
+    "window": Finish(mirror=0.09),
+    "metal": Finish(mirror=0.55),
+    "lens": Finish(mirror=0.06),
+    "sheeting": Finish(returns=50.0),
+    "reflector": Finish(mirror=0.05, returns=2.0),
+}
+"""Clear coat and glass: 0.04 for one face of index 1.5 (Fresnel). Markings 150 mcd/m²/lx as EN 1436 class R3, and signs
+50 cd/m²/lx as EN 12899-1 class RA1 white ask."""
+
+_BY_MATERIAL = {
+    "driving": "road", "junction": "road", "shoulder": "road", "parking": "road", "biking": "road", "asphalt": "road",
+    "sidewalk": "road", "curb": "road", "pavement": "road",
+    "median": "soil", "verge": "soil", "grass": "soil",
+    "marking_white": "marking", "marking_yellow": "marking", "marking": "marking",
+    "paint": "paint", "white": "paint", "red": "paint", "yellow": "paint", "cargo": "paint",
+    "glass": "glass", "window": "window", "window_lit": "window",
+    "chrome": "metal", "rim": "metal", "steel": "metal",
+    "headlight": "lens", "indicator": "lens", "blue_light": "lens", "red_light": "lens", "taillight": "reflector",
+    "plate": "sheeting",
+}  # fmt: skip
+
+_NUMBERS = {name: number for number, name in enumerate(FINISHES)}
+
+MIRROR: Floats = np.array([finish.mirror for finish in FINISHES.values()], dtype=np.float32)
+GRAIN: Floats = np.array([finish.grain for finish in FINISHES.values()], dtype=np.float32)
+SOAKS = np.array([finish.soaks for finish in FINISHES.values()])
+RETURNS: Floats = np.array([finish.returns for finish in FINISHES.values()], dtype=np.float32)
+
+
+def finish_of(material: str) -> int:
+    """The number of a material's finish; matt where nothing is said."""
+    return _NUMBERS[_BY_MATERIAL.get(material, "matt")]

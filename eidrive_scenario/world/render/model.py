@@ -1,0 +1,164 @@
+"""What is drawn: triangles with what they are made of, and where they stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.meshes.palette import MATERIALS, Colour
+from eidrive_scenario.world.render.materials import finish_of
+
+Floats = NDArray[np.float32]
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Light = tuple[float, float, float]
+"""Red, green, blue of linear sRGB."""
+
+_COARSE_SHARE = 0.97
+"""Of a model's surface, the share that its coarse version keeps: the largest triangles."""
+_CELL = 40.0
+"""Scenery is cut into squares of this side, of which those out of sight cost nothing [m]."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front.
+
+    normals (K, 3) unit, plane (K,) = normal · corner, albedo (K, 3) linear, finish (K,) index of FINISHES,
+    material (K,) index of `materials`, coarse indices of the triangles that matter from afar
+    """
+
+    triangles: Floats
+    normals: Floats
+    plane: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    material: NDArray[np.int16]
+    materials: tuple[str, ...]
+    coarse: Integers
+    centre: Array
+    radius: float
+
+    def parts(self) -> Iterator[Model]:
+        """The model cut along a grid on the ground."""
+        cells = np.floor(self.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
+        _, cell = np.unique(cells, axis=0, return_inverse=True)
+        order = np.argsort(cell.ravel(), kind="stable")
+        for chosen in np.split(order, np.flatnonzero(np.diff(cell.ravel()[order])) + 1):
+            yield _model(
+                self.triangles[chosen],
+                self.normals[chosen],
+                self.albedo[chosen],
+                self.finish[chosen],
+                self.material[chosen],
+                self.materials,
+            )
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A model somewhere: rotation (3, 3) and position (3,) to the world, label in the segmentation.
+
+    glow   what its materials emit [cd/m²], by material
+    """
+
+    model: Model
+    rotation: Array
+    position: Array
+    label: int = -1
+    glow: Mapping[str, Light] = field(default_factory=dict)
+
+    @cached_property
+    def centre(self) -> Array:
+        """(3,) of the sphere of radius `model.radius` around it, in the world [m]."""
+        found: Array = self.rotation @ self.model.centre + self.position
+        return found
+
+
+def linear(colour: Colour) -> Light:
+    """A colour as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+    return red, green, blue
+
+
+def model(mesh: Mapping[str, Array], colours: Mapping[str, Colour]) -> Model:
+    """A model of triangles (K, 3, 3) by material; colours not given are those of the palette."""
+    triangles, albedo, finish, material = [], [], [], []
+    for number, (name, solid) in enumerate(mesh.items()):
+        colour = linear(colours[name] if name in colours else MATERIALS[name])
+        triangles.append(solid)
+        albedo.append(np.broadcast_to(np.array(colour, dtype=np.float32), (len(solid), 3)))
+        finish.append(np.full(len(solid), finish_of(name), dtype=np.uint8))
+        material.append(np.full(len(solid), number, dtype=np.int16))
+    corners = np.concatenate(triangles)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1)
+    solid_ones = np.flatnonzero(length > 1e-12)
+    return _model(
+        corners[solid_ones].astype(np.float32),
+        (normals[solid_ones] / length[solid_ones, None]).astype(np.float32),
+        np.concatenate(albedo)[solid_ones],
+        np.concatenate(finish)[solid_ones],
+        np.concatenate(material)[solid_ones],
+        tuple(mesh),
+    )
+
+
+def merged(models: Iterable[Model]) -> Model:
+    """Several models in one frame as one; materials of one name count as one."""
+    parts = list(models)
+    names = tuple(dict.fromkeys(name for part in parts for name in part.materials))
+    numbers = [np.array([names.index(name) for name in part.materials], dtype=np.int16) for part in parts]
+    return _model(
+        np.concatenate([part.triangles for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.albedo for part in parts]),
+        np.concatenate([part.finish for part in parts]),
+        np.concatenate([number[part.material] for number, part in zip(numbers, parts, strict=True)]),
+        names,
+    )
+
+
+def placed(part: Model, rotation: Array, position: Array) -> Model:
+    """The model in the frame in which it stands at this rotation and position."""
+    turn = rotation.T
+    return _model(
+        (part.triangles.astype(np.float64) @ turn + position).astype(np.float32),
+        (part.normals @ turn).astype(np.float32),
+        part.albedo,
+        part.finish,
+        part.material,
+        part.materials,
+    )
+
+
+def _model(
+    triangles: Floats,
+    normals: Floats,
+    albedo: Floats,
+    finish: NDArray[np.uint8],
+    material: NDArray[np.int16],
+    materials: tuple[str, ...],
+) -> Model:
+    edges = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    order = np.argsort(-area, kind="stable")
+    kept = int(np.searchsorted(np.cumsum(area[order]), _COARSE_SHARE * area.sum())) + 1
+    corners = triangles.reshape(-1, 3).astype(np.float64)
+    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    return Model(
+        triangles,
+        normals,
+        np.einsum("ki,ki->k", normals, triangles[:, 0]),
+        np.ascontiguousarray(albedo),
+        finish,
+        material,
+        materials,
+        np.sort(order[:kept]),
+        centre,
+        float(np.sqrt(((corners - centre) ** 2).sum(axis=1).max())),
+    )

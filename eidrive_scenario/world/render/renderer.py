@@ -1,0 +1,147 @@
+"""From instances, weather and a camera to the light in each of its pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.render import wet_road
+from eidrive_scenario.world.render.daylight import daylight
+from eidrive_scenario.world.render.lamps import Beam
+from eidrive_scenario.world.render.materials import SOAKS
+from eidrive_scenario.world.render.model import Array, Floats, Instance
+from eidrive_scenario.world.render.rasterise import rasterise
+from eidrive_scenario.world.render.shading import Points, shade
+from eidrive_scenario.world.render.shadows import shadow_map
+from eidrive_scenario.world.render.sky import dome, horizon, sample
+from eidrive_scenario.world.render.staging import stage
+from eidrive_scenario.world.render.surfaces import patches
+from eidrive_scenario.world.weather import Weather
+
+DAYLIGHT = 3000.0
+"""Light on the ground under which headlamps add nothing to see [lx]."""
+GLARE = 0.03
+"""Share of light that a lens scatters around a bright spot."""
+
+
+def render(
+    instances: Sequence[Instance],
+    casters: Sequence[Instance],
+    beams: Sequence[Beam],
+    weather: Weather,
+    pose: Array,
+    pinhole: Pinhole,
+    ground: float,
+) -> Radiance:
+    """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m]."""
+    staged = stage(instances, pose, pinhole)
+    cover = rasterise(staged.x, staged.y, staged.nearness, pinhole.width, pinhole.height)
+    light, heaven = daylight(weather), dome(weather)
+    eye = pose[:3, 3]
+    rx, ry, rz, length = _rays(pinhole, pose)
+    rays = (rx / length, ry / length, rz / length)
+    shape = (pinhole.height, pinhole.width)
+    picture = sample(heaven, *(part.reshape(shape) for part in rays)).reshape(-1, 3)
+    shown = np.flatnonzero(cover.triangle >= 0)
+    depth = np.full(len(cover.triangle), np.inf, dtype=np.float32)
+    label = np.full(len(cover.triangle), -1, dtype=np.int32)
+    if len(shown):
+        nearness = cover.nearness[shown]
+        far = np.float32(1.0) / nearness
+        points = Points(
+            cover.triangle[shown],
+            rx[shown] * far,
+            ry[shown] * far,
+            rz[shown] * far,
+            (rays[0][shown], rays[1][shown], rays[2][shown]),
+            length[shown] * far,
+        )
+        shadows = shadow_map(casters, light.towards, pose, pinhole) if light.sun.any() else None
+        felt = beams if float(light.ground.max()) < DAYLIGHT else ()
+        luminance = shade(points, staged, eye, light, weather, heaven, shadows, felt)
+        if weather.wetness > 0.0:
+            _wet(
+                luminance, picture, shown, points, staged.finish, cover.nearness, weather, pose, pinhole, ground, heaven
+            )
+        through = np.exp(np.float32(-weather.extinction) * points.distance)[:, None]
+        air = horizon(weather).astype(np.float32)
+        picture[shown] = luminance * through + air * (np.float32(1.0) - through)
+        near = far <= pinhole.far
+        depth[shown[near]] = far[near]
+        label[shown[near]] = staged.label[points.triangle[near]]
+    whole: Floats = picture.reshape(*shape, 3)
+    if weather.lamps_on:
+        whole = _with_glare(whole)
+    return Radiance(whole, depth.reshape(shape), label.reshape(shape))
+
+
+@lru_cache(maxsize=32)
+def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
+    """x, y (H · W,) at depth 1 in the camera's frame, and the length of each ray there."""
+    columns = (np.arange(pinhole.width) + 0.5 - pinhole.centre_x) / pinhole.focal
+    rows = (np.arange(pinhole.height) + 0.5 - pinhole.centre_y) / pinhole.focal
+    x, y = (grid.ravel().astype(np.float32) for grid in np.meshgrid(columns, rows))
+    return x, y, np.sqrt(x * x + y * y + np.float32(1.0))
+
+
+def _rays(pinhole: Pinhole, pose: Array) -> tuple[Floats, Floats, Floats, Floats]:
+    """The rays through the pixels in the world's axes, at depth 1, and their lengths."""
+    x, y, length = _own_rays(pinhole)
+    turn = pose[:3, :3].astype(np.float32)
+    rx, ry, rz = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] for axis in range(3))
+    return rx, ry, rz, length
+
+
+def _wet(
+    luminance: Floats,
+    sky: Floats,
+    shown: NDArray[np.int64],
+    points: Points,
+    finish: NDArray[np.uint8],
+    nearness: Floats,
+    weather: Weather,
+    pose: Array,
+    pinhole: Pinhole,
+    ground: float,
+    heaven: Floats,
+) -> None:
+    """Add to luminance (n, 3) what a wet road mirrors."""
+    on_road = np.flatnonzero(SOAKS[finish[points.triangle]])
+    if not len(on_road):
+        return
+    rows = shown[on_road]
+    ray = [part[on_road] for part in points.ray]
+    whole = np.zeros((pinhole.height * pinhole.width, 3), dtype=np.float32)
+    rx, ry, rz, length = _rays(pinhole, pose)
+    shape = (pinhole.height, pinhole.width)
+    reflected = sample(
+        heaven,
+        (rx / length).reshape(shape),
+        (ry / length).reshape(shape),
+        np.abs(rz / length).reshape(shape),
+    ).reshape(-1, 3)
+    whole[shown] = luminance
+    x, y, z = (np.zeros(len(whole), dtype=np.float32) for _ in range(3))
+    x[shown], y[shown], z[shown] = points.x, points.y, points.z
+    image = wet_road.mirrored(whole, reflected, nearness, x, y, z, ground - float(pose[2, 3]), pose, pinhole)
+    image = wet_road.blurred(image, pinhole.height, pinhole.width)
+    places = [points.x[on_road] + np.float32(pose[0, 3] % 4096.0), points.y[on_road] + np.float32(pose[1, 3] % 4096.0)]
+    smooth = wet_road.puddles(places[0], places[1], weather.wetness, patches())
+    share = wet_road.reflectance(np.abs(ray[2])) * smooth
+    luminance[on_road] += share[:, None] * (image[rows] - luminance[on_road])
+
+
+def _with_glare(picture: Floats) -> Floats:
+    """Bright lamps bleed into their surroundings."""
+    height, width = picture.shape[:2]
+    small = cv2.resize(picture, (max(width // 4, 1), max(height // 4, 1)), interpolation=cv2.INTER_AREA)
+    spread = cv2.GaussianBlur(small, (0, 0), max(width / 4 / 50.0, 0.8)) * 0.7
+    spread += cv2.GaussianBlur(small, (0, 0), max(width / 4 / 14.0, 1.5)) * 0.3
+    wide = cv2.resize(spread, (width, height), interpolation=cv2.INTER_LINEAR)
+    found: Floats = np.asarray(picture * np.float32(1.0 - GLARE) + wide * np.float32(GLARE), dtype=np.float32)
+    return found

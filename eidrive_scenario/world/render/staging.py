@@ -1,0 +1,155 @@
+"""Which triangles a camera may see, and where they lie in its picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.model import Array, Floats, Instance
+
+_COARSE_PIXELS = 14.0
+"""A model whose diameter covers fewer pixels is drawn coarsely."""
+
+
+class Stage(NamedTuple):
+    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (N, 3) at their corners, and of each the normal in
+    the world (N, 3), albedo (N, 3), finish (N,), label (N,) and what it emits (N, 3) [cd/m²]."""
+
+    x: Array
+    y: Array
+    nearness: Array
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+
+class _Chosen(NamedTuple):
+    corners: Floats
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+
+def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage:
+    """Triangles that face the camera and may lie in its picture, cut off at its near plane."""
+    sides = _sides(pinhole)
+    chosen = []
+    for instance, pixels in _in_sight(instances, pose, pinhole, sides):
+        found = _facing(instance, pose, pixels)
+        if found is not None:
+            chosen.append(found)
+    if not chosen:
+        chosen = [_Chosen(*(np.empty((0, *shape), dtype=kind) for shape, kind in _EMPTY))]
+    corners = np.concatenate([part.corners for part in chosen]).astype(np.float64)
+    normal, albedo, finish, label, glow = (
+        np.concatenate([part[column] for part in chosen]) for column in range(1, len(_Chosen._fields))
+    )
+    beyond = corners @ sides.T < 0.0
+    inside = np.flatnonzero(~(beyond[:, 0] & beyond[:, 1] & beyond[:, 2]).any(axis=1))
+    corners = corners[inside]
+    corners, whose = _cut(corners, pinhole.near)
+    inside = inside[whose]
+    nearness = 1.0 / corners[..., 2]
+    x = pinhole.focal * corners[..., 0] * nearness + pinhole.centre_x
+    y = pinhole.focal * corners[..., 1] * nearness + pinhole.centre_y
+    return Stage(x, y, nearness, normal[inside], albedo[inside], finish[inside], label[inside], glow[inside])
+
+
+_EMPTY = (
+    ((3, 3), np.float32),
+    ((3,), np.float32),
+    ((3,), np.float32),
+    ((), np.uint8),
+    ((), np.int32),
+    ((3,), np.float32),
+)
+
+
+def _sides(pinhole: Pinhole) -> Array:
+    """(5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
+    left, right = -pinhole.centre_x / pinhole.focal, (pinhole.width - pinhole.centre_x) / pinhole.focal
+    top, bottom = -pinhole.centre_y / pinhole.focal, (pinhole.height - pinhole.centre_y) / pinhole.focal
+    planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
+    found: Array = planes / np.linalg.norm(planes, axis=1, keepdims=True)
+    return found
+
+
+def _in_sight(
+    instances: Sequence[Instance], pose: Array, pinhole: Pinhole, sides: Array
+) -> list[tuple[Instance, float]]:
+    """The instances whose spheres reach into the picture, and how many pixels these cover across."""
+    if not instances:
+        return []
+    centres = (np.array([instance.centre for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
+    radii = np.array([instance.model.radius for instance in instances])
+    seen = (centres @ sides.T >= -radii[:, None]).all(axis=1) & (centres[:, 2] - radii <= pinhole.far)
+    distance = np.maximum(np.sqrt((centres**2).sum(axis=1)), 1e-6)
+    pixels = (2.0 * pinhole.focal * radii / distance).tolist()
+    return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
+
+
+def _facing(instance: Instance, pose: Array, pixels: float) -> _Chosen | None:
+    """The triangles of one instance that face the camera, corners in its frame; None where there are none."""
+    model = instance.model
+    to_camera = pose[:3, :3].T @ instance.rotation
+    shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
+    eye = -(to_camera.T @ shift)
+    facing = model.normals @ eye.astype(np.float32) > model.plane
+    if instance.label >= 0 and pixels < _COARSE_PIXELS:
+        rows = model.coarse[facing[model.coarse]]
+    else:
+        rows = np.flatnonzero(facing)
+    if not len(rows):
+        return None
+    corners = model.triangles[rows] @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
+    glow = np.zeros((len(rows), 3), dtype=np.float32)
+    if instance.glow:
+        by_material = np.array([instance.glow.get(name, (0.0, 0.0, 0.0)) for name in model.materials], dtype=np.float32)
+        glow = by_material[model.material[rows]]
+    return _Chosen(
+        corners,
+        model.normals[rows] @ instance.rotation.T.astype(np.float32),
+        model.albedo[rows],
+        model.finish[rows],
+        np.full(len(rows), instance.label, dtype=np.int32),
+        glow,
+    )
+
+
+def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
+    """Triangles (N, 3, 3) without what is nearer than the near plane, and of each the row that it came from.
+
+    Of one with one corner behind the plane two are left, of one with two corners behind it one.
+    """
+    behind = corners[..., 2] < near
+    count = behind.sum(axis=1)
+    whole = np.flatnonzero(count == 0)
+    parts, whose = [corners[whole]], [whole]
+    for number in (1, 2):
+        rows = np.flatnonzero(count == number)
+        if not len(rows):
+            continue
+        odd = np.argmax(behind[rows] if number == 1 else ~behind[rows], axis=1)
+        a, b, c = (corners[rows, (odd + k) % 3] for k in range(3))
+        ab, ac = _crossing(a, b, near), _crossing(a, c, near)
+        if number == 1:
+            parts += [np.stack([ab, b, c], axis=1), np.stack([ab, c, ac], axis=1)]
+            whose += [rows, rows]
+        else:
+            parts.append(np.stack([a, ab, ac], axis=1))
+            whose.append(rows)
+    return np.concatenate(parts), np.concatenate(whose)
+
+
+def _crossing(first: Array, second: Array, near: float) -> Array:
+    share = (near - first[:, 2]) / (second[:, 2] - first[:, 2])
+    found: Array = first + share[:, None] * (second - first)
+    return found

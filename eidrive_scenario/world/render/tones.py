@@ -1,0 +1,47 @@
+"""From luminance to the numbers of a picture: a meter, and a tone curve."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+LUMA: Floats = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+"""Luminance of linear sRGB (IEC 61966-2-1)."""
+HEADROOM = 4.0
+"""Luminance that comes out as white, in units of that which comes out as middle light grey before the shoulder."""
+BRIGHTNESS = 0.65
+"""Share of the published key, which lets white road markings keep below white."""
+DARKEST = 0.03
+_STEPS = 8192
+
+
+def white_level(luminance: Floats) -> float:
+    """The luminance of a picture (H, W, 3) that shall come out as white [cd/m²].
+
+    The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
+    1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
+    """
+    mean = math.exp(float(np.log(np.maximum(luminance[::2, ::2] @ LUMA, np.float32(1e-4))).mean()))
+    key = max(BRIGHTNESS * (1.03 - 2.0 / (2.0 + math.log10(mean + 1.0))), DARKEST)
+    return HEADROOM * mean / key
+
+
+def toned(signal: Floats) -> NDArray[np.uint8]:
+    """The numbers of a picture whose light is given as shares of white; what is brighter is white."""
+    steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0)) * np.float32(_STEPS - 1)
+    return _TONES[steps.astype(np.uint16)]
+
+
+def _tone_curve() -> NDArray[np.uint8]:
+    """A shoulder for highlights (Reinhard et al., Photographic tone reproduction, 2002, eq. 4), then sRGB's curve."""
+    scaled = np.linspace(0.0, HEADROOM, _STEPS)
+    tone = scaled * (1.0 + scaled / HEADROOM**2) / (1.0 + scaled)
+    encoded = np.where(tone <= 0.0031308, 12.92 * tone, 1.055 * tone ** (1 / 2.4) - 0.055)
+    return np.rint(255.0 * np.clip(encoded, 0.0, 1.0)).astype(np.uint8)
+
+
+_TONES = _tone_curve()

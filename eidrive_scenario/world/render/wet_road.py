@@ -1,0 +1,83 @@
+"""The mirror image on a wet road, made from the picture itself."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.model import Array, Floats
+
+WATER = 0.02
+"""Share of light that water throws back when seen from straight above (Fresnel, index 1.33)."""
+DARKENING = 0.45
+"""Of the light that a soaked road returns, this share is lost: its pores hold water (Lekner and Dorf 1988)."""
+_HEIGHT = 0.15
+"""What stands higher above the road has a mirror image [m]."""
+
+
+def mirrored(
+    light: Floats,
+    sky: Floats,
+    nearness: Floats,
+    x: Floats,
+    y: Floats,
+    z: Floats,
+    ground: float,
+    pose: Array,
+    pinhole: Pinhole,
+) -> Floats:
+    """(H · W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
+
+    light (H · W, 3), nearness and places x, y, z relative to the camera of what the picture shows; `sky` is what the
+    mirror shows where it has nothing else. Only what the picture shows is mirrored.
+    """
+    standing = np.flatnonzero((z > ground + _HEIGHT) & (nearness > 0.0))
+    image = sky.copy()
+    if not len(standing):
+        return image
+    mx, my, mz = x[standing], y[standing], np.float32(2.0 * ground) - z[standing]
+    right, down, forward = (pose[:3, k].astype(np.float32) for k in range(3))
+    depth = mx * forward[0] + my * forward[1] + mz * forward[2]
+    depth = np.maximum(depth, np.float32(1e-3))
+    u = (mx * right[0] + my * right[1] + mz * right[2]) / depth * np.float32(pinhole.focal) + np.float32(
+        pinhole.centre_x
+    )
+    v = (mx * down[0] + my * down[1] + mz * down[2]) / depth * np.float32(pinhole.focal) + np.float32(pinhole.centre_y)
+    inside = np.flatnonzero((u >= 0) & (u < pinhole.width) & (v >= 0) & (v < pinhole.height) & (depth > 0.3))
+    target = v[inside].astype(np.int64) * pinhole.width + u[inside].astype(np.int64)
+    key = (np.float32(1.0) / depth[inside]).view(np.uint32).astype(np.uint64) << np.uint64(32)
+    key |= (inside + 1).astype(np.uint64)
+    held = np.zeros(len(image), dtype=np.uint64)
+    np.maximum.at(held, target, key)
+    source = (held & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
+    found = np.flatnonzero(source >= 0)
+    image[found] = light[standing[source[found]]]
+    return image
+
+
+def blurred(image: Floats, height: int, width: int) -> Floats:
+    """The same in a rough surface: drawn out up and down, a little sideways."""
+    tall = max(3, round(height / 24)) | 1
+    wide = max(1, round(width / 160)) | 1
+    picture = cv2.blur(image.reshape(height, width, 3), (wide, tall))
+    picture = cv2.blur(picture, (1, tall))
+    found: Floats = np.asarray(picture, dtype=np.float32).reshape(-1, 3)
+    return found
+
+
+def reflectance(cosine: Floats) -> Floats:
+    """Of water, by the cosine of the angle to the upright (Schlick 1994)."""
+    found: Floats = np.float32(WATER) + np.float32(1.0 - WATER) * (np.float32(1.0) - cosine) ** 5
+    return found
+
+
+def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) -> Floats:
+    """How smooth the water lies at places in the world [m], in [0, 1]: a film on a moist road, puddles on a wet one."""
+    size = table.shape[0]
+    noise = table[np.mod(y * 2.0, size).astype(np.intp), np.mod(x * 2.0, size).astype(np.intp)]
+    film = np.float32(0.25 * min(2.0 * wetness, 1.0))
+    pool = np.clip((noise + np.float32(2.6 * wetness - 1.6)) * np.float32(1.5), np.float32(0.0), np.float32(1.0))
+    found: Floats = film + (np.float32(1.0) - film) * pool
+    return found
