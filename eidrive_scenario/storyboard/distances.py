@@ -6,7 +6,7 @@ import math
 
 from eidrive_scenario.geometry import footprint_distance
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import LaneLocation, Pose
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
 
@@ -90,9 +90,10 @@ def _offsets(stage: Stage, a: str, b: str | Place, frame: str) -> tuple[float, f
 def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value: float) -> float:
     """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
     axis = _axis(stage, a, frame)
-    mine = _reach(stage, a, axis, kind)
+    mine = _reach(stage, a, axis, frame, kind)
     if isinstance(b, str):
-        theirs = _reach(stage, b, axis if frame in ("entity", "world") else _axis(stage, b, frame, like=axis), kind)
+        like = axis if frame in ("entity", "world") else _axis(stage, b, frame, like=axis)
+        theirs = _reach(stage, b, like, frame, kind)
     else:
         theirs = (0.0, 0.0)
     if value + theirs[0] > mine[1]:
@@ -117,8 +118,12 @@ def _axis(stage: Stage, name: str, frame: str, like: float | None = None) -> flo
     return heading
 
 
-def _reach(stage: Stage, name: str, axis: float, kind: str) -> tuple[float, float]:
-    """How far the box of an actor reaches from its reference point along an axis: least and most [m]."""
+def _reach(stage: Stage, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
+    """How far the box of an actor reaches from its reference point along an axis or the road: least and most [m]."""
+    if frame in ("lane", "road") and stage.roads is not None:
+        here = stage.location(name)
+        if here is not None and stage.roads.curvature(here.road, here.s) != 0.0:
+            return _reach_along(stage, stage.roads, name, here, axis, kind)
     bounds = stage.actors[name].entity.bounding_box
     turn = stage.pose(name).h - axis
     cos, sin = math.cos(turn), math.sin(turn)
@@ -129,6 +134,23 @@ def _reach(stage: Stage, name: str, axis: float, kind: str) -> tuple[float, floa
     else:
         centre, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
     return centre - half, centre + half
+
+
+def _reach_along(
+    stage: Stage, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
+) -> tuple[float, float]:
+    """The reach along a road that bends: from corner to corner of the box in road coordinates."""
+    x, y, _, length, width, _, yaw = box_of(stage, name)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
+    reached = []
+    for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
+        dx, dy = along * length, across * width
+        corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
+        found = None if corner is None else roads.distance(here, corner)
+        if found is not None:
+            reached.append(sign * found[0 if kind == "longitudinal" else 1])
+    return min(reached, default=0.0), max(reached, default=0.0)
 
 
 def _pose(stage: Stage, target: str | Place) -> Pose:

@@ -34,11 +34,13 @@ class Steering(NamedTuple):
     offset   left of the lane's driving direction positive
     heading  angle to the lane's direction after the step [rad]; None follows from the motion
     slows    True: the way sideways is part of the distance that the speed covers
+    way      distance of the step [m], where it is that of the speed at which the offset was chosen
     """
 
     offset: float
     heading: float | None = None
     slows: bool = True
+    way: float | None = None
 
 
 class Motion:
@@ -158,6 +160,8 @@ class Motion:
         if steering is not None:
             left = steering.offset - here.offset * way
             here = here._replace(offset=steering.offset * way, t=here.t + left * way)
+            if steering.way is not None:
+                distance = math.copysign(steering.way, distance)
             if steering.slows:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         if distance != 0.0:

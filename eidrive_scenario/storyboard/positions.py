@@ -200,8 +200,8 @@ def _in_road(
     if lane is not None:
         here = roads.location(road, lane, s, t - roads.location(road, lane, s).t)
     surface = roads.road_pose_at(road, s, t)
-    base = surface if roads.driving_direction(road, here.lane) > 0 else surface.turned(math.pi)
-    return Place(_oriented(orientation, base), here)
+    along = orientation is not None or roads.driving_direction(road, here.lane) > 0
+    return Place(_oriented(orientation, surface if along else surface.turned(math.pi)), here)
 
 
 def _oriented(orientation: model.Orientation | None, base: Pose) -> Pose:

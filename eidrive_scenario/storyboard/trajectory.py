@@ -8,12 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 
 SPACING = 0.1
 """Distance between the points at which curved shapes are laid out [m]."""
+ROUNDING = 2.0
+"""How far from a corner of a polyline the heading begins to turn [m]."""
 
 Resolve = Callable[[model.Position], Pose]
 
@@ -23,9 +27,9 @@ class Layout:
     """A trajectory as points with headings, by arc length.
 
     s         arc length of each point [m];  poses  of each point
-    times     at which each point is passed [s], None for a trajectory without times
-    straight  True where the points are corners: between two of them the heading is that of the line, unless given
+    times     at which the stations are passed [s], None for a trajectory without times
     given     True where the file gives headings
+    stations  arc length of the points that have times [m]; empty: all have
     """
 
     s: tuple[float, ...]
@@ -33,6 +37,12 @@ class Layout:
     times: tuple[float, ...] | None
     closed: bool = False
     given: bool = False
+    stations: tuple[float, ...] = ()
+
+    @property
+    def timed(self) -> tuple[float, ...]:
+        """Arc length at each of the times [m]."""
+        return self.stations or self.s
 
     @property
     def length(self) -> float:
@@ -51,27 +61,28 @@ class Layout:
 
     def at(self, s: float) -> Pose:
         """The pose at arc length s; beyond the ends that of the end, on a closed one further round."""
-        if self.closed and self.length > 0.0:
+        if self.closed and s > self.length > 0.0:
             s %= self.length
         index, share = self._between(self.s, s)
-        return self._blend(index, share)
+        return _blend(self.poses[index], self.poses[index + 1], share)
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
         """Arc length at a time [m]: between two points at constant speed, or as the `speeds` at the points ask."""
         if self.times is None:
             return 0.0
         index, share = self._between(self.times, time)
-        way = self.s[index + 1] - self.s[index]
+        s = self.timed
+        way = s[index + 1] - s[index]
         if speeds is None:
-            return self.s[index] + share * way
+            return s[index] + share * way
         span = self.times[index + 1] - self.times[index]
-        return self.s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
+        return s[index] + share * (speeds[index] * span * (1.0 - share) + share * way)
 
     def time_at(self, s: float) -> float:
         """The time at an arc length [s]; 0 without times."""
         if self.times is None:
             return 0.0
-        index, share = self._between(self.s, s)
+        index, share = self._between(self.timed, s)
         return self.times[index] + share * (self.times[index + 1] - self.times[index])
 
     def speeds_from(self, start: float) -> tuple[float, ...]:
@@ -81,26 +92,13 @@ class Layout:
         """
         assert self.times is not None
         speeds, speed = [], start
-        for index in range(len(self.s) - 1):
-            span, way = self.times[index + 1] - self.times[index], self.s[index + 1] - self.s[index]
+        for span, way in zip(map(_gap, pairwise(self.times)), map(_gap, pairwise(self.timed)), strict=True):
             mean = way / span if span > 0.0 else speed
             if 2.0 * mean - speed < -1e-6:
                 speed = mean
             speeds.append(speed)
             speed = 2.0 * mean - speed
         return (*speeds, speed)
-
-    def _blend(self, index: int, share: float) -> Pose:
-        a, b = self.poses[index], self.poses[index + 1]
-        turn = wrap_angle(b.h - a.h)
-        return Pose(
-            a.x + share * (b.x - a.x),
-            a.y + share * (b.y - a.y),
-            a.z + share * (b.z - a.z),
-            a.h + share * turn,
-            a.p + share * wrap_angle(b.p - a.p),
-            a.r + share * wrap_angle(b.r - a.r),
-        )
 
     @staticmethod
     def _between(grid: Sequence[float], value: float) -> tuple[int, float]:
@@ -131,25 +129,35 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
     if closed and math.hypot(corners[0].x - corners[-1].x, corners[0].y - corners[-1].y) > 1e-3:
         corners.append(corners[0])
         times.append(None)
-    given = any(has_heading(vertex.position) for vertex in shape.vertex)
-    s, poses, clock = [0.0], [], []
-    for index, corner in enumerate(corners[:-1]):
-        after = corners[index + 1]
-        span = math.hypot(after.x - corner.x, after.y - corner.y)
-        if given:
-            poses.append(corner)
-        else:
-            # two points per line, so that the heading changes at the corner and not along the line
-            line = math.atan2(after.y - corner.y, after.x - corner.x) if span > 0.0 else corner.h
-            poses += [corner._replace(h=line), after._replace(h=line)]
-        s += [s[-1] + span] if given else [s[-1] + span, s[-1] + span]
-    if given:
-        poses.append(corners[-1])
-        clock = times
-    else:
-        s = s[:-1]
-        clock = [times[0], *[time for time in times[1:-1] for _ in range(2)], times[-1]]
-    return Layout(tuple(s), tuple(poses), _times(clock), closed, given)
+    clock = _times(times)
+    if any(has_heading(vertex.position) for vertex in shape.vertex):
+        s = [0.0]
+        for a, b in pairwise(corners):
+            s.append(s[-1] + math.hypot(b.x - a.x, b.y - a.y))
+        return Layout(tuple(s), tuple(corners), clock, closed, given=True)
+    return _along_corners(corners, clock, closed)
+
+
+def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> Layout:
+    """A polyline whose heading is that of its lines, and turns evenly within ROUNDING of a corner or half the line."""
+    spans = [math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(corners)]
+    lines = [
+        math.atan2(b.y - a.y, b.x - a.x) if span > 0.0 else a.h
+        for (a, b), span in zip(pairwise(corners), spans, strict=True)
+    ]
+    around = wrap_angle(lines[0] - lines[-1]) if closed else 0.0
+    turns = [around, *(wrap_angle(b - a) for a, b in pairwise(lines)), around]
+    s, poses, stations = [0.0], [corners[0]._replace(h=lines[0] - 0.5 * turns[0])], [0.0]
+    for index, ((a, b), span, line) in enumerate(zip(pairwise(corners), spans, lines, strict=True)):
+        inset = min(ROUNDING / span, 0.5) if span > 0.0 else 0.5
+        if index > 0:
+            s.append(stations[-1])
+            poses.append(a._replace(h=line - 0.5 * turns[index]))
+        for share, turn in ((inset, 0.0), (1.0 - inset, 0.0), (1.0, 0.5 * turns[index + 1])):
+            s.append(stations[-1] + share * span)
+            poses.append(_blend(a, b, share)._replace(h=line + turn))
+        stations.append(stations[-1] + span)
+    return Layout(tuple(s), tuple(poses), times, closed, stations=tuple(stations))
 
 
 def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
@@ -201,7 +209,11 @@ def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list
 
 
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
-    """Points of a rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4)."""
+    """Points of a rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4).
+
+    The time of a control point holds where its basis function is largest (of as many even steps of the parameter as
+    the control polygon has metres, the last one before that); between, the parameter grows evenly with time.
+    """
     knots = [knot.value for knot in shape.knot]
     control = [(resolve(p.position), p.weight if p.weight is not None else 1.0, p.time) for p in shape.control_point]
     degree = shape.order - 1
@@ -210,7 +222,7 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     count = max(2, math.ceil(rough / SPACING))
     s: list[float] = [0.0]
     points: list[tuple[float, float, float]] = []
-    clock: list[float] = []
+    peaks = [(0.0, 0)] * len(control)
     for number in range(count + 1):
         u = low + (high - low) * number / count
         weights = _basis(u, degree, knots, len(control))
@@ -220,13 +232,20 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
         if points:
             s.append(s[-1] + math.hypot(x - points[-1][0], y - points[-1][1]))
         points.append((x, y, z))
-        if all(entry[2] is not None for entry in control):
-            clock.append(sum(r * (entry[2] or 0.0) for r, entry in zip(rational, control, strict=True)))
+        for index, share in enumerate(weights):
+            if share > peaks[index][0]:
+                peaks[index] = (share, number)
     poses = []
     for number, (x, y, z) in enumerate(points):
         a, b = points[max(0, number - 1)], points[min(count, number + 1)]
         poses.append(Pose(x, y, z, math.atan2(b[1] - a[1], b[0] - a[0]), 0.0, 0.0))
-    return Layout(tuple(s), tuple(poses), tuple(clock) if clock else None, closed)
+    given = _times([time for _, _, time in control])
+    if given is None:
+        return Layout(tuple(s), tuple(poses), None, closed)
+    metres = 1 + int(rough)
+    stations = [math.floor((number + 1) / count * metres) / metres * count for _, number in peaks]
+    clock = np.interp(np.arange(count + 1), stations, given)
+    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed)
 
 
 def _basis(u: float, degree: int, knots: Sequence[float], count: int) -> list[float]:
@@ -250,6 +269,22 @@ def has_heading(position: model.Position) -> bool:
         return frame.h is not None
     orientation = getattr(frame, "orientation", None)
     return orientation is not None and orientation.h is not None
+
+
+def _blend(a: Pose, b: Pose, share: float) -> Pose:
+    """Between two poses, angles the short way round."""
+    return Pose(
+        a.x + share * (b.x - a.x),
+        a.y + share * (b.y - a.y),
+        a.z + share * (b.z - a.z),
+        a.h + share * wrap_angle(b.h - a.h),
+        a.p + share * wrap_angle(b.p - a.p),
+        a.r + share * wrap_angle(b.r - a.r),
+    )
+
+
+def _gap(ends: tuple[float, float]) -> float:
+    return ends[1] - ends[0]
 
 
 def _even(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:

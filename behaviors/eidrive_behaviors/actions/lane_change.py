@@ -98,7 +98,7 @@ class LaneChangeAction(ActionBehaviour):
             wanted = self._offset + math.copysign(way, wanted - self._offset)
         self._offset = wanted
         arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
-        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None))
+        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way))
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def _next(self, way: float) -> float:
