@@ -22,6 +22,12 @@ MOST_POINTS = 300
 """In the search for the heading; the extent counts all."""
 RANGE_NOISE = 0.03
 """Of the points on a surface, standard deviation [m]."""
+SHAPELESS = 0.4
+"""Points within so small a rectangle have no heading of their own [m]."""
+FEW_COLUMNS = 1.6
+"""A rectangle of fewer gaps between columns of rays has one that is worse than that of the lane."""
+HEADING_DEVIATION = 0.4
+"""Of a heading that is a guess [rad]."""
 ABOVE_TOP = 0.3
 """A sensor this much above an object sees its top [m]."""
 
@@ -96,21 +102,29 @@ def fit_box(
     pattern: Pattern,
     classes: Sequence[str],
     hidden: tuple[bool, bool] = (False, False),
+    heading: float | None = None,
 ) -> Fit:
     """The box of the likeliest of `classes` around points (N, 3) of a level frame, the sensor above its origin.
 
     ground   height of the ground below the object [m]; the box stands on it
     hidden   whether something nearer ends the object's points at its left and its right end, as the sensor sees it
+    heading  of its length, where it is known; taken if the points lie so close together that they show none [rad]
 
     Extents that the points show are believed as far as the gaps between the rays allow; sides that face away or are
     hidden are completed to the usual size of the class, towards the end that is not seen. The axis of the length
     follows from the fit; its direction leads away from the sensor, as points do not tell front from back.
     """
     shape = rectangle(points[:, :2])
+    x, y = points[:, :2].mean(axis=0).tolist()
+    widest = max(shape.high[0] - shape.low[0], shape.high[1] - shape.low[1])
+    shapeless = widest < SHAPELESS
+    if heading is not None and widest < max(SHAPELESS, FEW_COLUMNS * pattern.azimuth * math.hypot(x, y)):
+        shape = bounds(points[:, :2], heading)
+    elif shapeless:
+        shape = bounds(points[:, :2], math.atan2(y, x))
     top = float(points[:, 2].max()) - ground
     spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden)
-    reach = math.hypot(*points[:, :2].mean(axis=0).tolist())
-    highest = _highest(points, sensor_height, reach, top, ground, pattern)
+    highest = _highest(points, sensor_height, top, ground, pattern)
     cost, name, lengthwise = min(
         (_cost(prior_of(name), spans, lengthwise, top, highest), name, lengthwise)
         for name in classes
@@ -123,6 +137,9 @@ def fit_box(
         sizes[place], middles[axis], variances[axis] = _completed(
             spans[axis], prior.mean[place], prior.deviation[place]
         )
+    if shapeless:
+        turned = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
+        variances = [variance + turned for variance in variances]
     cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
     x, y = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
     yaw = shape.yaw + lengthwise * math.pi / 2.0
@@ -188,9 +205,7 @@ def _hidden_ends(
     return at_low, at_high
 
 
-def _highest(
-    points: Array, sensor_height: float, distance: float, top: float, ground: float, pattern: Pattern
-) -> float:
+def _highest(points: Array, sensor_height: float, top: float, ground: float, pattern: Pattern) -> float:
     """How high above the ground the object may reach, by the next ring over its highest point [m]."""
     row = int(np.argmax(points[:, 2]))
     reach = math.hypot(float(points[row, 0]), float(points[row, 1]))

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import iou_bev, wrap_angle
-from eidrive_scenario.perception.box_fit import Fit, fit_box
+from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.perception.box_fit import Fit
 from eidrive_scenario.perception.clustering import Integers, clusters
 from eidrive_scenario.perception.detector import Detector, Installation
-from eidrive_scenario.perception.ground import CLEARANCE, ground_height
 from eidrive_scenario.perception.lidar_geometry import (
     LevelFrame,
     Pattern,
     pattern_from_points,
     pattern_from_settings,
 )
-from eidrive_scenario.perception.size_priors import LARGEST, PRIORS
+from eidrive_scenario.perception.scan import Scan
+from eidrive_scenario.perception.size_priors import PRIORS
 from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
@@ -30,10 +30,8 @@ from eidrive_scenario.settings import Settings
 
 Array = NDArray[np.float64]
 
-NEARER = 0.5
-"""What ends this much before an object, beside it as the sensor sees it, hides a part of it [m]."""
-BESIDE = 1.6
-"""How many columns of rays beside its outermost point are looked at for that."""
+FEW = 12
+"""A cluster of so few points may show no heading; then that of its lane is looked up."""
 HALF_SURE = 5.0
 """Points at which the score reaches half of what it can be."""
 UNLIKELY = 30.0
@@ -89,7 +87,7 @@ class LidarDetector(Detector):
         if not fits:
             return Detections(readings.time)
         boxes = np.concatenate([frame.boxes_to_world(np.array([fit.box])) for fit, _, frame in fits])
-        boxes[:, 6] = self._facing(boxes)
+        boxes[:, 6] = self._surroundings.facing(boxes)
         detections = Detections(
             readings.time,
             boxes,
@@ -101,80 +99,36 @@ class LidarDetector(Detector):
         return detections if len(readings.lidars) < 2 else _without_doubles(detections)
 
     def _in_sweep(self, reading: LidarReading, pattern: Pattern, foot: float) -> list[tuple[Fit, float, LevelFrame]]:
-        frame = LevelFrame.of(reading.pose)
-        points = frame.points(reading)
-        ground = ground_height(points, foot)
-        above = points[:, 2] - ground
-        standing = (above > CLEARANCE) & (above < LARGEST[2] + 0.5)
-        if self.settings.off_road is not None and self._surroundings.has_map:
-            standing[standing] = self._surroundings.near_road(frame.to_world(points[standing, :2]))
-        scan = _Scan(points[standing], ground[standing], frame.height, pattern)
+        restricted = self.settings.off_road is not None and self._surroundings.has_map
+        scan = Scan(reading, pattern, foot, self._surroundings.near_road if restricted else None)
         found = []
         for rows in clusters(scan.points, pattern.azimuth):
             for fit, count in self._fits(scan, rows):
                 score = count / (count + HALF_SURE) * math.exp(-fit.deviation / UNLIKELY)
                 if fit.deviation <= UNLIKELY and score >= self.settings.least_score:
-                    found.append((fit, score, frame))
+                    found.append((fit, score, scan.frame))
         return found
 
-    def _fits(self, scan: _Scan, rows: Integers) -> list[tuple[Fit, int]]:
+    def _fits(self, scan: Scan, rows: Integers) -> list[tuple[Fit, int]]:
         """The objects in a cluster with their points: one, or several where that fits better."""
         if len(rows) < self.settings.least_points:
             return []
-        whole = scan.fit(rows)
+        whole = self._fit(scan, rows)
         if whole is not None and whole.deviation <= DOUBTFUL:
             return [(whole, len(rows))]
         parts = clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)
         if len(parts) > 1:
-            fits = [(scan.fit(rows[part]), len(part)) for part in parts if len(part) >= self.settings.least_points]
+            own = [rows[part] for part in parts if len(part) >= self.settings.least_points]
+            fits = [(self._fit(scan, part), len(part)) for part in own]
             good = [(fit, count) for fit, count in fits if fit is not None and fit.deviation <= DOUBTFUL]
             if good:
                 return good
         return [(whole, len(rows))] if whole is not None else []
 
-    def _facing(self, boxes: Array) -> Array:
-        """The headings of boxes, turned about where their lane leads the other way."""
-        lane = self._surroundings.lane_heading(boxes[:, :2])
-        against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
-        turned: Array = np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
-        return turned
-
-
-class _Scan:
-    """What stands on the ground in one sweep."""
-
-    def __init__(self, points: Array, ground: Array, sensor_height: float, pattern: Pattern) -> None:
-        self.points = points
-        self.pattern = pattern
-        self._ground = ground
-        self._sensor_height = sensor_height
-        self._bearing = np.arctan2(points[:, 1], points[:, 0])
-        self._distance = np.hypot(points[:, 0], points[:, 1])
-
-    def fit(self, rows: Integers) -> Fit | None:
-        """The box around these points, None where no road user is so large."""
-        points = self.points[rows]
-        if math.hypot(*np.ptp(points[:, :2], axis=0).tolist()) > math.hypot(LARGEST[0], LARGEST[1]):
-            return None
-        return fit_box(
-            points,
-            sensor_height=self._sensor_height,
-            ground=float(np.median(self._ground[rows])),
-            pattern=self.pattern,
-            classes=tuple(PRIORS),
-            hidden=self._hidden(rows),
-        )
-
-    def _hidden(self, rows: Integers) -> tuple[bool, bool]:
-        """Whether something nearer stands right beside the left and the right end of these points."""
-        turned = wrap_angle(self._bearing - float(self._bearing[rows[len(rows) // 2]]))
-        own = turned[rows]
-        flags = []
-        for end, sign in ((int(rows[np.argmax(own)]), 1.0), (int(rows[np.argmin(own)]), -1.0)):
-            past = sign * (turned - turned[end])
-            beside = (past > 1e-9) & (past <= BESIDE * self.pattern.azimuth)
-            flags.append(bool(np.any(self._distance[beside] < self._distance[end] - NEARER)))
-        return flags[0], flags[1]
+    def _fit(self, scan: Scan, rows: Integers) -> Fit | None:
+        middle = scan.frame.to_world(scan.points[rows, :2].mean(axis=0)[None])
+        lane = float(self._surroundings.lane_heading(middle)[0]) if len(rows) < FEW else math.nan
+        return scan.fit(rows, tuple(PRIORS), lane - scan.frame.yaw if math.isfinite(lane) else None)
 
 
 def _without_doubles(detections: Detections) -> Detections:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 
 Array = NDArray[np.float64]
@@ -66,16 +67,24 @@ class Surroundings:
         return near
 
     def lane_heading(self, plan: Array) -> Array:
-        """(N,) direction in which traffic drives at points (N, 2) [rad], NaN off the roads."""
+        """(N,) direction in which traffic drives at points (N, 2) [rad], NaN off the roads and in junctions."""
         headings = np.full(len(plan), np.nan)
         if self._roads is None or not len(plan):
             return headings
         found = self._roads.locate(plan[:, 0], plan[:, 1])
         for row in np.flatnonzero((found.road >= 0) & (found.outside <= 0.0) & (found.lane != 0)).tolist():
             road, lane = found.roads[int(found.road[row])], int(found.lane[row])
+            if self._roads.roads[road].junction_id is not None:
+                continue
             against = self._roads.driving_direction(road, lane) < 0
             headings[row] = float(found.heading[row]) + (np.pi if against else 0.0)
         return headings
+
+    def facing(self, boxes: Array) -> Array:
+        """(N,) headings of boxes (N, 7), turned about where their lane clearly leads the other way [rad]."""
+        lane = self.lane_heading(boxes[:, :2])
+        against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
+        return np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
 
     def ground(self, plan: Array, otherwise: float) -> Array:
         """(N,) height of the road below points (N, 2); `otherwise` off the roads and without a map [m]."""
