@@ -28,15 +28,15 @@ from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.specs import actor_spec
+from eidrive_scenario.world.weather import Weather, load_weather
+from eidrive_scenario.world.weather_of import weather_of
 
 PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
 """Exit codes of a run."""
-
-LEAST_FRICTION = 1e-3
-"""The standard allows a road without any friction; tyres need a little."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ class RunSettings:
     parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
     dt              step [s]
     time_limit      [s] of simulated time, for files that do not end by themselves
+    weather         preset or file; it wins over all that the file says of weather and road
     user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
     """
 
@@ -58,7 +59,7 @@ class RunSettings:
     parameters: Mapping[str, str | Assignment] = field(default_factory=dict)
     dt: float = 0.05
     time_limit: float = 120.0
-    weather: str | None = None
+    weather: str | Path | None = None
     user_values: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -83,6 +84,8 @@ class RunResult:
     """Of the scenario as a whole, with the values that counted."""
     run: int | None = None
     """Its number among the runs of a parameter value distribution, from 0 on."""
+    links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
+    """The books of the radio, by (sender, receiver)."""
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -106,6 +109,10 @@ class RunResult:
                 for verdict in self.criteria
             ],
             "metrics": dict(self.metrics),
+            "links": [
+                {"sender": sender, "receiver": receiver, **book.as_json()}
+                for (sender, receiver), book in self.links.items()
+            ],
             "trace_hash": self.trace_hash,
             "simulated_s": self.simulated_s,
             "wall_s": self.wall_s,
@@ -157,8 +164,14 @@ class Simulation:
             )
         with together:
             self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
+        self._weather: Weather | None = None
+        with together:
+            if self.settings.weather is not None:
+                self._weather = load_weather(self.settings.weather, origin="--weather")
         together.settle()
         self.world = World(self.roads, dt=self.settings.dt)
+        if self._weather is not None:
+            self.world.set_weather(self._weather)
         self._observers = tuple(observers)
         self._trace = TraceHash()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario))]
@@ -250,7 +263,8 @@ class Simulation:
         self.stations.goals = commands.goals
         if commands.environment is not None:
             self._environment = commands.environment
-            self.world.set_friction(max(commands.environment.friction, LEAST_FRICTION))
+            if self._weather is None:
+                self.world.set_weather(weather_of(commands.environment, self.world.time))
         for command in commands.custom:
             self._command(command)
 
@@ -311,6 +325,7 @@ class Simulation:
             wall_s=wall_s,
             warnings=tuple(dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings)])),
             parameters=dict(self.scenario.parameters),
+            links=dict(self.stations.link_statistics(frame.view.time)),
         )
 
 

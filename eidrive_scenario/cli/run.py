@@ -28,6 +28,9 @@ def run(
         typer.Option(help="Channel profile, by name or file; none: no cooperation.", show_default="the file's"),
     ] = None,
     detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default="the file's")] = None,
+    weather: Annotated[
+        str | None, typer.Option(help="Weather preset, by name or file.", show_default="the file's")
+    ] = None,
     cooperate: Annotated[
         str | None, typer.Option(metavar="A,B|none", help="The senders that are heard.", show_default="the file's")
     ] = None,
@@ -69,6 +72,7 @@ def run(
         channel=channel,
         detector=detector,
         cooperate=_senders(cooperate),
+        weather=weather,
         parameters=parameters,
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),

@@ -16,6 +16,7 @@ class Names(StrEnum):
 
     scenarios = "scenarios"
     channels = "channels"
+    weather = "weather"
     detectors = "detectors"
     criteria = "criteria"
     actions = "actions"
@@ -32,6 +33,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = library.scenarios()
     elif what is Names.channels:
         lines = [*library.names("channels"), "none"]
+    elif what is Names.weather:
+        lines = library.names("weather")
     elif what is Names.checks:
         from eidrive_scenario.experiments.rules import ALL_RULES
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -39,7 +40,8 @@ class Weather(Settings):
 
     sun_azimuth    0 is north (y), 90 east (x) [degrees]
     sun_elevation  above the horizon, negative at night [degrees]
-    sun_illuminance  direct light of the sun across its rays [lx]; None is what a sun of this height gives
+    sun_illuminance  direct light of the sun across its rays [lx]; None is what a sun of this height gives, times
+    sun_share      which dims it
     cloud_cover    share of the sky
     visual_range   Koschmieder's, of the air without precipitation [m]; fog below 1000
     precipitation, precipitation_intensity  what falls, and how much water [mm/h]
@@ -55,6 +57,7 @@ class Weather(Settings):
     sun_azimuth: float = 130.0
     sun_elevation: float = Field(default=55.0, ge=-90.0, le=90.0)
     sun_illuminance: NonNegativeFloat | None = None
+    sun_share: Share = 1.0
     cloud_cover: Share = 0.1
     visual_range: PositiveFloat = 30_000.0
     precipitation: Literal["none", "rain", "snow"] = "none"
@@ -114,9 +117,15 @@ class Weather(Settings):
         return self.sun_elevation < DARK or EXTINCTION_AT_RANGE / self.extinction < 1500.0
 
 
-def load_weather(source: str | Path) -> Weather:
-    """A preset of the library by name, or a YAML file. Raises SettingError with the file and line of each mistake."""
-    path = resolve("weather", source)
+def load_weather(source: str | Path, *, origin: str = "") -> Weather:
+    """A preset of the library by name, or a YAML file; `origin` says where the name was given, such as an option.
+
+    Raises SettingError with the file and line of each mistake, or with `origin` where there is no such file.
+    """
+    try:
+        path = resolve("weather", source)
+    except SettingError as error:
+        raise SettingError([replace(problem, source=origin) for problem in error.problems]) from error
     data, lines = load_yaml_file(path)
     if not isinstance(data, Mapping):
         found: Any = "nothing" if data is None else data

@@ -56,7 +56,7 @@ def daylight(weather: Weather) -> Daylight:
     cover = weather.cloud_cover
     warm = _sunlight_colour(weather.sun_elevation)
     if height > 0.0:
-        beam = 127_500.0 * math.exp(-0.21 / max(height, 1e-3))
+        beam = 127_500.0 * math.exp(-0.21 / max(height, 1e-3)) * weather.sun_share
         if weather.sun_illuminance is not None:
             beam = weather.sun_illuminance
         clear_sky = 800.0 + 15_500.0 * math.sqrt(height)

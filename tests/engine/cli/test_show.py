@@ -33,6 +33,7 @@ def test_version(eidrive: Eidrive) -> None:
     [
         ("scenarios", "coop/scenario_1"),
         ("channels", "none"),
+        ("weather", "foggy_morning"),
         ("criteria", "min_distance"),
         ("detectors", "oracle"),
         ("actions", "SpeedAction"),

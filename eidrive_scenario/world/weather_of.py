@@ -1,0 +1,93 @@
+"""From what a scenario says of time of day, weather and road to the weather of the world."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+from typing import Any
+
+from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.weather import Weather
+
+LATITUDE = 48.0
+"""Where the sun's height is reckoned from a time of day alone [degrees]; the clock then shows the sun's time."""
+LEAST_FRICTION = 1e-3
+"""The standard allows a road without any friction; tyres need a little."""
+HEAVY_RAIN = 50.0
+"""What a share of 1 means in files of OpenSCENARIO 1.0, whose precipitation has no unit [mm/h]."""
+FULL_SUN = 1.0
+"""An intensity of the sun up to this is a share of what a sun of its height gives, as many files have it; what is
+greater is in lux, as the standard says."""
+WET_BY_RAIN = 0.5
+"""Wetness of a road on which it rains, where the scenario does not say it."""
+
+_WETNESS = {"dry": 0.0, "moist": 0.25, "wetWithPuddles": 0.5, "lowFlooded": 0.75, "highFlooded": 1.0}
+_CLOUDS = {"free": 0.0, "cloudy": 0.5, "overcast": 1.0, "rainy": 1.0, "skyOff": 0.0} | {
+    f"{word}Oktas": min(eighths, 8) / 8
+    for eighths, word in enumerate(("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"))
+}
+
+
+def weather_of(environment: Environment, time: float = 0.0) -> Weather:
+    """The weather at a time of the run [s]; what the environment does not say is as in a `Weather` without settings.
+
+    Angles of the sun and of the wind are taken as the standard has them: the sun's azimuth from north (y) over east
+    (x), the wind's direction from x over y.
+    """
+    said: dict[str, Any] = {
+        "name": environment.name,
+        "friction": min(max(environment.friction, LEAST_FRICTION), 2.0),
+        "wind_direction": _degrees(environment.wind_direction),
+        "wind_speed": environment.wind_speed,
+        "visual_range": max(environment.fog_range, 1.0) if environment.fog_range is not None else None,
+        "cloud_cover": _CLOUDS.get(environment.clouds or ""),
+        "wetness": _WETNESS.get(environment.wetness or ""),
+    }
+    said |= _sun(environment, time)
+    amount = environment.precipitation_intensity
+    if amount is None and environment.precipitation_share is not None:
+        amount = HEAVY_RAIN * environment.precipitation_share
+    if environment.precipitation in ("rain", "snow") and amount:
+        said |= {"precipitation": environment.precipitation, "precipitation_intensity": min(amount, 500.0)}
+        if said["wetness"] is None and environment.precipitation == "rain":
+            said["wetness"] = WET_BY_RAIN
+    return Weather(**{key: value for key, value in said.items() if value is not None})
+
+
+def solar_position(moment: datetime, latitude: float = LATITUDE) -> tuple[float, float]:
+    """Azimuth from north over east and elevation of the sun [degrees] at the sun's own time of a place.
+
+    Declination by Cooper, The absorption of radiation in solar stills (1969): right to half a degree.
+    """
+    declination = math.radians(23.45) * math.sin(2.0 * math.pi * (284 + moment.timetuple().tm_yday) / 365.0)
+    hours = moment.hour + moment.minute / 60.0 + moment.second / 3600.0
+    turn = math.radians(15.0 * (hours - 12.0))
+    here = math.radians(latitude)
+    up = math.sin(here) * math.sin(declination) + math.cos(here) * math.cos(declination) * math.cos(turn)
+    east = -math.cos(declination) * math.sin(turn)
+    north = math.cos(here) * math.sin(declination) - math.sin(here) * math.cos(declination) * math.cos(turn)
+    return math.degrees(math.atan2(east, north)) % 360.0, math.degrees(math.asin(max(-1.0, min(1.0, up))))
+
+
+def _sun(environment: Environment, time: float) -> dict[str, float]:
+    elevation = environment.sun_elevation
+    if elevation is None:
+        moment = environment.clock(time)
+        if moment is None:
+            return {}
+        azimuth, height = solar_position(moment)
+        return {"sun_azimuth": azimuth, "sun_elevation": height}
+    height = math.degrees(math.remainder(elevation, 2.0 * math.pi))
+    if abs(height) > 90.0:
+        height = math.copysign(180.0 - abs(height), height)
+    found = {"sun_azimuth": math.degrees(environment.sun_azimuth or 0.0), "sun_elevation": height}
+    given = environment.illuminance
+    if given is not None and given > FULL_SUN:
+        found["sun_illuminance"] = given
+    elif given is not None:
+        found["sun_share"] = max(given, 0.0)
+    return found
+
+
+def _degrees(angle: float | None) -> float | None:
+    return math.degrees(angle) if angle is not None else None

@@ -1,0 +1,147 @@
+"""Weather: settings, presets, what follows for air and road, and what an Environment becomes."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.library import names
+from eidrive_scenario.world import World
+from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.weather import Weather, load_weather
+from eidrive_scenario.world.weather_of import solar_position, weather_of
+
+
+def test_presets_are_what_their_names_say() -> None:
+    assert names("weather") == ["foggy_morning", "midnight", "storm", "sunny"]
+    sunny, midnight = load_weather("sunny"), load_weather("midnight")
+    storm, fog = load_weather("storm"), load_weather("foggy_morning")
+    assert sunny.sun_elevation > 45 > 0 > midnight.sun_elevation
+    assert (sunny.lamps_on, midnight.lamps_on, fog.lamps_on) == (False, True, True)
+    assert storm.precipitation == "rain"
+    assert storm.friction_scale < fog.friction_scale < sunny.friction_scale == 1.0
+    assert fog.visual_range < 200
+    assert 0 < fog.sun_elevation < 15
+
+
+def test_koschmieder() -> None:
+    """Along the visual range, 2 % of the contrast is left."""
+    fog = Weather(visual_range=80.0)
+    assert math.exp(-fog.extinction * 80.0) == pytest.approx(0.02)
+    assert fog.fog_extinction == pytest.approx(3.912 / 80.0, rel=1e-4)
+
+
+def test_rain_and_snow_attenuate_as_itu_r_p_1814_has_it() -> None:
+    """25 mm/h of rain: 1.076 · 25^0.67 = 9.30 dB/km; 2 mm/h of dry snow: 5.5253 · 2^1.38 = 14.38 dB/km."""
+    rain = Weather(precipitation="rain", precipitation_intensity=25.0)
+    assert rain.precipitation_extinction == pytest.approx(9.30 * math.log(10) / 10 / 1000, rel=1e-3)
+    snow = Weather(precipitation="snow", precipitation_intensity=2.0)
+    assert snow.precipitation_extinction == pytest.approx(14.38 * math.log(10) / 10 / 1000, rel=1e-3)
+
+
+def test_grip() -> None:
+    assert Weather().friction_scale == 1.0
+    assert Weather(wetness=1.0).friction_scale == pytest.approx(0.59)
+    assert Weather(wetness=1.0, friction=0.9).friction_scale == 0.9
+    assert Weather(precipitation="snow", precipitation_intensity=1.0).friction_scale == pytest.approx(0.235)
+
+
+def test_the_sun_stands_where_the_settings_say() -> None:
+    assert Weather(sun_azimuth=0.0, sun_elevation=0.0).sun_direction == pytest.approx((0.0, 1.0, 0.0))
+    assert Weather(sun_azimuth=90.0, sun_elevation=30.0).sun_direction == pytest.approx(
+        (math.cos(math.pi / 6), 0.0, 0.5)
+    )
+
+
+def test_mistakes_name_file_and_line(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text("cloud_cover: 1.4\nvisual_rage: 50\nprecipitation: hail\n")
+    with pytest.raises(SettingError) as caught:
+        load_weather(wrong)
+    text = str(caught.value)
+    assert f"{wrong}:1: setting 'cloud_cover' is 1.4" in text
+    assert f"{wrong}:2: unknown setting 'visual_rage'; did you mean 'visual_range'?" in text
+    assert f"{wrong}:3: setting 'precipitation' is 'hail'" in text
+    wrong.write_text("precipitation_intensity: 3.0\n")
+    with pytest.raises(SettingError, match="needs `precipitation: rain`"):
+        load_weather(wrong)
+    wrong.write_text("- 1\n")
+    with pytest.raises(SettingError, match="a weather is a mapping"):
+        load_weather(wrong)
+    with pytest.raises(SettingError, match=r"--weather: no weather preset 'sunni'.*did you mean 'sunny'"):
+        load_weather("sunni", origin="--weather")
+
+
+def test_an_environment_becomes_a_weather() -> None:
+    weather = weather_of(
+        Environment(
+            name="Wet",
+            friction=0.6,
+            wetness="wetWithPuddles",
+            clouds="sixOktas",
+            sun_azimuth=math.pi / 2,
+            sun_elevation=0.5,
+            illuminance=40_000.0,
+            fog_range=300.0,
+            precipitation="rain",
+            precipitation_intensity=8.0,
+            wind_direction=math.pi,
+            wind_speed=4.0,
+        )
+    )
+    assert weather == Weather(
+        name="Wet",
+        friction=0.6,
+        wetness=0.5,
+        cloud_cover=0.75,
+        sun_azimuth=90.0,
+        sun_elevation=math.degrees(0.5),
+        sun_illuminance=40_000.0,
+        visual_range=300.0,
+        precipitation="rain",
+        precipitation_intensity=8.0,
+        wind_direction=180.0,
+        wind_speed=4.0,
+    )
+
+
+def test_what_an_environment_does_not_say_is_as_usual() -> None:
+    assert weather_of(Environment()) == Weather(friction=1.0)
+    assert weather_of(Environment(friction=0.0)).friction_scale > 0.0
+    assert weather_of(Environment(precipitation="rain", precipitation_share=0.2)).precipitation_intensity == 10.0
+    assert weather_of(Environment(precipitation="dry", precipitation_share=0.2)).precipitation == "none"
+
+
+def test_shares_of_sunlight_as_scenario_runner_s_files_write_them() -> None:
+    weather = weather_of(Environment(sun_azimuth=0.0, sun_elevation=1.31, illuminance=0.85))
+    assert (weather.sun_share, weather.sun_illuminance) == (0.85, None)
+
+
+def test_a_sun_past_the_zenith_comes_down_on_the_other_side() -> None:
+    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=math.pi / 2)).sun_elevation == pytest.approx(90.0)
+    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=math.pi * 0.75)).sun_elevation == pytest.approx(45.0)
+    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=-1.1)).lamps_on
+
+
+def test_the_sun_by_the_clock() -> None:
+    """Noon of a solstice at 48 degrees north: 90 - 48 ± 23.45 degrees high in the south; at an equinox it rises in the
+    east at six."""
+    assert solar_position(datetime(2026, 6, 21, 12)) == pytest.approx((180.0, 65.45), abs=0.1)
+    assert solar_position(datetime(2026, 12, 21, 12)) == pytest.approx((180.0, 18.55), abs=0.1)
+    azimuth, elevation = solar_position(datetime(2026, 3, 22, 6))
+    assert (azimuth, elevation) == pytest.approx((90.0, 0.0), abs=0.6)
+    night = weather_of(Environment(date_time="2026-06-21T00:00:00"))
+    assert night.sun_elevation == pytest.approx(-18.55, abs=0.1)
+    running = Environment(date_time="2026-06-21T00:00:00", clock_runs=True, clock_since=5.0)
+    assert weather_of(running, 12 * 3600.0 + 5.0).sun_elevation == pytest.approx(65.45, abs=0.1)
+
+
+def test_weather_sets_the_grip_of_the_world() -> None:
+    with World() as world:
+        world.set_weather(load_weather("storm"))
+        assert world.weather.name == "storm"
+        assert world._friction == pytest.approx(1 - 0.41 * 0.8)
