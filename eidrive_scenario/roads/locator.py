@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from eidrive_scenario.roads.location import Array, Integers, LaneLocations
+from eidrive_scenario.roads.overlaps import Overlaps
 from eidrive_scenario.roads.tables import RoadTables
 
 SPACING = 4.0
@@ -30,7 +33,6 @@ class Locator:
         poses = tables.lane_poses(self._row, self._s, np.zeros_like(self._s))
         self._road = tables.section_road[tables.lane_section[self._row]]
         self.sample_points: Array = np.column_stack([poses.x, poses.y])
-        self._beneath = _sharing(tables)
         self._flat = cKDTree(self.sample_points)
         self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
 
@@ -67,23 +69,18 @@ class Locator:
         """Every lane beneath points (N,): its row, s on its road, and the point's number."""
         found = self.locate(x, y, z)
         on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))
-        road, s, point = [found.road[on]], [found.s[on]], [on]
-        for n in on:
-            for other in self._beneath.get(int(found.road[n]), ()):
-                road.append(np.array([other]))
-                s.append(np.array([self._nearest_s(other, float(x[n]), float(y[n]))]))
-                point.append(np.array([n]))
-        roads, guesses, points = np.concatenate(road), np.concatenate(s), np.concatenate(point)
+        pair, other, guess = self._overlaps.beneath(found.road[on], x[on], y[on])
+        roads = np.concatenate([found.road[on], other])
+        guesses, points = np.concatenate([found.s[on], guess]), np.concatenate([on, on[pair]])
         refined, t, beyond = self._refine(roads, guesses, x[points], y[points])
         row, outside = self._tables.lane_beside(roads, refined, t)
         hit = np.flatnonzero((beyond <= 0.0) & (outside <= 0.0))
         return row[hit], refined[hit], points[hit]
 
-    def _nearest_s(self, road: int, x: float, y: float) -> float:
-        """s of the sample of one road that lies nearest to a point."""
-        first, last = np.searchsorted(self._road, [road, road + 1])
-        gap = np.sum((self.sample_points[first:last] - (x, y)) ** 2, axis=1)
-        return float(self._s[first + int(np.argmin(gap))])
+    @cached_property
+    def _overlaps(self) -> Overlaps:
+        reach = self._tables.widest_lane + NARROW + SPACING
+        return Overlaps(self._tables, self.sample_points, self._road, self._s, reach)
 
     def _compare(
         self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None
@@ -130,15 +127,6 @@ class Locator:
                 break
         roll = self._tables.superelevation.value(road, s)
         return s, across / np.cos(roll), beyond
-
-
-def _sharing(tables: RoadTables) -> dict[int, list[int]]:
-    """For each connecting road of a junction, the junction's other roads."""
-    junctions: dict[str, list[int]] = {}
-    for index, road in enumerate(tables.roads):
-        if road.junction_id is not None:
-            junctions.setdefault(road.junction_id, []).append(index)
-    return {road: [other for other in group if other != road] for group in junctions.values() for road in group}
 
 
 def _samples(tables: RoadTables) -> tuple[Integers, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -55,6 +56,14 @@ class RoadTables:
         self.centre = PolynomialTable([lane.centre for lane in lanes], spans)
         self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
         self.width = PolynomialTable([lane.width for lane in lanes], spans)
+
+    @cached_property
+    def widest_lane(self) -> float:
+        """The largest width of any lane, looked at its start, middle and end [m]."""
+        lanes = np.arange(len(self.lane_id))
+        length = self.section_length[self.lane_section]
+        widths = [self.width.value(lanes, length * part).max(initial=0.0) for part in (0.0, 0.5, 1.0)]
+        return float(max(widths))
 
     def section_of(self, road: Integers, s: Array) -> Integers:
         """Running number of the lane section at s (N,) of roads (N,)."""

@@ -124,6 +124,8 @@ class ScriptedBody(Body):
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
         super().__init__(client, spec, placement, dt)
         self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
+        self.stale = False
+        """Whether the rigid body is not yet where the actor is: pybullet hears of it when somebody asks pybullet."""
         self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
 
     def rest(self) -> None:
@@ -152,11 +154,11 @@ class ScriptedBody(Body):
             excess = placement.speed - (vx * fx + vy * fy + vz * fz)
             self._accelerate_to((vx + excess * fx, vy + excess * fy, vz + excess * fz))
             self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
-        if self.moved or was_moving or self.velocity != (0.0, 0.0, 0.0):
-            self.settle()
+        self.stale = self.stale or self.moved or was_moving or self.velocity != (0.0, 0.0, 0.0)
 
     def settle(self) -> None:
         """Put the rigid body where the actor is."""
+        self.stale = False
         here = {"physicsClientId": self.client}
         turn = quaternion(self.yaw, self.pitch, self.roll)
         bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, **here)

@@ -168,7 +168,10 @@ class World:
                     body.place(placement)
             elif placement is not None:
                 self._driven[name].jump(placement)
-        touches = self._physics.tick(self._bodies, self._driven, controls, self._friction) if self._driven else {}
+        touches = {}
+        if self._driven:
+            self._settle()
+            touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
         self._broadphase_fresh = bool(self._driven)
@@ -282,10 +285,17 @@ class World:
         self._cast = _Cast(names, categories, dict(self._rows), size, offset)
         return self._cast
 
+    def _settle(self) -> None:
+        """Put the rigid bodies of scripted actors where these are."""
+        for body in self._in_order:
+            if isinstance(body, ScriptedBody) and body.stale:
+                body.settle()
+
     def _refresh(self) -> None:
         """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
         if self._scenery.raise_ground():
             self._changed()
         if not self._broadphase_fresh:
+            self._settle()
             bullet.performCollisionDetection(physicsClientId=self._client)
             self._broadphase_fresh = True

@@ -1,0 +1,151 @@
+"""How fast a town full of cars runs on one core: scripted cars of a scenario and a swarm around one of them.
+
+The scenario is written by this script: scripted cars on random places of a CARLA town, a fifth of which change lane or
+speed on triggers, and a TrafficSwarmAction. `EIDRIVE_MAPS` names the folder with the towns.
+
+    python benchmarks/bench_traffic.py [--town Town04] [--scripted 200] [--swarm 100] [--seconds 30] [--runs 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import os
+import pstats
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from bench_scenario_1 import shares_by_room
+
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.traffic import Fleet
+
+VEHICLE = """<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1.4" y="0" z="0.75"/>
+<Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
+<Performance maxSpeed="60" maxDeceleration="9" maxAcceleration="5"/>
+<Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
+<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles></Vehicle>"""
+SWARM = """<GlobalAction><TrafficAction trafficName="swarm"><TrafficSwarmAction innerRadius="10" semiMajorAxis="{reach}"
+semiMinorAxis="{reach}" numberOfVehicles="{count}" offset="0"><CentralObject entityRef="car0"/>
+</TrafficSwarmAction></TrafficAction></GlobalAction>"""
+PLACED = """<Private entityRef="car{n}"><PrivateAction><TeleportAction><Position>
+<LanePosition roadId="{road}" laneId="{lane}" s="{s:.2f}"/></Position></TeleportAction></PrivateAction>
+<PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{speed:.2f}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
+</PrivateAction></Private>"""
+GROUP = """<ManeuverGroup name="g{n}" maximumExecutionCount="1"><Actors selectTriggeringEntities="false">
+<EntityRef entityRef="car{n}"/></Actors><Maneuver name="m{n}"><Event name="e{n}" priority="override">
+<Action name="a{n}"><PrivateAction>{action}</PrivateAction></Action><StartTrigger><ConditionGroup>
+<Condition name="c{n}" delay="0" conditionEdge="rising"><ByEntityCondition>
+<TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="car{n}"/></TriggeringEntities><EntityCondition>
+<TraveledDistanceCondition value="{distance:.1f}"/></EntityCondition></ByEntityCondition></Condition></ConditionGroup>
+</StartTrigger></Event></Maneuver></ManeuverGroup>"""
+ACTIONS = (
+    """<LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="rate" value="1.5"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="4"/></SpeedActionTarget></SpeedAction></LongitudinalAction>""",
+    """<LateralAction><LaneOffsetAction continuous="false">
+<LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="1"/>
+<LaneOffsetTarget><AbsoluteTargetLaneOffset value="0.6"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>""",
+)
+FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00"
+description="traffic" author="-"/>
+<CatalogLocations/><RoadNetwork><LogicFile filepath="{map}"/></RoadNetwork><Entities>{entities}</Entities>
+<Storyboard><Init><Actions>{swarm}{placed}</Actions></Init><Story name="story"><Act name="act">{groups}<StartTrigger>
+<ConditionGroup><Condition name="start" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="0" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+</StartTrigger></Act></Story><StopTrigger><ConditionGroup><Condition name="stop" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="{seconds}" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+</StopTrigger></Storyboard></OpenSCENARIO>"""
+
+
+def scenario_text(town: Path, scripted: int, swarm: int, seconds: float) -> str:
+    """A scenario with that many scripted cars, at places that a fixed seed chooses, and a swarm around the first."""
+    lanes = Fleet(RoadNetwork.load(town)).lanes
+    rng = generator(0, "bench_traffic")
+    rows = np.flatnonzero(lanes.tables.lane_drivable & ~lanes.in_junction & (lanes.length > 20.0))
+    shares = lanes.length[rows] / lanes.length[rows].sum()
+    taken: list[tuple[int, float]] = []
+    while len(taken) < scripted:
+        row = int(rng.choice(rows, p=shares))
+        progress = float(rng.uniform(5.0, lanes.length[row] - 5.0))
+        if all(row != other or abs(progress - place) > 12.0 for other, place in taken):
+            taken.append((row, progress))
+    placed, groups = [], []
+    for n, (row, progress) in enumerate(taken):
+        key = lanes.keys[row]
+        s = float(lanes.s(np.array([row]), np.array([progress]))[0])
+        placed.append(PLACED.format(n=n, road=key.road, lane=key.lane, s=s, speed=rng.uniform(5.0, 14.0)))
+        if n % 5 == 0:
+            groups.append(GROUP.format(n=n, action=ACTIONS[n // 5 % 2], distance=rng.uniform(10.0, 150.0)))
+    return FILE.format(
+        map=town,
+        entities="".join(f'<ScenarioObject name="car{n}">{VEHICLE}</ScenarioObject>' for n in range(scripted)),
+        swarm=SWARM.format(reach=350, count=swarm) if swarm else "",
+        placed="".join(placed),
+        groups="".join(groups),
+        seconds=seconds,
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--town", default="Town04")
+    parser.add_argument("--scripted", type=int, default=200)
+    parser.add_argument("--swarm", type=int, default=100)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--profile", action="store_true", help="also print the functions that take the most time")
+    given = parser.parse_args()
+    folder = os.environ.get("EIDRIVE_MAPS")
+    if not folder:
+        sys.exit("bench_traffic: EIDRIVE_MAPS is not set; it names the folder with CARLA's towns (Town04.xodr)")
+    town = (Path(folder) / given.town).with_suffix(".xodr").resolve()
+
+    with tempfile.TemporaryDirectory() as temporary:
+        path = Path(temporary) / "traffic.xosc"
+        path.write_text(scenario_text(town, given.scripted, given.swarm, given.seconds), encoding="utf-8")
+
+        def build() -> Simulation:
+            return Simulation(load_scenario(path), seed=1, settings=RunSettings(time_limit=given.seconds + 1.0))
+
+        loading, running, hashes = [], [], set()
+        for _ in range(given.runs):
+            started = time.perf_counter()
+            simulation = build()
+            loading.append(time.perf_counter() - started)
+            result = simulation.run()
+            running.append(result.wall_s)
+            hashes.add(result.trace_hash)
+        profile = cProfile.Profile()
+        simulation = build()
+        profile.enable()
+        simulation.run()
+        profile.disable()
+    ticks = round(result.simulated_s / 0.05)
+    swarm = len(simulation.storyboard.stage.traffic.names)
+    print(f"{given.town}: {given.scripted} scripted cars, a swarm of {given.swarm} ({swarm} there at the end)")
+    same = "the same trace" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
+    print(f"  simulated {result.simulated_s:.2f} s in {ticks} ticks of 0.05 s, {given.runs} runs, {same}")
+    print(f"  simulated s per wall s     {result.simulated_s / median(running):8.2f}   (aim: above 1)")
+    print(f"  per tick                   {1e3 * median(running) / ticks:8.3f} ms")
+    print(f"  loading                    {median(loading):8.3f} s")
+    print("where the time of a run goes (cProfile; libraries count for the room that calls them):")
+    for room, share in shares_by_room(profile).items():
+        if share >= 0.005:
+            print(f"  {room:24} {100 * share:5.1f} %  {'#' * round(50 * share)}")
+    if given.profile:
+        pstats.Stats(profile).sort_stats("tottime").print_stats(40)
+
+
+if __name__ == "__main__":
+    main()
