@@ -8,6 +8,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from eidrive_scenario.roads.curves import ReferenceLine
@@ -159,6 +160,16 @@ class Road:
     types: tuple[RoadType, ...] = ()
     line: int | None = None
     section_starts: tuple[float, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def directions(self) -> Mapping[int, int]:
+        """By lane id, +1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
+        found = {0: 1}
+        for section in self.sections:
+            for number, lane in section.lanes.items():
+                usual = -1 if (number > 0) == (self.rule == "RHT") else 1
+                found.setdefault(number, -usual if lane.direction == "reversed" else usual)
+        return found
 
     def section_at(self, s: float) -> LaneSection:
         """The lane section at s."""

@@ -37,14 +37,10 @@ Choose = Callable[[Sequence[Branch]], Branch]
 
 def driving_direction(road: Road, lane_id: int) -> int:
     """+1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
-    if lane_id == 0:
-        return 1
-    direction = -1 if (lane_id > 0) == (road.rule == "RHT") else 1
-    for section in road.sections:
-        lane = section.lanes.get(lane_id)
-        if lane is not None:
-            return -direction if lane.direction == "reversed" else direction
-    return direction
+    known = road.directions.get(lane_id)
+    if known is not None:
+        return known
+    return -1 if (lane_id > 0) == (road.rule == "RHT") else 1
 
 
 class Movement:
