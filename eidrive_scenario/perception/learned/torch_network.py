@@ -39,13 +39,13 @@ class TorchNetwork(ImageNetwork):
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)[None]
             outputs = self._network(pixels.to(torch.float32).div_(255.0))
             if isinstance(self._network, YoloV5):
-                boxes, scores, classes = yolo_candidates(self._network, outputs, self.confidence)
+                boxes, scores, classes = yolo_candidates(self._network.anchors, outputs, self.confidence)
             else:
                 boxes, scores, classes = ssd_candidates(outputs, self._defaults, self.confidence)
             return Candidates(boxes.double().numpy(), scores.double().numpy(), classes.numpy())
 
 
-def yolo_candidates(network: YoloV5, outputs: list[Tensor], confidence: float) -> tuple[Tensor, Tensor, Tensor]:
+def yolo_candidates(anchors: Tensor, outputs: list[Tensor], confidence: float) -> tuple[Tensor, Tensor, Tensor]:
     """Boxes (N, 4) as corners, scores (N,) and classes (N,) of the first picture; score = objectness · class.
 
     Decodes like `YoloV5.decode`, but only the cells whose objectness alone reaches the confidence.
@@ -56,7 +56,7 @@ def yolo_candidates(network: YoloV5, outputs: list[Tensor], confidence: float) -
         anchor, line, column = torch.nonzero(raw[0, ..., 4] >= least, as_tuple=True)
         share = raw[0, anchor, line, column].sigmoid()
         centre = (2.0 * share[:, :2] - 0.5 + torch.stack([column, line], dim=1)) * stride
-        size = (2.0 * share[:, 2:4]).square() * network.anchors[scale][anchor]
+        size = (2.0 * share[:, 2:4]).square() * anchors[scale][anchor]
         best, number = share[:, 5:].max(dim=1)
         boxes.append(corners(torch.cat([centre, size], dim=1)))
         scores.append(share[:, 4] * best)

@@ -17,7 +17,7 @@ LARGEST_RATIO = 4.0
 most (2·1)² = 4 times the anchor."""
 SCALE_WEIGHTS = (4.0, 1.0, 0.4)
 """Of the objectness at strides 8, 16, 32: small objects are many and hard."""
-BOX_WEIGHT, OBJECT_WEIGHT, CLASS_WEIGHT = 2.5, 25.0, 2.5
+BOX_WEIGHT, OBJECT_WEIGHT, CLASS_WEIGHT = 2.5, 25.0, 0.6
 
 
 class Assignment(NamedTuple):

@@ -1,0 +1,177 @@
+"""The detectors `yolov5` and `ssd`: a network on each camera's picture, its boxes lifted to the world."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, PositiveInt, model_validator
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.learned.classes import object_category
+from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork, Layout
+from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
+from eidrive_scenario.perception.learned.lights import LightsOnMap
+from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
+from eidrive_scenario.perception.lifting import lift
+from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
+from eidrive_scenario.sensing.settings import LidarSettings
+from eidrive_scenario.settings import Settings
+
+SHIPPED = Path(__file__).parents[1] / "weights"
+OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", ".pt")
+
+SAME_PLACE = 0.1
+"""Lifted boxes that overlap this much in plan view are one object; the surer one counts."""
+
+
+class LearnedSettings(Settings):
+    """What the property `detector_settings` may say.
+
+    weights      a file, seen from the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or
+                 a TorchScript model (.pt); None is what is shipped
+    classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
+                 and how its output is laid out, where the shape does not tell
+    confidence   below which a box does not count
+    threads      of the network's computation, in the whole process
+    """
+
+    weights: str | None = None
+    classes: tuple[str, ...] | None = None
+    input_size: tuple[PositiveInt, PositiveInt] | None = None
+    layout: Layout | None = None
+    confidence: float = Field(default=0.35, gt=0.0, lt=1.0)
+    threads: PositiveInt = 1
+
+    @model_validator(mode="after")
+    def _fit_together(self) -> LearnedSettings:
+        suffix = Path(self.weights or OWN_SUFFIX).suffix or OWN_SUFFIX
+        if suffix in FOREIGN_SUFFIXES:
+            if not self.classes or self.input_size is None:
+                raise ValueError(f"weights {suffix} need `classes: [...]` and `input_size: [width, height]`")
+            if not any(object_category(name) for name in self.classes):
+                raise ValueError("none of `classes` is an object on the road such as car, truck, bus or pedestrian")
+        elif self.weights is not None and suffix != OWN_SUFFIX:
+            raise ValueError(f"weights end in .npz, .onnx or .pt, not in {suffix!r}")
+        elif self.classes is not None or self.input_size is not None or self.layout is not None:
+            raise ValueError("`classes`, `input_size` and `layout` are for weights .onnx and .pt")
+        return self
+
+
+class LearnedDetector(Detector):
+    """What a network finds in the pictures of all cameras, lifted by LiDAR points where there are, else by the ground.
+
+    Of boxes on one place, from one camera or several, the surest counts.
+    """
+
+    needs: ClassVar[frozenset[str]] = frozenset({"camera"})
+    settings_type: ClassVar[type[Settings] | None] = LearnedSettings
+    network: ClassVar[Literal["yolov5", "ssd"]]
+
+    def __init__(self, settings: LearnedSettings | None = None) -> None:
+        self.settings = settings or LearnedSettings()
+        self.pictures: dict[str, ImageDetections] = {}
+        """What was found in the last picture of each camera."""
+        self.signals: tuple[SignalReading, ...] = ()
+        """The traffic lights and stop signs of the map that were found in the last pictures."""
+        self._network = build_network(self.network, self.settings)
+        self._surroundings = Surroundings(None)
+        self._patterns: dict[str, Pattern] = {}
+        self._lights = LightsOnMap(None)
+
+    def install(self, installation: Installation) -> None:
+        """Learn the map and the patterns of the LiDARs."""
+        self._surroundings = Surroundings(installation.roads)
+        self._lights = LightsOnMap(installation.roads)
+        for name, sensor in installation.sensors.items():
+            if isinstance(sensor, LidarSettings):
+                self._patterns[name] = pattern_from_settings(sensor)
+
+    def detect(self, readings: Readings) -> Detections:
+        """The road users in the pictures of all cameras that were read."""
+        name, sweep = next(iter(readings.lidars.items()), ("", None))
+        self.pictures = {camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()}
+        self.signals = self._lights.read(self.pictures, readings.cameras)
+        parts = [
+            self._lifted(found, readings, camera, sweep, self._patterns.get(name))
+            for camera, found in self.pictures.items()
+        ]
+        return distinct(parts, readings.time)
+
+    def _lifted(
+        self,
+        found: ImageDetections,
+        readings: Readings,
+        camera: str,
+        sweep: LidarReading | None,
+        pattern: Pattern | None,
+    ) -> Detections:
+        categories = [object_category(name) for name in found.classes]
+        rows = [row for row, category in enumerate(categories) if category is not None]
+        return lift(
+            found.boxes[rows],
+            [category for category in categories if category is not None],
+            found.scores[rows],
+            readings.cameras[camera],
+            sweep,
+            time=readings.time,
+            ground=float(readings.ego.position[2]),
+            surroundings=self._surroundings,
+            pattern=pattern,
+        )
+
+
+class YoloDetector(LearnedDetector):
+    """The detector `yolov5`."""
+
+    network: ClassVar[Literal["yolov5", "ssd"]] = "yolov5"
+
+
+class SsdDetector(LearnedDetector):
+    """The detector `ssd`."""
+
+    network: ClassVar[Literal["yolov5", "ssd"]] = "ssd"
+
+
+def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
+    """The network that the settings ask for. Raises SettingError if its weights are missing or do not fit."""
+    path = SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
+    if not path.is_file():
+        raise SettingError(Problem(f"no file {str(path)!r} with weights", "check `weights` of the detector's settings"))
+    if path.suffix != ".onnx" and importlib.util.find_spec("torch") is None:
+        message = f"detector {name!r} needs torch, which is not installed"
+        raise SettingError(Problem(message, "run: pip install eidrive-scenario[learned]"))
+    if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
+        return ForeignNetwork(
+            path, settings.classes, settings.input_size, settings.confidence, settings.layout, settings.threads
+        )
+    from eidrive_scenario.perception.learned.torch_network import TorchNetwork
+
+    return TorchNetwork(path, settings.confidence, settings.threads)
+
+
+def distinct(parts: list[Detections], time: float) -> Detections:
+    """All detections, those left out that lie on the place of a surer one."""
+    parts = [part for part in parts if len(part)]
+    if not parts:
+        return Detections(time)
+    together = Detections(
+        time,
+        np.concatenate([part.boxes for part in parts]),
+        np.concatenate([part.scores for part in parts]),
+        tuple(name for part in parts for name in part.classes),
+        np.concatenate([part.velocity for part in parts]),
+        np.concatenate([part.covariance for part in parts]),
+    )
+    shared = iou_bev(together.boxes, together.boxes)
+    kept: list[int] = []
+    for row in np.argsort(-together.scores, kind="stable").tolist():
+        if not kept or shared[row, kept].max() <= SAME_PLACE:
+            kept.append(row)
+    return together.subset(sorted(kept))

@@ -1,0 +1,242 @@
+"""Random road networks to train on: crossings like those of the library, and winding roads on hills.
+
+None of them is a place of the library: widths, lanes, corners, signals and houses are drawn anew for each.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+
+from eidrive_scenario.roads import RoadNetwork, curves
+from xosc.roads import make_roads
+from xosc.roads.make_roads import Crossing, LaneSpec, Street, add, add_lane, add_mark, add_road
+
+Element = etree._Element
+
+LIGHT = ("1000001", "-1", 0.3, 0.86)
+STOP = ("206", "-1", 0.75, 0.75)
+
+
+@dataclass(frozen=True)
+class House:
+    """A box beside the road: centre [m], length, width, height [m], heading [rad], colour."""
+
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+    yaw: float
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A road network, and the houses that stand along it."""
+
+    roads: RoadNetwork
+    houses: tuple[House, ...]
+
+
+def random_place(rng: np.random.Generator, folder: Path) -> Place:
+    """A place for this state of the generator; its OpenDRIVE file is written into the folder and read again."""
+    path = folder / "place.xodr"
+    if rng.random() < 0.65:
+        make_roads.write(random_crossing(rng), path)
+        root = etree.parse(path).getroot()
+        for item in root.iterfind(".//object[@type='building']"):
+            holder = item.getparent()
+            if holder is not None:
+                holder.remove(item)
+        vary_signals(root, rng)
+    else:
+        root = winding_road(rng)
+    etree.ElementTree(root).write(str(path), xml_declaration=True, encoding="UTF-8")
+    roads = RoadNetwork.load(path)
+    return Place(roads, tuple(random_houses(roads, rng)))
+
+
+def random_crossing(rng: np.random.Generator) -> Crossing:
+    """Two streets of random lanes that cross at right angles."""
+    first, second = random_street(rng), random_street(rng)
+    x, y = rng.uniform(20.0, 60.0), rng.uniform(-6.0, 6.0)
+    room = rng.uniform(3.0, 9.0, 4)
+    near, far = x - _half_width(second, -1) - room[0], x + _half_width(second, 1) + room[1]
+    right, left = y - _half_width(first, -1) - room[2], y + _half_width(first, 1) + room[3]
+    ends = rng.uniform(70.0, 110.0, 4)
+    return Crossing(
+        name="training",
+        ego_street=first,
+        cross_street=second,
+        y=y,
+        x=x,
+        box=(near, far, right, left),
+        reach=(near - ends[0], far + ends[1], right - ends[2], left + ends[3]),
+        lights=bool(rng.random() < 0.6),
+    )
+
+
+def random_street(rng: np.random.Generator) -> Street:
+    """One to three lanes each way, with or without a middle lane, parking, shoulder and sidewalk."""
+    inner, outer = (LaneSpec("driving", make_roads.LANE, (kind, "white")) for kind in ("broken", "solid"))
+    count = int(rng.choice([1, 2, 3], p=[0.5, 0.35, 0.15]))
+    side = [inner] * (count - 1) + [outer]
+    if rng.random() < 0.45:
+        side.append(LaneSpec("parking", float(rng.uniform(2.2, 3.6))))
+    if rng.random() < 0.5:
+        side.append(LaneSpec("shoulder", float(rng.uniform(0.5, 2.5))))
+    side += [LaneSpec("shoulder", 0.63, ("curb", "standard")), LaneSpec("sidewalk", float(rng.uniform(1.5, 4.0)))]
+    colour = str(rng.choice(["white", "yellow"]))
+    if rng.random() < 0.3:
+        middle = LaneSpec("bidirectional", make_roads.LANE, ("solid broken", colour))
+        return Street(left=(middle, *side), right=tuple(side), centre=("broken solid", colour))
+    centre = str(rng.choice(["solid", "solid solid", "broken"]))
+    return Street(left=tuple(side), right=tuple(side), centre=(centre, colour))
+
+
+def _half_width(street: Street, sign: int) -> float:
+    return sum(spec.width for spec in street.side(sign))
+
+
+def vary_signals(root: Element, rng: np.random.Generator) -> None:
+    """Heights and places of lights and signs as no library road has them."""
+    for signal in root.iterfind(".//signal"):
+        signal.set("zOffset", f"{rng.uniform(1.9, 4.5):.3f}")
+        scale = rng.uniform(0.85, 1.3)
+        for key in ("width", "height"):
+            signal.set(key, f"{float(signal.get(key, '0.5')) * scale:.3f}")
+        signal.set("hOffset", f"{rng.normal(0.0, 0.12):.4f}")
+
+
+def winding_road(rng: np.random.Generator) -> Element:
+    """A road of lines, clothoids and arcs that climbs and falls, with lights and stop signs along it."""
+    street = random_street(rng)
+    line = winding_course(rng)
+    length = sum(curve.length for curve in line)
+    root = etree.Element("OpenDRIVE")
+    add(root, "header", revMajor=1, revMinor=6, name="training", version="1.00")
+    road, _, plan = add_road(root, "1", "winding", length, "-1")
+    for curve in line:
+        geometry = add(plan, "geometry", s=curve.s, x=curve.x, y=curve.y, hdg=curve.h, length=curve.length)
+        if isinstance(curve, curves.Spiral):
+            add(geometry, "spiral", curvStart=curve.curvature, curvEnd=curve.curvature + curve.rate * curve.length)
+        elif isinstance(curve, curves.Arc) and curve.curvature:
+            add(geometry, "arc", curvature=curve.curvature)
+        else:
+            add(geometry, "line")
+    write_hills(road, length, rng)
+    section = add(add(road, "lanes"), "laneSection", s=0.0)
+    left = add(section, "left")
+    for i in range(len(street.left), 0, -1):
+        add_lane(left, i, street.left[i - 1])
+    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(centre, "link")
+    add_mark(centre, street.centre)
+    right = add(section, "right")
+    for i, spec in enumerate(street.right, start=1):
+        add_lane(right, -i, spec)
+    signals = add(road, "signals")
+    for number in range(int(rng.integers(2, 6))):
+        sign = int(rng.choice([-1, 1]))
+        kind, subtype, width, height = LIGHT if rng.random() < 0.6 else STOP
+        add(
+            signals,
+            "signal",
+            s=float(rng.uniform(0.1, 0.9) * length),
+            t=sign * (street.edge(sign) + street.verge(sign) + rng.uniform(0.3, 1.0)),
+            id=str(number + 1),
+            name=f"signal {number + 1}",
+            dynamic="yes" if kind == LIGHT[0] else "no",
+            orientation="+" if sign < 0 else "-",
+            zOffset=float(rng.uniform(1.9, 4.5)),
+            country="DE",
+            type=kind,
+            subtype=subtype,
+            height=height,
+            width=width,
+            hOffset=float(rng.normal(0.0, 0.12)),
+            pitch=0.0,
+            roll=0.0,
+        )
+    return root
+
+
+def winding_course(rng: np.random.Generator) -> list[curves.Curve]:
+    """Lines and bends, each bend a clothoid, an arc and a clothoid."""
+    found: list[curves.Curve] = []
+    x, y, heading, s = 0.0, 0.0, float(rng.uniform(-math.pi, math.pi)), 0.0
+    for _ in range(int(rng.integers(1, 4))):
+        bend = float(rng.choice([-1, 1])) / rng.uniform(35.0, 250.0)
+        clothoid, arc = float(rng.uniform(12.0, 30.0)), float(rng.uniform(8.0, 50.0))
+        pieces = (
+            (float(rng.uniform(20.0, 70.0)), 0.0, 0.0),
+            (clothoid, 0.0, bend),
+            (arc, bend, bend),
+            (clothoid, bend, 0.0),
+        )
+        for length, start, end in pieces:
+            curve = (
+                curves.Arc(s, x, y, heading, length, start)
+                if start == end
+                else curves.spiral(s, x, y, heading, length, start, end)
+            )
+            found.append(curve)
+            x, y, heading, *_ = curve.at(length)
+            s += length
+    return found
+
+
+def write_hills(road: Element, length: float, rng: np.random.Generator) -> None:
+    """A smooth elevation: pieces of cubics that meet in height and slope."""
+    profile = road.find("elevationProfile")
+    assert profile is not None
+    for old in list(profile):
+        profile.remove(old)
+    height, slope, s = 0.0, 0.0, 0.0
+    step = 40.0
+    steep = float(rng.choice([0.0, 0.02, 0.06]))
+    while s < length:
+        target = float(rng.uniform(-steep, steep))
+        # c and d so that the slope goes from `slope` to `target` without a kink in the curvature at the far end
+        c = (target - slope) / step
+        d = -(target - slope) / (3.0 * step**2)
+        add(profile, "elevation", s=s, a=height, b=slope, c=c, d=d)
+        height += slope * step + c * step**2 + d * step**3
+        slope = slope + 2.0 * c * step + 3.0 * d * step**2
+        s += step
+
+
+def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
+    """Rows of houses along the roads outside junctions, some places without any."""
+    found: list[House] = []
+    if rng.random() < 0.2:
+        return found
+    setback, gap = rng.uniform(1.0, 10.0), rng.uniform(1.0, 25.0)
+    for road in roads.roads.values():
+        if road.junction_id is not None:
+            continue
+        for side in (-1, 1):
+            lanes = roads.lane_ids(road.id, road.length / 2)
+            edge = sum(roads.lane_width(road.id, lane, road.length / 2) for lane in lanes if lane * side > 0)
+            s = rng.uniform(0.0, 15.0)
+            while s < road.length - 12.0:
+                length, depth, height = rng.uniform(6.0, 24.0), rng.uniform(6.0, 14.0), rng.uniform(3.5, 18.0)
+                t = side * (edge + setback + depth / 2 + rng.uniform(0.0, 2.0))
+                pose = roads.road_pose_at(road.id, min(s + length / 2, road.length), t)
+                if _clear_of_roads(roads, pose.x, pose.y, pose.h, length, depth):
+                    tone = rng.uniform(0.25, 0.9)
+                    colour = tuple(float(c) for c in (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95))
+                    centre = (pose.x, pose.y, pose.z + height / 2)
+                    found.append(House(centre, (length, depth, height), pose.h, (colour[0], colour[1], colour[2])))
+                s += length + gap + rng.uniform(0.0, 10.0)
+    return found
+
+
+def _clear_of_roads(roads: RoadNetwork, x: float, y: float, heading: float, length: float, depth: float) -> bool:
+    """Whether no road runs through a house."""
+    along, across = np.meshgrid(np.linspace(-0.5, 0.5, 9) * length, np.linspace(-0.5, 0.5, 5) * depth)
+    cos, sin = math.cos(heading), math.sin(heading)
+    lanes, _, _ = roads.touched((x + cos * along - sin * across).ravel(), (y + sin * along + cos * across).ravel())
+    return not len(lanes)

@@ -1,0 +1,256 @@
+"""Random traffic, cameras and weather on a place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import overlap, rotation_matrix
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.weather import Weather
+
+Array = NDArray[np.float64]
+
+OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Camera axes (x right, y down, z forward) as columns in a frame of x forward, y left, z up."""
+
+_CATEGORY = {"firetruck": "truck", "ambulance": "van", "rsu": "misc", "box": "misc"}
+_SIZES: Mapping[str, tuple[tuple[float, float, float], ...]] = {
+    "car": ((4.89, 1.84, 1.49), (4.6, 1.93, 1.85), (4.19, 1.82, 1.47), (4.79, 2.0, 1.49), (3.9, 1.7, 1.5)),
+    "van": ((5.93, 2.02, 2.62), (5.0, 1.95, 2.1)),
+    "ambulance": ((6.37, 2.35, 2.43),),
+    "truck": ((8.3, 2.5, 3.55), (6.5, 2.3, 2.9), (10.0, 2.55, 3.9)),
+    "firetruck": ((8.47, 2.89, 3.83), (7.5, 2.5, 3.2)),
+    "bus": ((10.27, 3.94, 4.25), (12.0, 2.55, 3.1), (9.0, 2.5, 3.0)),
+    "motorbike": ((2.2, 0.8, 1.6),),
+    "bicycle": ((1.8, 0.65, 1.75),),
+    "pedestrian": ((0.5, 0.5, 1.75), (0.4, 0.4, 1.86), (0.45, 0.45, 1.25)),
+    "rsu": ((0.5, 0.5, 4.0),),
+    "box": ((0.5, 0.5, 0.5), (1.0, 0.8, 1.0)),
+}
+_WHEELED = ("car", "van", "ambulance", "truck", "firetruck", "bus", "motorbike", "bicycle")
+_ON_LANES: Mapping[str, Mapping[str, float]] = {
+    "driving": {
+        "car": 0.45, "van": 0.07, "ambulance": 0.04, "truck": 0.09, "firetruck": 0.05, "bus": 0.09, "motorbike": 0.08,
+        "bicycle": 0.07, "pedestrian": 0.05, "box": 0.01,
+    },
+    "parking": {
+        "car": 0.6, "van": 0.12, "ambulance": 0.04, "truck": 0.1, "firetruck": 0.06, "bus": 0.03, "motorbike": 0.05,
+    },
+    "shoulder": {"car": 0.2, "bicycle": 0.35, "motorbike": 0.1, "pedestrian": 0.3, "box": 0.05},
+    "sidewalk": {"pedestrian": 0.78, "bicycle": 0.12, "rsu": 0.05, "box": 0.05},
+}  # fmt: skip
+_PICTURE_SIZES = ((640, 480), (800, 600), (640, 384), (960, 540))
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Places on lanes: x y z [m] and heading of traffic [rad] (N, 4), type of the lane, its width [m]."""
+
+    poses: Array
+    kinds: NDArray[np.str_]
+    widths: Array
+
+    @classmethod
+    def of(cls, roads: RoadNetwork, step: float = 1.5) -> Spots:
+        """All places, every `step` metres of each lane."""
+        poses, kinds, widths = [], [], []
+        for road in roads.roads.values():
+            for s in np.arange(step / 2, road.length, step).tolist():
+                for lane in roads.lane_ids(road.id, s):
+                    kind, width = roads.lane_type(road.id, lane, s), roads.lane_width(road.id, lane, s)
+                    kind = "driving" if kind == "bidirectional" else kind
+                    if kind in _ON_LANES and width > (0.4 if kind == "shoulder" else 1.2):
+                        pose = roads.lane_pose_at(road.id, lane, s)
+                        turn = 0.0 if roads.driving_direction(road.id, lane) > 0 else math.pi
+                        poses.append((pose.x, pose.y, pose.z, pose.h + turn))
+                        kinds.append(kind)
+                        widths.append(width)
+        return cls(np.array(poses), np.array(kinds), np.array(widths))
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera in the place: settings, pose (4, 4) camera to world, and the body that carries it, if it is seen."""
+
+    settings: CameraSettings
+    pose: Array
+    carrier: tuple[ActorSpec, Placement] | None
+
+
+def random_view(rng: np.random.Generator, spots: Spots) -> View:
+    """On a vehicle, ahead or aside, or at the roadside up to 8 m high."""
+    width, height = _PICTURE_SIZES[int(rng.choice(4, p=[0.5, 0.2, 0.15, 0.15]))]
+    fov = 100.0 if rng.random() < 0.4 else float(rng.uniform(55.0, 115.0))
+    bent = rng.random() < 0.15
+    settings = CameraSettings(
+        width=width,
+        height=height,
+        fov=fov,
+        distortion=(float(rng.uniform(-0.15, 0.02)), float(rng.uniform(0.0, 0.03)), 0.0, 0.0, 0.0)
+        if bent
+        else (0.0,) * 5,
+    )
+    if rng.random() < 0.35:
+        return View(settings, _roadside(rng, spots), None)
+    row = int(rng.choice(np.flatnonzero(spots.kinds == "driving")))
+    x, y, z, heading = spots.poses[row].tolist()
+    heading += float(rng.normal(0.0, 0.08))
+    spec = random_actor(rng, "Carrier", "car")
+    on_roof = rng.random() < 0.25
+    aside = float(rng.choice([math.radians(100.0), -math.radians(100.0), math.pi])) if rng.random() < 0.3 else 0.0
+    if on_roof or aside:
+        mount = (
+            -0.5 + float(rng.uniform(-1.2, 0.8)),
+            float(rng.uniform(-0.3, 0.3)),
+            spec.size[2] + float(rng.uniform(0.2, 0.5)),
+        )
+    else:
+        mount = (spec.size[0] / 2 + 0.06, float(rng.uniform(-0.3, 0.3)), float(rng.uniform(0.7, 1.5)))
+    cos, sin = math.cos(heading), math.sin(heading)
+    place = (x + cos * mount[0] - sin * mount[1], y + sin * mount[0] + cos * mount[1], z + mount[2])
+    pose = _camera_pose(place, heading + aside, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
+    ahead, _, _ = spec.offset
+    return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
+
+
+def _roadside(rng: np.random.Generator, spots: Spots) -> Array:
+    edge = np.flatnonzero(spots.kinds != "driving")
+    row = int(rng.choice(edge if len(edge) else len(spots.kinds)))
+    x, y, z, heading = spots.poses[row].tolist()
+    height = float(rng.uniform(2.2, 8.0))
+    yaw = heading + float(rng.choice([0.0, math.pi])) + float(rng.uniform(-0.9, 0.9))
+    pitch = float(rng.uniform(0.0, 0.35)) if rng.random() < 0.6 else 0.0
+    return _camera_pose((x, y, z + height), yaw, pitch, 0.0)
+
+
+def _camera_pose(place: tuple[float, float, float], yaw: float, pitch: float, roll: float) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_matrix(yaw, pitch, roll) @ OPTICAL
+    pose[:3, 3] = place
+    return pose
+
+
+def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
+    """A body of this shape in a random size and colour."""
+    sizes = _SIZES[shape]
+    length, width, height = sizes[int(rng.integers(len(sizes)))]
+    grow = rng.uniform(0.93, 1.07, 3) * rng.uniform(0.95, 1.05)
+    size = (length * float(grow[0]), width * float(grow[1]), height * float(grow[2]))
+    wheels = shape in _WHEELED
+    wheelbase = 0.58 * size[0] if wheels else 0.0
+    radius = {"motorbike": 0.31, "bicycle": 0.34}.get(shape, 0.33 if size[2] < 2.2 else 0.45)
+    colour = None
+    if rng.random() < 0.6:
+        tone = float(rng.uniform(0.08, 0.95))
+        red, green, blue = (tone + rng.normal(0.0, 0.18, 3)).clip(0.03, 0.97).tolist()
+        colour = (red, green, blue)
+    return ActorSpec(
+        name=name,
+        shape=shape,
+        category=_CATEGORY.get(shape, shape),
+        size=size,
+        offset=(0.5 * wheelbase, 0.0, size[2] / 2),
+        wheelbase=wheelbase,
+        wheel_radius=radius,
+        colour=colour,
+    )
+
+
+def random_traffic(
+    rng: np.random.Generator, spots: Spots, view: View, taken: Sequence[tuple[float, ...]] = ()
+) -> list[tuple[ActorSpec, Placement]]:
+    """Up to 30 actors that do not touch, most of them in front of the camera."""
+    axis, origin = view.pose[:3, 2], view.pose[:3, 3]
+    away = spots.poses[:, :2] - origin[:2]
+    distance = np.hypot(away[:, 0], away[:, 1])
+    facing = (away @ axis[:2]) / np.maximum(distance * np.hypot(axis[0], axis[1]), 1e-6)
+    inside = (facing > math.cos(math.radians(view.settings.fov) / 2)) & (distance > 3.0) & (distance < 95.0)
+    weight = np.where(inside, np.exp(-distance / 30.0), 1e-4)
+    weight *= np.where(spots.kinds == "driving", 1.0, 0.6)
+    boxes = list(taken)
+    if view.carrier is not None:
+        boxes.append(_box(*view.carrier))
+    found = []
+    for number in range(int(rng.integers(3, 31))):
+        row = int(rng.choice(len(weight), p=weight / weight.sum()))
+        kinds = _ON_LANES[str(spots.kinds[row])]
+        shape = str(rng.choice(list(kinds), p=np.array(list(kinds.values())) / sum(kinds.values())))
+        spec = random_actor(rng, f"{shape} {number} {int(rng.integers(1000))}", shape)
+        x, y, z, heading = spots.poses[row].tolist()
+        aside = float(rng.normal(0.0, 0.12)) * float(spots.widths[row])
+        x, y = x - math.sin(heading) * aside, y + math.cos(heading) * aside
+        turned = rng.random() < (0.95 if shape == "pedestrian" else 0.12)
+        heading += float(rng.uniform(-math.pi, math.pi)) if turned else float(rng.normal(0.0, 0.07))
+        placement = Placement(x, y, z, heading, speed=float(rng.uniform(0.0, 12.0)))
+        box = _box(spec, placement)
+        near = np.hypot(x - origin[0], y - origin[1]) < 0.6 + max(spec.size[0], spec.size[1]) / 2
+        if near or any(overlap(box, other) for other in boxes):
+            continue
+        boxes.append(box)
+        found.append((spec, placement))
+    return found
+
+
+def _box(spec: ActorSpec, placement: Placement) -> tuple[float, ...]:
+    cos, sin = math.cos(placement.yaw), math.sin(placement.yaw)
+    ahead, _, up = spec.offset
+    length, width, height = spec.size
+    return (
+        placement.x + cos * ahead, placement.y + sin * ahead, placement.z + up,
+        length + 0.3, width + 0.2, height, placement.yaw,
+    )  # fmt: skip
+
+
+def random_weather(rng: np.random.Generator) -> Weather:
+    """Half of them clear days; the rest overcast, fog, rain, snow, dusk and night."""
+    kind = str(
+        rng.choice(
+            ["clear", "overcast", "fog", "rain", "snow", "dusk", "night"],
+            p=[0.45, 0.12, 0.14, 0.09, 0.02, 0.06, 0.12],
+        )
+    )
+    azimuth = float(rng.uniform(0.0, 360.0))
+    day = float(rng.uniform(10.0, 75.0))
+    if kind == "clear":
+        return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=day, cloud_cover=float(rng.uniform(0.0, 0.4)))
+    if kind == "overcast":
+        return Weather(
+            name=kind,
+            sun_azimuth=azimuth,
+            sun_elevation=day,
+            cloud_cover=float(rng.uniform(0.7, 1.0)),
+            visual_range=8000.0,
+        )
+    if kind == "fog":
+        return Weather(
+            name=kind,
+            sun_azimuth=azimuth,
+            sun_elevation=float(rng.uniform(3.0, 45.0)),
+            cloud_cover=float(rng.uniform(0.2, 1.0)),
+            visual_range=float(np.exp(rng.uniform(math.log(40.0), math.log(500.0)))),
+            wetness=0.25,
+        )
+    if kind in ("rain", "snow"):
+        return Weather(
+            name=kind,
+            sun_azimuth=azimuth,
+            sun_elevation=day,
+            cloud_cover=1.0,
+            visual_range=float(rng.uniform(1500.0, 6000.0)),
+            precipitation="rain" if kind == "rain" else "snow",
+            precipitation_intensity=float(rng.uniform(2.0, 50.0 if kind == "rain" else 4.0)),
+            wetness=float(rng.uniform(0.3, 0.9)),
+            wind_direction=azimuth,
+            wind_speed=float(rng.uniform(0.0, 12.0)),
+        )
+    if kind == "dusk":
+        return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=float(rng.uniform(-6.0, 8.0)), street_lighting=4.0)
+    lamps = float(rng.choice([0.0, 5.0, 15.0], p=[0.25, 0.5, 0.25]))
+    return Weather(name=kind, sun_azimuth=azimuth, sun_elevation=float(rng.uniform(-50.0, -8.0)), street_lighting=lamps)

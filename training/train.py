@@ -1,0 +1,284 @@
+"""Trains a network on rendered pictures: `python -m training.train yolov5 --data training/data --out training/out`.
+
+On a GPU in minutes, on a CPU overnight, with the same seeds. All pictures are held in the device's memory and changed
+there. What is kept is the moving average of the weights, as the best epoch on the validation pictures had it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import datetime
+import json
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, match
+from eidrive_scenario.perception.learned.boxes import centred
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
+from eidrive_scenario.perception.learned.ssd import default_boxes
+from eidrive_scenario.perception.learned.ssd_loss import SsdLoss
+from eidrive_scenario.perception.learned.suppression import suppress
+from eidrive_scenario.perception.learned.targets import IGNORED, PADDING, Targets
+from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates
+from eidrive_scenario.perception.learned.weights import Description, save
+from eidrive_scenario.perception.learned.yolov5 import ANCHORS_PER_SCALE, STRIDES, Anchors, YoloV5
+from eidrive_scenario.perception.learned.yolov5_loss import YoloLoss
+from training.augment import moved, recoloured
+from training.dataset import Dataset
+
+INPUT_SIZE = (512, 384)
+MOST_OBJECTS = 48
+"""Rows of a picture's padded table of objects; the farthest are left out of a fuller one."""
+AVERAGE = 0.9995
+"""Share of the old weights that the moving average keeps with each step, once it is under way."""
+LEAST_CONFIDENCE = 0.02
+
+
+class Samples:
+    """A dataset on a device: pictures (P, 3, H, W) uint8, boxes (P, M, 4) x1 y1 x2 y2 [px], classes (P, M)."""
+
+    def __init__(self, dataset: Dataset, device: torch.device) -> None:
+        width, height = INPUT_SIZE
+        pictures = np.empty((len(dataset), height, width, 3), dtype=np.uint8)
+        for row, picture in enumerate(dataset.pictures()):
+            pictures[row] = picture
+        boxes = np.zeros((len(dataset), MOST_OBJECTS, 4), dtype=np.float32)
+        classes = np.full((len(dataset), MOST_OBJECTS), PADDING, dtype=np.int64)
+        to_find = dataset.to_find()
+        filled = np.zeros(len(dataset), dtype=np.int64)
+        for row in np.argsort(dataset.distance, kind="stable").tolist():
+            picture_row = int(dataset.picture[row])
+            at = filled[picture_row]
+            if at < MOST_OBJECTS:
+                boxes[picture_row, at] = dataset.box[row]
+                classes[picture_row, at] = dataset.number[row] if to_find[row] else IGNORED
+                filled[picture_row] += 1
+        self.pictures = torch.from_numpy(pictures).to(device).permute(0, 3, 1, 2)
+        self.boxes = torch.from_numpy(boxes).to(device)
+        self.classes = torch.from_numpy(classes).to(device)
+
+    def __len__(self) -> int:
+        return len(self.pictures)
+
+
+def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
+    """Nine anchors by k-means over the boxes' widths and heights, nearness being the overlap of boxes on one centre
+    (Redmon and Farhadi, YOLO9000, 2017, section 2), sorted by area, three for each scale."""
+    box = dataset.box[dataset.to_find()].astype(float)
+    sides = np.maximum(box[:, 2:] - box[:, :2], 2.0)
+    rng = np.random.default_rng(seed)
+    means = sides[rng.choice(len(sides), len(STRIDES) * ANCHORS_PER_SCALE, replace=False)]
+    for _ in range(rounds):
+        shared = np.minimum(sides[:, None], means[None]).prod(axis=2)
+        near = (shared / (sides.prod(axis=1)[:, None] + means.prod(axis=1)[None] - shared)).argmax(axis=1)
+        means = np.array(
+            [np.median(sides[near == k], axis=0) if (near == k).any() else means[k] for k in range(len(means))]
+        )
+    means = means[np.argsort(means.prod(axis=1))].round(1).reshape(len(STRIDES), ANCHORS_PER_SCALE, 2)
+    return tuple(tuple((float(w), float(h)) for w, h in scale) for scale in means)
+
+
+def learning_rate(step: int, steps: int, highest: float) -> float:
+    """A linear rise over the first twentieth, then half a cosine down to a hundredth (Loshchilov and Hutter 2017)."""
+    rise = max(steps // 20, 1)
+    if step < rise:
+        return highest * (step + 1) / rise
+    share = (step - rise) / max(steps - rise, 1)
+    return highest * (0.01 + 0.99 * 0.5 * (1.0 + math.cos(math.pi * share)))
+
+
+class Average:
+    """The moving average of a network's weights, quicker at first."""
+
+    def __init__(self, network: nn.Module) -> None:
+        self.network = copy.deepcopy(network).eval().requires_grad_(False)
+        self._steps = 0
+
+    @torch.no_grad()
+    def update(self, network: nn.Module) -> None:
+        self._steps += 1
+        keep = AVERAGE * (1.0 - math.exp(-self._steps / 300.0))
+        new = network.state_dict()
+        for name, value in self.network.state_dict().items():
+            if value.dtype.is_floating_point:
+                value.mul_(keep).add_(new[name].detach(), alpha=1.0 - keep)
+            else:
+                value.copy_(new[name])
+
+
+@torch.no_grad()
+def scores(network: nn.Module, samples: Samples, autocast: bool) -> dict[str, float]:
+    """AP at overlap 0.5 of each class, and their mean over the classes that occur."""
+    width, height = INPUT_SIZE
+    device = samples.pictures.device
+    groups = suppression_groups(IMAGE_CLASSES)
+    defaults = default_boxes(height, width)
+    found: dict[int, list[Matches]] = {number: [] for number in range(len(IMAGE_CLASSES))}
+    present = np.zeros(len(IMAGE_CLASSES), dtype=np.int64)
+    for start in range(0, len(samples), 64):
+        pixels = samples.pictures[start : start + 64].float().div(255.0)
+        with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
+            outputs = network(pixels.contiguous(memory_format=torch.channels_last))
+        outputs = [output.float().cpu() for output in outputs]
+        for index in range(len(pixels)):
+            single = [output[index : index + 1] for output in outputs]
+            if isinstance(network, YoloV5):
+                boxes, confidence, number = yolo_candidates(network.anchors.cpu(), single, LEAST_CONFIDENCE)
+            else:
+                boxes, confidence, number = ssd_candidates((single[0], single[1]), defaults, LEAST_CONFIDENCE)
+            b, s, n = boxes.double().numpy(), confidence.double().numpy(), number.numpy()
+            best = np.argsort(-s, kind="stable")[:500]
+            b, s, n = b[best], s[best], n[best]
+            kept = suppress(b, s, groups[n], 0.5)
+            b, s, n = b[kept], s[kept], n[kept]
+            objects = samples.boxes[start + index].cpu().double().numpy()
+            classes = samples.classes[start + index].cpu().numpy()
+            for which in range(len(IMAGE_CLASSES)):
+                mine = (classes == which) | (classes == IGNORED)
+                ignored: NDArray[np.bool_] = classes[mine] == IGNORED
+                present[which] += int((~ignored).sum())
+                found[which].append(match(b[n == which], s[n == which], objects[mine], ignored))
+    result = {
+        name: average_precision(found[number], int(present[number]))
+        for number, name in enumerate(IMAGE_CLASSES)
+        if present[number]
+    }
+    return {"mean": float(np.mean(list(result.values()))), **result}
+
+
+def train(options: argparse.Namespace) -> None:
+    device = torch.device(options.device or ("cuda" if torch.cuda.is_available() else "cpu"))
+    torch.manual_seed(options.seed)
+    autocast = device.type == "cuda"
+    started = time.perf_counter()
+    dataset = Dataset.load(options.data / "train")
+    samples, checks = (Samples(Dataset.load(options.data / part), device) for part in ("train", "validation"))
+    print(
+        f"{len(samples)} + {len(checks)} pictures on {device} after {time.perf_counter() - started:.0f} s", flush=True
+    )
+    anchors = fit_anchors(dataset, options.seed) if options.network == "yolov5" else None
+    description = Description(options.network, IMAGE_CLASSES, INPUT_SIZE, anchors)
+    network = description.build().to(device)
+    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    defaults = default_boxes(INPUT_SIZE[1], INPUT_SIZE[0]).to(device)
+    loss_of: Any = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(defaults)
+    average = Average(network)
+    decayed = [value for value in network.parameters() if value.ndim > 1]
+    others = [value for value in network.parameters() if value.ndim <= 1]
+    optimizer = torch.optim.AdamW(
+        [{"params": decayed, "weight_decay": 0.02}, {"params": others, "weight_decay": 0.0}], lr=options.rate
+    )
+    draws = torch.Generator(device).manual_seed(options.seed)
+    per_epoch = len(samples) // options.batch
+    steps = per_epoch * options.epochs
+    best, step, epoch = -1.0, 0, 0
+    began = time.perf_counter()
+    limit = options.minutes * 60.0 if options.minutes else math.inf
+    for epoch in range(options.epochs):
+        network.train()
+        order = torch.randperm(len(samples), generator=draws, device=device)
+        sums: dict[str, float] = {}
+        for number in range(per_epoch):
+            rows = order[number * options.batch : (number + 1) * options.batch]
+            pixels = samples.pictures[rows].float().div_(255.0)
+            last = epoch >= options.epochs - max(options.epochs // 12, 1)
+            if last:
+                pictures, targets = pixels, Targets(centred(samples.boxes[rows]), samples.classes[rows])
+            else:
+                pictures, targets = moved(pixels, samples.boxes[rows], samples.classes[rows], draws)
+            pictures = recoloured(pictures, draws)
+            # Time, not epochs, sets the schedule where there is a limit, so that it always ends in small steps.
+            progress = max(step / steps, (time.perf_counter() - began) / limit)
+            for group in optimizer.param_groups:
+                group["lr"] = learning_rate(int(progress * steps), steps, options.rate)
+            with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
+                outputs = network(pictures.contiguous(memory_format=torch.channels_last))
+            loss, parts = loss_of(outputs, targets)
+            optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            nn.utils.clip_grad_norm_(network.parameters(), 10.0)
+            optimizer.step()
+            average.update(network)
+            step += 1
+            for name, value in parts.items():
+                sums[name] = sums.get(name, 0.0) + value / per_epoch
+        passed = time.perf_counter() - began
+        over = passed > limit
+        line = f"epoch {epoch + 1}/{options.epochs} {passed:.0f} s " + " ".join(f"{k} {v:.3f}" for k, v in sums.items())
+        if over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
+            reached = scores(average.network, checks, autocast)
+            line += f" | AP50 {reached['mean']:.4f}"
+            if reached["mean"] > best:
+                best = reached["mean"]
+                card = card_text(options, description, reached, epoch + 1, passed, len(samples), len(checks))
+                options.out.mkdir(parents=True, exist_ok=True)
+                save(options.out / f"{options.network}.npz", average.network, description, card)
+        print(line, flush=True)
+        if over:
+            break
+    print(json.dumps(reached, indent=1))
+
+
+def card_text(
+    options: argparse.Namespace,
+    description: Description,
+    reached: dict[str, float],
+    epochs: int,
+    seconds: float,
+    pictures: int,
+    checks: int,
+) -> dict[str, Any]:
+    """What travels with the weights: where they come from, and what they reach on the validation pictures."""
+    device = torch.cuda.get_device_name() if torch.cuda.is_available() else "CPU"
+    return {
+        "network": description.network,
+        "classes": list(description.classes),
+        "input_size": list(description.input_size),
+        "anchors": description.anchors,
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "torch": torch.__version__,
+        "data": {
+            "script": "training/render_data.py",
+            "seed": options.data_seed,
+            "train_pictures": pictures,
+            "validation_pictures": checks,
+        },
+        "training": {
+            "script": "training/train.py",
+            "seed": options.seed,
+            "epochs": epochs,
+            "batch": options.batch,
+            "rate": options.rate,
+            "device": device,
+            "seconds": round(seconds),
+        },
+        "validation_ap50": {name: round(value, 4) for name, value in reached.items()},
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("network", choices=("yolov5", "ssd"))
+    parser.add_argument("--data", type=Path, default=Path("training/data"))
+    parser.add_argument("--data-seed", type=int, default=1, help="of render_data.py, for the card")
+    parser.add_argument("--out", type=Path, default=Path("training/out"))
+    parser.add_argument("--epochs", type=int, default=120)
+    parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long; 0 is no limit")
+    parser.add_argument("--batch", type=int, default=32)
+    parser.add_argument("--rate", type=float, default=2e-3)
+    parser.add_argument("--check", type=int, default=10, help="epochs from one validation to the next")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--device", default="")
+    train(parser.parse_args())
+
+
+if __name__ == "__main__":
+    main()
