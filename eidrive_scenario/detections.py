@@ -22,6 +22,7 @@ class Detections:
     classes     (N,) names out of CLASSES
     velocity    (N, 2) world frame [m/s], NaN where unknown
     covariance  (N, 2, 2) of the position x y [m²], NaN where unknown
+    tracks      numbers of the tracks (N,), the same for one object over time; empty where nobody tracks
     """
 
     time: float
@@ -30,6 +31,7 @@ class Detections:
     classes: tuple[str, ...] = ()
     velocity: Array = field(default_factory=lambda: np.empty((0, 2)))
     covariance: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
+    tracks: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.boxes)
@@ -40,6 +42,8 @@ class Detections:
                 raise ValueError(f"{name} has shape {getattr(self, name).shape}, expected {shape}")
         if len(self.classes) != count:
             raise ValueError(f"{len(self.classes)} classes for {count} boxes")
+        if self.tracks and len(self.tracks) != count:
+            raise ValueError(f"{len(self.tracks)} tracks for {count} boxes")
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -54,4 +58,5 @@ class Detections:
             tuple(self.classes[row] for row in picked),
             self.velocity[picked],
             self.covariance[picked],
+            tuple(self.tracks[row] for row in picked) if self.tracks else (),
         )

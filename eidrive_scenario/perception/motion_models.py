@@ -1,0 +1,170 @@
+"""How tracked objects move: constant velocity, or constant turn rate and speed; for all tracks at once."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+ACCELERATION_DENSITY = 6.0
+"""Of white acceleration [m²/s³]: within a second, a speed changes by 2.4 m/s (standard deviation)."""
+TURN_DENSITY = 0.15
+"""Of white yaw acceleration [rad²/s³]: within a second, a turn rate changes by 0.4 rad/s."""
+UNKNOWN_SPEED = 12.0
+"""Of an object seen for the first time, standard deviation [m/s]."""
+KNOWN_SPEED = 0.5
+"""Of a velocity that the detector gives [m/s]."""
+HEADING_DEVIATION = math.radians(6.0)
+"""Of the axis of a box from the axis of the object [rad]."""
+UNKNOWN_TURN = 0.3
+"""Of the turn rate of an object seen for the first time [rad/s]."""
+BACKWARDS = 0.5
+"""A box that moves backwards faster than this is taken to have its front at the other end [m/s]."""
+
+
+class Estimates(NamedTuple):
+    """States (N, D) of tracks and their covariances (N, D, D); x and y come first."""
+
+    state: Array
+    covariance: Array
+
+
+class MotionModel(ABC):
+    """The state of a track, and how it goes on. Positions [m], angles [rad], all in the world frame."""
+
+    size: ClassVar[int]
+
+    @abstractmethod
+    def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
+        """First estimates from boxes (N, 7), velocities (N, 2), NaN where unknown, and position noise (N, 2, 2)."""
+
+    @abstractmethod
+    def predict(self, tracks: Estimates, step: float) -> Estimates:
+        """The estimates `step` seconds later."""
+
+    @abstractmethod
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+        """The estimates with boxes (N, 7) measured, one for each track, with position noise (N, 2, 2)."""
+
+    @abstractmethod
+    def velocity(self, state: Array) -> Array:
+        """(N, 2) velocities [m/s]."""
+
+
+class ConstantVelocity(MotionModel):
+    """State x, y, vx, vy; white noise acceleration (Bar-Shalom, Li and Kirubarajan, Estimation with applications to
+    tracking and navigation, 2001, section 6.2.2)."""
+
+    size: ClassVar[int] = 4
+
+    def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
+        known = np.asarray(np.all(np.isfinite(velocity), axis=1))
+        state = np.concatenate([boxes[:, :2], np.where(known[:, None], velocity, 0.0)], axis=1)
+        covariance = np.zeros((len(boxes), 4, 4))
+        covariance[:, :2, :2] = noise
+        variance = np.where(known, KNOWN_SPEED, UNKNOWN_SPEED) ** 2
+        covariance[:, 2, 2] = covariance[:, 3, 3] = variance
+        return Estimates(state, covariance)
+
+    def predict(self, tracks: Estimates, step: float) -> Estimates:
+        forward = np.eye(4)
+        forward[0, 2] = forward[1, 3] = step
+        drift = np.zeros((4, 4))
+        drift[0, 0] = drift[1, 1] = step**3 / 3.0
+        drift[2, 2] = drift[3, 3] = step
+        drift[0, 2] = drift[2, 0] = drift[1, 3] = drift[3, 1] = step**2 / 2.0
+        covariance = forward @ tracks.covariance @ forward.T + ACCELERATION_DENSITY * drift
+        return Estimates(tracks.state @ forward.T, covariance)
+
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+        return _corrected(tracks, boxes[:, :2] - tracks.state[:, :2], noise)
+
+    def velocity(self, state: Array) -> Array:
+        return state[:, 2:4]
+
+
+class TurnRate(MotionModel):
+    """State x, y, heading, speed, turn rate, the latter two constant but for white noise (Schubert, Richter and
+    Wanielik, Comparison and evaluation of advanced motion models for vehicle tracking, FUSION 2008, section III)."""
+
+    size: ClassVar[int] = 5
+
+    def begin(self, boxes: Array, velocity: Array, noise: Array) -> Estimates:
+        known = np.asarray(np.all(np.isfinite(velocity), axis=1))
+        vx, vy = np.where(known[:, None], velocity, 0.0).T
+        state = np.zeros((len(boxes), 5))
+        state[:, :2], state[:, 2] = boxes[:, :2], boxes[:, 6]
+        state[:, 3] = vx * np.cos(boxes[:, 6]) + vy * np.sin(boxes[:, 6])
+        covariance = np.zeros((len(boxes), 5, 5))
+        covariance[:, :2, :2] = noise
+        covariance[:, 2, 2] = HEADING_DEVIATION**2
+        covariance[:, 3, 3] = np.where(known, KNOWN_SPEED, UNKNOWN_SPEED) ** 2
+        covariance[:, 4, 4] = UNKNOWN_TURN**2
+        return Estimates(state, covariance)
+
+    def predict(self, tracks: Estimates, step: float) -> Estimates:
+        x, y, heading, speed, turn = tracks.state.T
+        half = 0.5 * turn * step
+        # A chord of the arc: its length is v·T·sin(half)/half, its direction that of the middle of the turn.
+        shrink = np.sinc(half / np.pi)
+        middle = heading + half
+        cos, sin = np.cos(middle), np.sin(middle)
+        chord = speed * step * shrink
+        state = np.stack([x + chord * cos, y + chord * sin, heading + turn * step, speed, turn], axis=1)
+        slope = np.where(np.abs(half) > 1e-4, (np.cos(half) - shrink) / np.where(half == 0.0, 1.0, half), -half / 3.0)
+        bend = speed * step * slope * 0.5 * step
+        forward: Array = np.broadcast_to(np.eye(5), (len(x), 5, 5)).copy()
+        forward[:, 0, 2], forward[:, 1, 2] = -chord * sin, chord * cos
+        forward[:, 0, 3], forward[:, 1, 3] = step * shrink * cos, step * shrink * sin
+        forward[:, 0, 4] = bend * cos - chord * sin * 0.5 * step
+        forward[:, 1, 4] = bend * sin + chord * cos * 0.5 * step
+        forward[:, 2, 4] = step
+        gain = np.zeros((len(x), 5, 2))
+        gain[:, 0, 0], gain[:, 1, 0], gain[:, 3, 0] = 0.5 * step * np.cos(heading), 0.5 * step * np.sin(heading), 1.0
+        gain[:, 2, 1], gain[:, 4, 1] = 0.5 * step, 1.0
+        density = step * np.array([ACCELERATION_DENSITY, TURN_DENSITY])
+        covariance = forward @ tracks.covariance @ _transposed(forward) + (gain * density) @ _transposed(gain)
+        return Estimates(state, covariance)
+
+    def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Estimates:
+        """Position, and the axis of the box where it is nearer to the heading than its other axis is."""
+        off = (boxes[:, 6] - tracks.state[:, 2] + np.pi / 2.0) % np.pi - np.pi / 2.0
+        usable = np.abs(off) < np.pi / 4.0
+        innovation = np.column_stack([boxes[:, :2] - tracks.state[:, :2], np.where(usable, off, 0.0)])
+        full = np.zeros((len(boxes), 3, 3))
+        full[:, :2, :2] = noise
+        full[:, 2, 2] = np.where(usable, HEADING_DEVIATION**2, 1e6)
+        state, covariance = _corrected(tracks, innovation, full)
+        backwards = state[:, 3] < -BACKWARDS
+        if backwards.any():
+            # The same motion with the front at the other end: heading + pi, -speed.
+            state[backwards, 2] += np.pi
+            state[backwards, 3] *= -1.0
+            mirror = np.array([1.0, 1.0, 1.0, -1.0, 1.0])
+            covariance[backwards] *= mirror[:, None] * mirror
+        state[:, 2] = np.pi - (np.pi - state[:, 2]) % (2.0 * np.pi)
+        return Estimates(state, covariance)
+
+    def velocity(self, state: Array) -> Array:
+        return np.stack([state[:, 3] * np.cos(state[:, 2]), state[:, 3] * np.sin(state[:, 2])], axis=1)
+
+
+def _corrected(tracks: Estimates, innovation: Array, noise: Array) -> Estimates:
+    """Kalman's update where the first entries of the state are measured, in Joseph's form."""
+    measured, size = innovation.shape[1], tracks.state.shape[1]
+    spread = tracks.covariance[:, :measured, :measured] + noise
+    gain = _transposed(np.asarray(np.linalg.solve(spread, tracks.covariance[:, :measured]), dtype=np.float64))
+    state = tracks.state + np.einsum("nij,nj->ni", gain, innovation)
+    rest: Array = np.broadcast_to(np.eye(size), (len(state), size, size)).copy()
+    rest[:, :, :measured] -= gain
+    covariance = rest @ tracks.covariance @ _transposed(rest) + gain @ noise @ _transposed(gain)
+    return Estimates(state, covariance)
+
+
+def _transposed(matrices: Array) -> Array:
+    return np.swapaxes(matrices, 1, 2)

@@ -1,0 +1,256 @@
+"""Tracking: which boxes of one instant and the next are the same object, where it really is and how it moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
+from eidrive_scenario.settings import Settings
+
+Array = NDArray[np.float64]
+
+MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
+
+UNKNOWN_DEVIATION = 0.5
+"""Of positions for which the detector gives no covariance [m]."""
+LEAST_DEVIATION = 0.05
+"""Of positions for which it gives a smaller one, none at all for instance [m]."""
+MOVING = 1.0
+"""From this speed on, the front of an object is where it drives to [m/s]."""
+SMOOTHING = 0.2
+"""Share of a new box in the size, height and heading of an object that has been seen often."""
+OUTSIDE = 1e6
+"""Cost of a pair beyond the gate; larger than any sum of costs within."""
+
+
+class TrackerSettings(Settings):
+    """The property `tracker`: a kind, or a mapping with these.
+
+    kind      cv: constant velocity; ctrv: constant turn rate and speed; none
+    confirm   [n, m]: an object is reported once it was detected in n of m successive detections
+    coast     how long an object that is no longer detected is reported where it should be [s]
+    gate      probability that a detection of an object is within its gate
+    """
+
+    kind: Literal["none", "cv", "ctrv"] = "cv"
+    confirm: tuple[PositiveInt, PositiveInt] = (2, 3)
+    coast: NonNegativeFloat = 0.5
+    gate: float = Field(default=0.99, gt=0.0, lt=1.0)
+
+    @model_validator(mode="after")
+    def _n_of_m(self) -> TrackerSettings:
+        if self.confirm[0] > self.confirm[1]:
+            raise ValueError(
+                f"{self.confirm[0]} of {self.confirm[1]} detections can never be; write [n, m] with n <= m"
+            )
+        return self
+
+
+def tracker_setting(value: Any) -> Any:
+    """A tracker may be written as its kind alone; None leaves it to the detector."""
+    return {"kind": value} if isinstance(value, str) else value
+
+
+class Tracker:
+    """A Kalman filter for each object, gated global nearest neighbours, and the life of tracks.
+
+    Pairs of tracks and boxes are the likeliest together (Hungarian method), each with a squared Mahalanobis distance
+    within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor tracking, 1995, section
+    2.3.2). A box that no track explains begins a new one, which is reported once it has been seen often enough.
+    """
+
+    def __init__(self, settings: TrackerSettings) -> None:
+        if settings.kind == "none":
+            raise ValueError("a tracker of kind 'none' is no tracker")
+        self.settings = settings
+        self._model = MODELS[settings.kind]()
+        self._gate = float(chi2.ppf(settings.gate, 2))
+        self._time: float | None = None
+        self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
+        self._shape = np.empty((0, 5))
+        """(N, 5) z, length, width, height, yaw."""
+        self._life: list[_Life] = []
+        self._confirmed = 0
+
+    def update(self, detections: Detections) -> Detections:
+        """The confirmed objects at the time of these detections, with velocities, covariances and track numbers.
+
+        Raises ValueError if they are older than those of the last call.
+        """
+        step = 0.0 if self._time is None else detections.time - self._time
+        if step < 0.0:
+            raise ValueError(f"detections of {detections.time} s after those of {self._time} s")
+        self._time = detections.time
+        if step > 0.0 and self._life:
+            self._tracks = self._model.predict(self._tracks, step)
+        noise = _noise(detections.covariance)
+        rows, columns = self._associate(detections.boxes, noise)
+        hit = set(rows)
+        if rows:
+            self._correct(rows, detections, columns, noise)
+        for row, life in enumerate(self._life):
+            life.note(row in hit, self.settings)
+        for row, column in zip(rows, columns, strict=True):
+            self._life[row].see(detections, column)
+        taken = set(columns)
+        self._begin(detections, [column for column in range(len(detections)) if column not in taken], noise)
+        self._bury(detections.time)
+        return self._reported(detections.time)
+
+    def _associate(self, boxes: Array, noise: Array) -> tuple[list[int], list[int]]:
+        """Rows of tracks and of boxes that belong together; confirmed tracks choose before others."""
+        if not self._life or not len(boxes):
+            return [], []
+        offset = boxes[None, :, :2] - self._tracks.state[:, None, :2]
+        spread = self._tracks.covariance[:, None, :2, :2] + noise[None]
+        a, b, d = spread[..., 0, 0], spread[..., 0, 1], spread[..., 1, 1]
+        x, y = offset[..., 0], offset[..., 1]
+        size = a * d - b * b
+        distance = (d * x * x - 2.0 * b * x * y + a * y * y) / size
+        # Minus twice the log of the likelihood, so that a track of which little is known does not win by its width.
+        cost = np.where(distance <= self._gate, distance + np.log(size), OUTSIDE)
+        confirmed = np.array([life.confirmed for life in self._life], dtype=bool)
+        rows: list[int] = []
+        columns: list[int] = []
+        for group in (np.flatnonzero(confirmed), np.flatnonzero(~confirmed)):
+            free = np.setdiff1d(np.arange(len(boxes)), columns) if columns else np.arange(len(boxes))
+            for row, column in _assigned(cost[group][:, free]):
+                rows.append(int(group[row]))
+                columns.append(int(free[column]))
+        return rows, columns
+
+    def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
+        boxes = detections.boxes[columns]
+        before = Estimates(self._tracks.state[rows], self._tracks.covariance[rows])
+        state, covariance = self._model.update(before, boxes, noise[columns])
+        self._tracks.state[rows], self._tracks.covariance[rows] = state, covariance
+        share = np.array([max(SMOOTHING, 1.0 / (self._life[row].hits + 1.0)) for row in rows])
+        shape = self._shape[rows]
+        shape[:, :4] += share[:, None] * (boxes[:, 2:6] - shape[:, :4])
+        shape[:, 4] = self._headings(shape[:, 4], boxes[:, 6], state, share)
+        self._shape[rows] = shape
+
+    def _headings(self, held: Array, measured: Array, state: Array, share: Array) -> Array:
+        """(N,) headings: the axis of the boxes, its front where the object drives to or else where it was before."""
+        vx, vy = self._model.velocity(state).T
+        course = np.where(vx * vx + vy * vy > MOVING * MOVING, np.arctan2(vy, vx), held)
+        turned = np.where(np.cos(measured - course) < 0.0, measured + math.pi, measured)
+        held = np.where(np.cos(held - course) < 0.0, held + math.pi, held)
+        # An axis across the course is the other one of the box: the fit of an L took the width for the length.
+        turned = np.where(np.cos(turned - course) < math.cos(math.pi / 4), held, turned)
+        return np.asarray(held + share * ((turned - held + math.pi) % (2.0 * math.pi) - math.pi))
+
+    def _begin(self, detections: Detections, columns: list[int], noise: Array) -> None:
+        if not columns:
+            return
+        boxes = detections.boxes[columns]
+        new = self._model.begin(boxes, detections.velocity[columns], noise[columns])
+        self._tracks = Estimates(
+            np.concatenate([self._tracks.state, new.state]), np.concatenate([self._tracks.covariance, new.covariance])
+        )
+        self._shape = np.concatenate([self._shape, boxes[:, 2:7]])
+        for column in columns:
+            life = _Life()
+            life.note(True, self.settings)
+            life.see(detections, column)
+            self._life.append(life)
+
+    def _bury(self, now: float) -> None:
+        """Forget tracks that cannot be confirmed any more, and those that have coasted for too long."""
+        kept = [row for row, life in enumerate(self._life) if life.goes_on(now, self.settings)]
+        if len(kept) < len(self._life):
+            self._tracks = Estimates(self._tracks.state[kept], self._tracks.covariance[kept])
+            self._shape = self._shape[kept]
+            self._life = [self._life[row] for row in kept]
+
+    def _reported(self, now: float) -> Detections:
+        shown = [row for row, life in enumerate(self._life) if life.confirmed]
+        lives = [self._life[row] for row in shown]
+        for life in lives:
+            if life.number is None:
+                self._confirmed += 1
+                life.number = self._confirmed
+        state = self._tracks.state[shown]
+        shape = self._shape[shown]
+        yaw = math.pi - (math.pi - shape[:, 4:]) % (2.0 * math.pi)
+        return Detections(
+            now,
+            np.concatenate([state[:, :2], shape[:, :4], yaw], axis=1),
+            np.array([life.score_at(now, self.settings.coast) for life in lives]),
+            tuple(life.name for life in lives),
+            self._model.velocity(state).copy(),
+            self._tracks.covariance[shown][:, :2, :2],
+            tuple(life.number or 0 for life in lives),
+        )
+
+
+class _Life:
+    """When a track was seen, how surely and as what."""
+
+    __slots__ = ("_names", "_recent", "_score", "_seen", "confirmed", "hits", "number")
+
+    def __init__(self) -> None:
+        self.confirmed = False
+        self.number: int | None = None
+        self.hits = 0
+        self._recent: list[bool] = []
+        self._names: dict[str, float] = {}
+        self._score = 0.0
+        self._seen = -math.inf
+
+    @property
+    def name(self) -> str:
+        """The class for which the detections' scores add up to the most."""
+        return max(self._names, key=lambda name: self._names[name])
+
+    def note(self, hit: bool, settings: TrackerSettings) -> None:
+        """Whether the detections just processed show the object."""
+        self.hits += hit
+        if not self.confirmed:
+            self._recent = [*self._recent, hit][-settings.confirm[1] :]
+            self.confirmed = sum(self._recent) >= settings.confirm[0]
+
+    def see(self, detections: Detections, column: int) -> None:
+        """The object is this detection."""
+        self._seen = detections.time
+        self._score = float(detections.scores[column])
+        name = detections.classes[column]
+        self._names[name] = self._names.get(name, 0.0) + self._score
+
+    def goes_on(self, now: float, settings: TrackerSettings) -> bool:
+        """Whether the track is worth keeping."""
+        if self.confirmed:
+            return now - self._seen <= settings.coast + 1e-9
+        return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
+
+    def score_at(self, now: float, coast: float) -> float:
+        """The last score, which falls to 0 while the object is not seen."""
+        return self._score * (1.0 - (now - self._seen) / (coast + 1e-9)) if now > self._seen else self._score
+
+
+def _assigned(cost: Array) -> list[tuple[int, int]]:
+    """Pairs of rows and columns with the least sum of costs, as many as there are within the gate."""
+    if not cost.size:
+        return []
+    inside = cost < OUTSIDE
+    rows, columns = np.nonzero(inside)
+    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
+        rows, columns = linear_sum_assignment(cost)
+    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
+
+
+def _noise(covariance: Array) -> Array:
+    """(N, 2, 2) of the positions measured, where the detector says nothing or too little of it."""
+    unknown = np.asarray(np.any(~np.isfinite(covariance), axis=(1, 2)))
+    noise = np.where(unknown[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
+    thin = (noise[:, 0, 0] < LEAST_DEVIATION**2) | (noise[:, 1, 1] < LEAST_DEVIATION**2)
+    return np.where(thin[:, None, None], noise + LEAST_DEVIATION**2 * np.eye(2), noise)
