@@ -14,7 +14,7 @@ from eidrive_scenario.world.actor import Placement
 
 TINY = 1e-6
 ACROSS = math.cos(math.radians(50.0))
-"""An actor that points further away from its lane than 50° crosses the road instead of following the lane."""
+"""An actor that is placed pointing further away from its lane than 50° crosses the road instead of following it."""
 
 
 APART = 0.01
@@ -62,6 +62,7 @@ class Motion:
         self._landing = False
         self._carried: float | None = None
         self._lift = 0.0
+        self._crosses = False
         self._teleport = False
         self.jumped = False
         """True from a teleport until the view that shows it."""
@@ -70,6 +71,7 @@ class Motion:
         """Place it there at once; its speed stays. The next view shows it there, so the step that begins is used up."""
         self.pose = place.pose
         self._adopt(place.location)
+        self._crosses = self.location is not None and abs(math.cos(self.heading)) < ACROSS
         self.end_of_road = False
         self._teleport = self.jumped = True
 
@@ -112,7 +114,8 @@ class Motion:
         self.land()
 
     def land(self) -> None:
-        """Find the lane again after free motion."""
+        """Find the lane again after free motion; the actor follows it at the angle at which it arrived."""
+        self._crosses = False
         hint = self.location
         place = self.roads.locate_at(self.pose.x, self.pose.y, hint) if self.roads is not None else None
         self._adopt(place)
@@ -140,7 +143,7 @@ class Motion:
                     self.speed = 0.0
         elif distance == 0.0 and steering is None:
             pass
-        elif self.location is not None and (carried is not None or abs(math.cos(self.heading)) >= ACROSS):
+        elif self.location is not None and (carried is not None or not self._crosses):
             self._along_lane(distance, steering)
         else:
             self._freely(distance)

@@ -123,8 +123,19 @@ def test_a_lateral_distance_is_kept_beside(scene: Any) -> None:
       continuous="false" coordinateSystem="lane" displacement="leftToReferencedEntity">
       <DynamicConstraints maxSpeed="1"/></LateralDistanceAction></LateralAction></PrivateAction>"""
     played = scene(5, ("Ego", action))
-    assert played.at(1.0).y == pytest.approx(-1.0)
+    assert played.at(1.1).y == pytest.approx(-1.0)
     assert played.at(4.0).y == pytest.approx(1.0, abs=0.02)
+
+
+def test_free_space_beside_is_from_flank_to_flank(scene: Any) -> None:
+    """Two cars of 2 m: their middles are 2.5 m apart; within a limit of acceleration the way there is a spring's."""
+    action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="0.5" freespace="true"
+      continuous="true" coordinateSystem="lane" displacement="rightToReferencedEntity">
+      <DynamicConstraints maxAcceleration="4"/></LateralDistanceAction></LateralAction></PrivateAction>"""
+    played = scene(12, ("Ego", action))
+    assert -4.5 - 1e-3 < min(row["Ego"].y for row in played.rows)
+    assert played.at(12.0).y == pytest.approx(-4.5, abs=1e-3)
+    assert played.at(12.0).yaw == pytest.approx(0.0, abs=1e-3)
 
 
 def test_teleports_show_in_the_next_view(scene: Any) -> None:

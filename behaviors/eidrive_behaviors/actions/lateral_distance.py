@@ -6,6 +6,7 @@ import math
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS
 from eidrive_scenario.api import ActionBehaviour, Domain, Steering, distance, frame_of, model
 
 REACHED = 0.01
@@ -15,8 +16,10 @@ REACHED = 0.01
 class LateralDistanceAction(ActionBehaviour):
     """Keeps `distance` metres beside an entity, on the side that `displacement` names (any: where the actor is).
 
-    The actor goes sideways as fast as its DynamicConstraints let it, and brakes so as to arrive without overshoot;
-    without constraints it is at its place at once.
+    Without a limit of acceleration the actor goes sideways as fast as `maxSpeed` lets it, without any at once. With
+    one it follows like a critically damped spring whose stiffness goes with the limit, as LongitudinalDistanceAction
+    does. Free space is that between the flanks of both, as if they stood along the lane. The standard leaves the
+    course of the distance open.
     """
 
     domains = Domain.LATERAL
@@ -41,43 +44,53 @@ class LateralDistanceAction(ActionBehaviour):
         here, roads = motion.location, self.stage.roads
         if self.actor.driven or self.action.entity_ref not in self.stage.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
-        wanted = self._side * (self.action.distance or 0.0)
-        error = wanted + self._beside()
+        error = self._side * self._wanted() + self._beside()
         if math.isnan(error):
             return Status.RUNNING
         sideways = self._sideways(error, dt)
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
-        motion.steer(Steering(offset, None if abs(motion.speed) > 1e-6 else 0.0, slows=False))
+        motion.steer(Steering(offset, None if abs(motion.speed) > 1e-6 else 0.0))
         arrived = abs(error - sideways) < REACHED
         return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
 
     def _sideways(self, error: float, dt: float) -> float:
-        """Metres to the left in this step."""
+        """Metres to the left in this step; the rate that is decided on holds from the next one."""
         limits = self.action.dynamic_constraints
         if limits is None or dt == 0.0:
             return error if limits is None else 0.0
+        way = self._rate * dt
         top = math.inf if limits.max_speed is None else limits.max_speed
         faster = math.inf if limits.max_acceleration is None else limits.max_acceleration
         slower = faster if limits.max_deceleration is None else limits.max_deceleration
-        rate = min(top, abs(error) / dt)
-        if math.isfinite(slower):
-            rate = min(rate, math.sqrt(2.0 * slower * abs(error)))
-        rate = math.copysign(rate, error)
-        if math.isfinite(faster):
-            rate = min(max(rate, self._rate - faster * dt), self._rate + faster * dt)
-        self._rate = rate
-        return rate * dt
+        if math.isinf(faster):
+            rate = (error - way) / dt
+        else:
+            stiffness = STIFFNESS * faster
+            pull = stiffness * error - 2.0 * math.sqrt(stiffness) * self._rate
+            limit = faster if pull * self._rate >= 0.0 else slower
+            rate = self._rate + min(max(pull, -limit), limit) * dt
+        self._rate = min(max(rate, -top), top)
+        return way
 
     def _beside(self) -> float:
-        """How far the other is to the left [m]."""
-        return distance(
-            self.stage,
-            self.actor.name,
-            self.action.entity_ref,
-            frame=frame_of(self.action.coordinate_system),
-            kind="lateral",
-            freespace=self.action.freespace,
+        """How far the other's middle is to the left of the own one [m]."""
+        frame = frame_of(self.action.coordinate_system)
+        beside = distance(
+            self.stage, self.actor.name, self.action.entity_ref, frame=frame, kind="lateral", freespace=False
         )
+        mine, theirs = self._boxes()
+        return beside + theirs.center.y - mine.center.y
+
+    def _wanted(self) -> float:
+        """How far apart the middles of the two shall be [m]."""
+        apart = self.action.distance or 0.0
+        if self.action.freespace:
+            apart += 0.5 * sum(box.dimensions.width for box in self._boxes())
+        return apart
+
+    def _boxes(self) -> tuple[model.BoundingBox, model.BoundingBox]:
+        actors = self.stage.actors
+        return self.actor.entity.bounding_box, actors[self.action.entity_ref].entity.bounding_box
 
     def describe(self) -> str:
         """Distance, and to whom."""
