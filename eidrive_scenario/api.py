@@ -33,6 +33,7 @@ from eidrive_scenario.storyboard.environments import changed as changed_environm
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
 from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve
 from eidrive_scenario.storyboard.progress import Progress, Watch
+from eidrive_scenario.storyboard.random_way import any_branch, random_route
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
@@ -106,6 +107,7 @@ __all__ = [
     "Visibility",
     "Watch",
     "WorldView",
+    "any_branch",
     "box_distance",
     "box_of",
     "changed_environment",
@@ -126,6 +128,7 @@ __all__ = [
     "never_appeared",
     "overlap",
     "parse_settings",
+    "random_route",
     "references",
     "resolve",
     "route_of",

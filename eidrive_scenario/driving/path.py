@@ -46,6 +46,11 @@ class Path:
                 best, nearest = index, distance
         return best
 
+    def distance(self, x: float, y: float, index: int) -> float:
+        """How far a point is from the segment that begins at an index [m]; from the last one beyond that."""
+        index = min(index, len(self._x) - 2)
+        return segment_distance(x, y, self._x[index], self._y[index], self._x[index + 1], self._y[index + 1])
+
     def _speed_limits(self) -> Array:
         step = np.diff(self.points, axis=0)
         length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-6)

@@ -23,6 +23,8 @@ HORIZON = 60
 """Points of a plan ahead of the vehicle."""
 LOOK_AHEAD = 300
 """Points of the lane that are followed at once where there is no destination."""
+STRAYED = 2.5
+"""A vehicle this far from the lane that it follows was moved by somebody else, and looks for its lane anew [m]."""
 BEHIND = 5
 """Points behind the vehicle that stay when the path is carried on."""
 
@@ -48,6 +50,10 @@ class RoutePlanner(Planner):
         x, y, _ = ego.position.tolist()
         path = self._current_path(x, y, ego.yaw, goal)
         self._progress = path.project(x, y, self._progress)
+        if self._way[0] is None and self._way[1] is None and path.distance(x, y, self._progress) > STRAYED:
+            self._lane = []
+            path = self._path = self._lane_ahead(x, y, ego.yaw)
+            self._progress = path.project(x, y)
         if not path.ends and len(path) - self._progress < 2 * HORIZON:
             path = self._path = self._lane_ahead(x, y, ego.yaw)
             self._progress = path.project(x, y)

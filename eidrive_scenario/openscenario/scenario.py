@@ -12,10 +12,15 @@ from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.document import read_root
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
+    BoundingBox,
     CatalogReference,
+    Center,
     Controller,
+    Dimensions,
     Element,
+    ExternalObjectReference,
     MiscObject,
+    MiscObjectCategory,
     OpenScenario,
     ParameterDeclarations,
     Pedestrian,
@@ -42,6 +47,7 @@ class Scenario:
     parameters   of the scenario as a whole, with the values that count
     variables    of the scenario, with their values at the start
     entities     by name, trailers included; catalog references resolved
+    external     those entities that another tool defines: `entities` has a body of no size for them
     controllers  of each entity, in the order of the file; catalog references resolved
     road_file    None if the scenario names none
     warnings     what the file's version of the standard deprecates
@@ -57,6 +63,7 @@ class Scenario:
     controllers: Mapping[str, tuple[Controller, ...]]
     road_file: Path | None
     warnings: tuple[Problem, ...]
+    external: Mapping[str, ExternalObjectReference]
     entries: Mapping[CatalogReference, Element] = field(repr=False)
 
     @property
@@ -105,12 +112,28 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         document=root,
         parameters=_values(root.parameter_declarations),
         variables=_values(root.variable_declarations),
-        entities={one.name: body for one, body in objects if isinstance(body, Vehicle | Pedestrian | MiscObject)},
+        entities={one.name: found for one, body in objects if (found := _body(one, body)) is not None},
+        external={one.name: body for one, body in objects if isinstance(body, ExternalObjectReference)},
         controllers={one.name: _controllers(one, library.entries) for one, _ in objects},
         road_file=road_file,
         warnings=warnings,
         entries=library.entries,
     )
+
+
+def _body(one: ScenarioObject, body: Element | None) -> EntityObject | None:
+    """What an entity is made of; one that another tool defines is made of nothing in particular."""
+    if isinstance(body, ExternalObjectReference):
+        box = BoundingBox(center=Center(x=0.0, y=0.0, z=0.0), dimensions=Dimensions(length=0.0, width=0.0, height=0.0))
+        return MiscObject(
+            name=body.name,
+            mass=0.0,
+            misc_object_category=MiscObjectCategory.NONE,
+            bounding_box=box,
+            line=one.line,
+            source=one.source,
+        )
+    return body if isinstance(body, Vehicle | Pedestrian | MiscObject) else None
 
 
 def _values(declarations: ParameterDeclarations | VariableDeclarations | None) -> dict[str, str]:

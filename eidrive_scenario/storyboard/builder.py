@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from eidrive_scenario.errors import Problem, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
@@ -18,6 +18,7 @@ from eidrive_scenario.storyboard.elements import (
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.init_block import InitBlock
+from eidrive_scenario.storyboard.selections import Selections, joined
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
 
@@ -57,8 +58,7 @@ class Builder:
         self._conditions = conditions
         self._problems: list[Problem] = []
         self._made: list[Condition] = []
-        selections = scenario.document.entities.entity_selection if scenario.document.entities is not None else ()
-        self._selections: Mapping[str, model.EntitySelection] = {entry.name: entry for entry in selections}
+        self._selections = Selections(scenario)
 
     def build(self) -> tuple[InitBlock, StoryboardElement]:
         """The actions of Init and the tree. Raises ScenarioError with all that cannot be executed."""
@@ -161,13 +161,14 @@ class Builder:
                 )
                 continue
             try:
-                made = self._actions.load(name)(leaf, self._stage, actor=actor, parent=parent)
+                one = self._selections.single(leaf)
+                for around in [one] if parent is leaf else self._selections.alternatives(parent):
+                    made = self._actions.load(name)(one, self._stage, actor=actor, parent=around)
+                    if not isinstance(made, ActionBehaviour):
+                        raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
+                    behaviours.append(made)
             except ScenarioError as error:
                 self._problems += error.problems
-                continue
-            if not isinstance(made, ActionBehaviour):
-                raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
-            behaviours.append(made)
         return behaviours
 
     def _wait(self, name: str, trigger: model.Trigger | None) -> WaitFor | None:
@@ -195,38 +196,33 @@ class Builder:
             )
             return None
         kind = self._conditions.load(name)
+        made: list[Condition] = []
         try:
             if by_entity is None:
-                condition: Condition = kind(leaf)
+                made = [kind(leaf)]
             else:
                 triggering = by_entity.triggering_entities
                 names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
-                condition = kind(leaf, names, triggering.triggering_entities_rule.value)
+                rule = triggering.triggering_entities_rule.value
+                made = [kind(one, names, rule) for one in self._selections.alternatives(leaf)]
         except ScenarioError as error:
             self._problems += error.problems
             return None
-        if not isinstance(condition, Condition) or (
-            by_entity is not None and not isinstance(condition, EntityCondition)
-        ):
+        needed = Condition if by_entity is None else EntityCondition
+        if not all(isinstance(one, needed) for one in made):
             raise RegistryError(f"conditions {name!r} ({self._conditions.value(name)}) is no Condition of this kind")
+        towards = [one for one in made if isinstance(one, EntityCondition)]
+        condition = made[0] if by_entity is None else joined(towards)
         self._made.append(condition)
         return ConditionMonitor(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
 
     def _entities(self, name: str) -> list[str]:
         """The entity of this name, or the members of the selection of this name."""
-        selection = self._selections.get(name)
-        if selection is None or name in self._scenario.entities:
-            return [name]
-        members = [one for ref in selection.members.entity_ref for one in self._entities(ref.entity_ref)]
-        for entry in selection.members.by_type:
-            members += [n for n, entity in self._scenario.entities.items() if _is_a(entity, entry.object_type.value)]
-        return list(dict.fromkeys(members))
-
-
-def _is_a(entity: model.Element, kind: str) -> bool:
-    return {"Vehicle": "vehicle", "Pedestrian": "pedestrian", "MiscObject": "miscellaneous"}[
-        type(entity).__name__
-    ] == kind
+        try:
+            return self._selections.members(name)
+        except ScenarioError as error:
+            self._problems += error.problems
+            return []
 
 
 def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[model.Element, model.Element]]:

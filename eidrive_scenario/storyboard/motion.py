@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.roads import Choose, LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.world.actor import Placement
 
 TINY = 1e-6
@@ -56,6 +56,8 @@ class Motion:
         self.heading = 0.0
         self.speed = 0.0
         self.route: Route | None = None
+        self.choose: Choose | None = None
+        """Picks a branch at forks that the route leaves open; None takes the straightest."""
         self.end_of_road = False
         self._steering: Steering | None = None
         self._next_pose: Pose | None = None
@@ -168,7 +170,7 @@ class Motion:
             if steering.slows:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         if distance != 0.0:
-            there = self.roads.advance(here, distance * self.direction, route=self.route)
+            there = self.roads.advance(here, distance * self.direction, route=self.route, choose=self.choose)
             if there is None:
                 there = self._last_place(here, distance * self.direction * way)
                 if self.end_of_road:

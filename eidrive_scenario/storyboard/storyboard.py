@@ -11,6 +11,7 @@ from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.builder import Builder
 from eidrive_scenario.storyboard.commands import Commands
+from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
@@ -44,6 +45,8 @@ class Storyboard:
         self.init, self.root = builder.build()
         for name, actor in self.stage.actors.items():
             actor.trailer = declared_trailer(scenario.entities[name])
+        self._external = ExternalObjects(scenario, roads)
+        self.stage.warnings += self._external.warnings
         self.ended: str | None = None
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 
@@ -56,6 +59,9 @@ class Storyboard:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
         self.stage.signals.advance(0.0)
         self.init.start()
+        for name, placed in self._external.places().items():
+            if not self.stage.actors[name].present:
+                self.stage.enter(name, Place(placed.pose))
         self._bring_trailers()
         for actor in self.stage.actors.values():
             actor.motion.settle()
@@ -104,6 +110,9 @@ class Storyboard:
     def _refresh(self, commands: Commands) -> None:
         """Who enters has the speed that later actions of the same tick gave it."""
         for name in commands.additions:
+            body = self._external.body(name)
+            if body is not None:
+                commands.bodies[name] = body
             commands.additions[name] = self.stage.actors[name].motion.placement()
 
     def _finished(self, commands: Commands) -> Commands:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Override, Stage, is_ours, model
+from eidrive_scenario.api import ActionBehaviour, Actor, Goal, Override, Stage, is_ours, model
 
+POINTS_APART = 2.0
+"""Of a route that a controller takes over [m]."""
 GEARS = {"n": 0.0, "p": 0.0, "r": -1.0, "d": 1.0}
 
 
@@ -137,3 +142,15 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         actor.longitudinal = longitudinal
     if before and not actor.driven and actor.present:
         actor.motion.land()
+    if actor.driven and not before and actor.present:
+        actor.goal = Goal(speed=actor.motion.speed, path=_rest_of_route(actor))
+
+
+def _rest_of_route(actor: Actor) -> np.ndarray[tuple[int, int], np.dtype[np.float64]] | None:
+    """The points (M, 3) of the actor's route from where it is [m]; None without one, or at its end."""
+    route, pose = actor.motion.route, actor.motion.pose
+    if route is None:
+        return None
+    done, _ = route.project(pose.x, pose.y)
+    count = math.ceil((route.length - done) / POINTS_APART) + 1
+    return np.asarray(route.points_at(np.linspace(done, route.length, count))) if count > 2 else None

@@ -13,11 +13,17 @@ from eidrive_scenario.api import (
     EidriveError,
     Goal,
     Route,
+    Stage,
+    any_branch,
+    generator,
+    model,
+    random_route,
     resolve,
     route_of,
 )
-from eidrive_scenario.api import model as model
 
+RANDOM_WAY = 5000.0
+"""Length of the way that a vehicle which drives itself gets for a random route [m]."""
 ARRIVED = 2.0
 """A vehicle that drives itself has arrived when it is this near to its destination [m]."""
 
@@ -72,9 +78,50 @@ class AcquirePositionAction(ActionBehaviour):
         return f"drive to {position_in_words(self.action.position)}"
 
 
+class RandomRouteAction(ActionBehaviour):
+    """Lets the actor drive about: at each fork it takes one of the branches, all as likely, from now on.
+
+    Who drives itself gets a way of that kind of some kilometres as its path. The run's seed decides.
+    """
+
+    action: model.RandomRouteAction
+
+    def __init__(
+        self,
+        action: model.RandomRouteAction,
+        stage: Stage,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
+    ) -> None:
+        super().__init__(action, stage, actor=actor, parent=parent)
+        self._starts = 0
+        if stage.roads is None:
+            raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
+
+    def initialise(self) -> None:
+        """Each start draws a way of its own."""
+        self._starts += 1
+
+    def update(self) -> Status:
+        """Forget the route, and choose at random."""
+        actor, roads = self.actor, self.stage.roads
+        choose = any_branch(generator(self.stage.seed, "random route", actor.name, self._starts))
+        actor.motion.route, actor.motion.choose = None, choose
+        here = self.stage.location(actor.name)
+        if actor.driven and roads is not None and here is not None:
+            way = random_route(roads, here, RANDOM_WAY, choose)
+            actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0))
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """What it does."""
+        return "drive about at random"
+
+
 def follow(behaviour: ActionBehaviour, route: Route) -> None:
     """Make a route the actor's own."""
     actor = behaviour.actor
-    actor.motion.route = route
+    actor.motion.route, actor.motion.choose = route, None
     if actor.driven:
         actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0))

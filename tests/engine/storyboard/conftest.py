@@ -10,6 +10,7 @@ import pytest
 from py_trees.common import Status
 
 from eidrive_scenario.openscenario import load_scenario, model
+from eidrive_scenario.registry import Registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition
@@ -145,11 +146,17 @@ ACT = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximum
 def build() -> Callable[..., Storyboard]:
     """A storyboard over cars A and B without roads: A's actions in Init, events for A, stop trigger, global actions."""
 
-    def made(init: str, events: str = "", stop: str = "<StopTrigger/>", everywhere: str = "") -> Storyboard:
+    def made(
+        init: str,
+        events: str = "",
+        stop: str = "<StopTrigger/>",
+        everywhere: str = "",
+        actions: Registry | None = None,
+    ) -> Storyboard:
         text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
         actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
         stories = ACT.format(events=events) if events else ""
         text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)
-        return Storyboard(load_scenario(text.encode()), None, dt=0.1)
+        return Storyboard(load_scenario(text.encode()), None, dt=0.1, actions=actions)
 
     return made

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 import pytest
 
 from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.registry import Registry
 from eidrive_scenario.storyboard.rendering import render
 
 TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
@@ -133,8 +135,14 @@ def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
 
 def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) -> None:
     swarm = "<GlobalAction><TrafficAction><TrafficStopAction/></TrafficAction></GlobalAction>"
+    all_but_one = [point for point in entry_points(group="eidrive_scenario.actions") if "Stop" not in point.name]
     with pytest.raises(ScenarioError) as caught:
-        build(STARTS, EVENT.format(name="odd", action=swarm, trigger=""), everywhere=swarm)
+        build(
+            STARTS,
+            EVENT.format(name="odd", action=swarm, trigger=""),
+            everywhere=swarm,
+            actions=Registry("actions", all_but_one),
+        )
     messages = [problem.message for problem in caught.value.problems]
     assert messages == ["TrafficStopAction is not executed yet"] * 2
     assert all(problem.line for problem in caught.value.problems)

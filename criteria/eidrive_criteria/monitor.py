@@ -1,0 +1,59 @@
+"""A monitor of the scenario must have a value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict
+
+
+class MonitorSettings(CriterionSettings):
+    """`{of: CutInHappened, expected: true, throughout: false}`; `of` names a MonitorDeclaration of the scenario."""
+
+    of: str
+    expected: bool = True
+    throughout: bool = False
+    """Whether it has to have the value all the time, not at the end only."""
+
+
+class Monitor(Criterion):
+    """Fails where a monitor does not have the expected value at the end, or at any time where it has to throughout."""
+
+    settings_type = MonitorSettings
+    name = "monitor"
+
+    def __init__(self, settings: MonitorSettings) -> None:
+        super().__init__(settings)
+        self._settings = settings
+        self._value: bool | None = None
+        self._changed = 0.0
+        self._violated: float | None = None
+
+    def observe(self, frame: Frame) -> None:
+        value = frame.monitors.get(self._settings.of)
+        if value != self._value:
+            self._value, self._changed = value, frame.view.time
+        if value is not None and value != self._settings.expected and self._violated is None:
+            self._violated = frame.view.time
+
+    def verdict(self) -> Verdict:
+        of, expected, value = self._settings.of, self._settings.expected, self._value
+        final = self._violated is not None and self._settings.throughout
+        if value is None:
+            reason = f"the scenario has no monitor {of!r}"
+        else:
+            reason = f"{of} is {str(value).lower()} since {self._changed:.2f} s"
+        return Verdict(
+            name=self.name,
+            passed=value == expected and not final,
+            value=None if value is None else float(value),
+            limit=float(expected),
+            unit="",
+            first_violation=self._violated if final else None if value == expected else self._changed,
+            reason=reason,
+            fatal=self.fatal and final,
+        )
+
+    def metrics(self) -> Mapping[str, float]:
+        """When it last changed [s]."""
+        return {f"monitor.{self._settings.of}.changed": self._changed} if self._value is not None else {}

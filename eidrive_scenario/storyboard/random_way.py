@@ -1,0 +1,42 @@
+"""Ways that nobody has planned: at each fork one of the branches, all of them as likely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from eidrive_scenario.roads import Branch, Choose, LaneKey, LaneLocation, RoadNetwork, Route
+
+
+def any_branch(generator: np.random.Generator) -> Choose:
+    """Chooses anew at each fork."""
+
+    def choose(branches: Sequence[Branch]) -> Branch:
+        return branches[int(generator.integers(len(branches)))]
+
+    return choose
+
+
+def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose: Choose) -> Route:
+    """A way from a place on, at least `length` metres long unless the road ends before."""
+    road = roads.road(start.road)
+    direction = roads.driving_direction(start.road, start.lane)
+    key = LaneKey(start.road, road.section_at(start.s).index, start.lane)
+    section = road.section_at(start.s)
+    left = length - ((section.end - start.s) if direction > 0 else (start.s - section.s))
+    lanes = [key]
+    while left > 0.0:
+        branches = roads.movement.branches(key, direction)
+        if not branches:
+            break
+        branch = branches[0] if len(branches) == 1 else choose(branches)
+        if branch.lane in lanes[-2:]:
+            break
+        key, direction = branch.lane, branch.direction
+        lanes.append(key)
+        left -= roads.road(key.road).sections[key.section].length
+    road = roads.road(key.road)
+    section = road.sections[key.section]
+    end = section.end if direction > 0 else section.s
+    return Route(roads.roads, tuple(lanes), start, LaneLocation(key.road, key.lane, end, 0.0, 0.0))

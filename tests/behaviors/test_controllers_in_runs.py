@@ -1,0 +1,118 @@
+"""Pedals, wheel and gear that are held, and who drives: through the simulation, with its physics."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from street_scene import after, everywhere, private
+from whole_run import slope
+
+
+def hold(*controls: str) -> str:
+    inside = "".join(controls)
+    return private(
+        f"<ControllerAction><OverrideControllerValueAction>{inside}</OverrideControllerValueAction></ControllerAction>"
+    )
+
+
+def activate(on: str) -> str:
+    return private(
+        f'<ControllerAction><ActivateControllerAction lateral="{on}" longitudinal="{on}"/></ControllerAction>'
+    )
+
+
+def test_a_held_brake_stops_the_car_with_its_share_and_lets_go(run: Any) -> None:
+    """Half of 10 m/s² in the 1.5 s of the hold, rolling resistance and drag (below 0.5 m/s²) beside it."""
+    brake = '<Throttle active="{0}" value="0"/><Brake active="{0}"><BrakePercent value="0.5"/></Brake>'
+    played = run(5, ("Ego", hold(brake.format("true")), after(1.0)), ("Ego", hold(brake.format("false")), after(2.5)))
+    speed = played.of("Ego", "speed")
+    assert abs(slope(speed, 0.0, 1.0)) < 0.3
+    assert -5.5 < slope(speed, 1.2, 2.4) < -5.0
+    assert slope(speed, 2.7, 4.5) > 1.0
+
+
+def test_a_brake_by_force_and_a_parking_brake(run: Any) -> None:
+    """CAR has no mass: 1500 kg. 3000 N are 2 m/s²; three tenths of the parking brake are 3 m/s²."""
+    force = '<Throttle active="true" value="0"/><Brake active="true"><BrakeForce value="3000"/></Brake>'
+    assert -2.5 < slope(run(2, ("Ego", hold(force))).of("Ego", "speed"), 0.5, 1.9) < -2.0
+    parking = (
+        '<Throttle active="true" value="0"/><ParkingBrake active="true"><BrakePercent value="0.3"/></ParkingBrake>'
+    )
+    assert -3.5 < slope(run(2, ("Ego", hold(parking))).of("Ego", "speed"), 0.5, 1.9) < -3.0
+
+
+def test_a_pedal_with_a_rate_gets_there_in_its_time(run: Any) -> None:
+    """At 0.5 per second the brake is at 0.25 after half a second and at 0.5 after one."""
+    brake = '<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="0.5" maxRate="0.5"/></Brake>'
+    speed = run(2.5, ("Ego", hold(brake))).of("Ego", "speed")
+    assert -3.1 < slope(speed, 0.45, 0.55) < -2.4
+    assert -5.5 < slope(speed, 1.2, 2.2) < -5.0
+
+
+def test_a_held_wheel_bends_the_way(run: Any) -> None:
+    """1.6 rad at the wheel are 0.1 rad at the axle: at 5 m/s over 3 m that turns by 5 tan(0.1) / 3 = 0.167 rad/s."""
+    played = run(3, ("Ego", hold('<SteeringWheel active="true" value="1.6"/>')), ego=(-1, 100.0, 5.0))
+    assert slope(played.of("Ego", "yaw"), 1.0, 2.5) == pytest.approx(0.167, rel=0.05)
+    right = run(3, ("Ego", hold('<SteeringWheel active="true" value="-1.6"/>')), ego=(-1, 100.0, 5.0))
+    assert slope(right.of("Ego", "yaw"), 1.0, 2.5) == pytest.approx(-0.167, rel=0.05)
+
+
+def test_gears_and_the_clutch(run: Any) -> None:
+    """Reverse drives backwards, neutral and a trodden clutch roll, park holds."""
+
+    def speeds(*controls: str, speed: float = 0.0) -> list[float]:
+        return run(2, ("Ego", hold(*controls)), ego=(-1, 100.0, speed)).of("Ego", "speed")
+
+    gas = '<Throttle active="true" value="0.3"/><Brake active="true"><BrakePercent value="0"/></Brake>'
+    assert slope(speeds(gas, '<Gear active="true"><AutomaticGear gear="r"/></Gear>'), 0.5, 1.9) < -2.5
+    assert slope(speeds(gas, '<Gear active="true"><AutomaticGear gear="d"/></Gear>'), 0.5, 1.9) > 2.5
+    assert abs(slope(speeds(gas, '<Gear active="true"><ManualGear number="0"/></Gear>'), 0.5, 1.9)) < 0.2
+    assert abs(slope(speeds(gas, '<Clutch active="true" value="1"/>', speed=10.0), 0.5, 1.9)) < 0.5
+    assert speeds(gas, '<Gear active="true"><AutomaticGear gear="p"/></Gear>', speed=5.0)[-1] == pytest.approx(
+        0, abs=1e-3
+    )
+
+
+def test_a_controller_hands_over_and_takes_over_again_without_a_jump(run: Any) -> None:
+    stop = private(
+        "<LongitudinalAction><SpeedAction>"
+        '<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="rate" value="2"/><SpeedActionTarget>'
+        '<AbsoluteTargetSpeed value="14"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+    )
+    played = run(
+        8,
+        ("Ego", activate("false"), after(1.0)),
+        ("Ego", stop, after(1.5)),
+        ("Ego", activate("true"), after(5.0)),
+    )
+    speed, x = played.of("Ego", "speed"), played.x("Ego")
+    handed = speed[21]
+    assert speed[22:30] == pytest.approx([handed] * 8, abs=1e-9)
+    assert slope(speed, 2.0, 4.0) == pytest.approx(-2.0, abs=1e-6)
+    steps = [b - a for a, b in pairwise(x)]
+    assert max(abs(b - a) for a, b in pairwise(steps)) < 0.05
+    # From 5 s on it drives by itself again: towards its goal, by its pedals, no longer exactly even.
+    assert max(abs(s - 14.0) for s in speed[102:]) < 0.5
+    assert any(s != 14.0 for s in speed[102:])
+
+
+def test_a_car_that_was_handed_over_is_no_longer_moved_by_its_pedals(run: Any) -> None:
+    brake = hold('<Brake active="true"><BrakePercent value="1"/></Brake>')
+    played = run(3, ("Ego", activate("false"), after(0.5)), ("Ego", brake, after(1.0)))
+    speed = played.of("Ego", "speed")
+    assert speed[25:] == pytest.approx([speed[25]] * (len(speed) - 25), abs=1e-9)
+
+
+def test_a_slippery_road_takes_grip(run: Any) -> None:
+    """Of the grip 0.2 · 9.81 m/s² the brakes use 0.95."""
+    ice = everywhere(
+        '<EnvironmentAction><Environment name="ice"><RoadCondition frictionScaleFactor="0.2" wetness="moist"/>'
+        "</Environment></EnvironmentAction>"
+    )
+    brake = hold('<Throttle active="true" value="0"/><Brake active="true"><BrakePercent value="1"/></Brake>')
+    played = run(3, ("Ego", brake, after(0.5)), globally=ice)
+    assert slope(played.of("Ego", "speed"), 1.0, 2.5) == pytest.approx(-0.95 * 0.2 * 9.81, abs=0.35)
+    environment = played.frames[0].environment
+    assert (environment.friction, environment.wetness, environment.name) == (0.2, "moist", "ice")

@@ -1,0 +1,68 @@
+"""Traffic signals in whole runs, and in their recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from street_scene import NOTHING, after, everywhere
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.trace_hash import TraceHash
+
+LIGHTS = """<TrafficSignals><TrafficSignalController name="crossing">
+  <Phase name="go" duration="0.4"><TrafficSignalState trafficSignalId="7" state="off;off;on"/></Phase>
+  <Phase name="stop" duration="0.6"><TrafficSignalState trafficSignalId="7" state="on;off;off"/></Phase>
+  </TrafficSignalController></TrafficSignals>"""
+
+
+def test_signals_run_through_their_phases_and_are_recorded(run: Any, tmp_path: Path) -> None:
+    go = '<ByValueCondition><TrafficSignalControllerCondition trafficSignalControllerRef="crossing" phase="stop"/>'
+    red = '<ByValueCondition><TrafficSignalCondition name="7" state="ON;OFF;OFF"/></ByValueCondition>'
+    again = everywhere(
+        "<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction "
+        'trafficSignalControllerRef="crossing" phase="go"/></TrafficSignalAction></InfrastructureAction>'
+    )
+    played = run(
+        1.5,
+        ("Ego", NOTHING, f"{go}</ByValueCondition>"),
+        ("Ego", again, after(0.62)),
+        ("Ego", NOTHING, red),
+        signals=LIGHTS,
+    )
+    states = [frame.signals["7"] for frame in played.frames]
+    green, stop = "off;off;on", "on;off;off"
+    assert states == [green] * 8 + [stop] * 5 + [green] * 8 + [stop] * 10
+    assert played.begun("event 0") == pytest.approx([0.4])
+    assert played.begun("event 2") == pytest.approx([0.4])
+    assert any("no signal '7'" in warning for warning in played.result.warnings)
+    recorder = Recorder(tmp_path / "run.mcap", metadata={})
+    live, read = TraceHash(), TraceHash()
+    for frame in played.frames:
+        recorder.observe(frame)
+        live.observe(frame)
+    recorder.close()
+    for frame in read_recording(tmp_path / "run.mcap").frames():
+        read.observe(frame)
+    assert [f.signals["7"] for f in read_recording(tmp_path / "run.mcap").frames()] == states
+    assert read.hexdigest() == live.hexdigest() == played.result.trace_hash
+
+
+@pytest.mark.parametrize(
+    ("phase", "expected"), [("gone", "did you mean 'go'"), ("stop", "")], ids=["unknown phase", "known phase"]
+)
+def test_an_unknown_phase_is_an_error_before_the_run(run: Any, phase: str, expected: str) -> None:
+    reference = f'trafficSignalControllerRef="crossing" phase="{phase}"'
+    action = everywhere(
+        f"<InfrastructureAction><TrafficSignalAction><TrafficSignalControllerAction {reference}/></TrafficSignalAction>"
+        "</InfrastructureAction>"
+    )
+    condition = f"<ByValueCondition><TrafficSignalControllerCondition {reference}/></ByValueCondition>"
+    for steps in ((("Ego", action),), (("Ego", NOTHING, condition),)):
+        if expected:
+            with pytest.raises(InputError, match=expected):
+                run(0.2, *steps, signals=LIGHTS)
+        else:
+            assert run(0.2, *steps, signals=LIGHTS).result.end == "stop trigger"

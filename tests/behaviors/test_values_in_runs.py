@@ -1,0 +1,127 @@
+"""Environment, values from outside, monitors, lights and animations: through the simulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from street_scene import NOTHING, after, everywhere, private
+
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.storyboard.states import Transition
+
+
+def test_what_an_environment_leaves_out_stays(run: Any) -> None:
+    first = everywhere("""<EnvironmentAction><Environment name="morning">
+      <TimeOfDay animation="true" dateTime="2024-06-01T06:00:00"/>
+      <Weather fractionalCloudCover="fourOktas" temperature="283"><Sun azimuth="1" elevation="0.2" illuminance="9000"/>
+      <Fog visualRange="150"/><Precipitation precipitationType="rain" precipitationIntensity="4"/></Weather>
+      <RoadCondition frictionScaleFactor="0.7"/></Environment></EnvironmentAction>""")
+    later = everywhere(
+        '<EnvironmentAction><Environment name="clearer"><Weather><Fog visualRange="900"/></Weather></Environment>'
+        "</EnvironmentAction>"
+    )
+    played = run(2, ("Ego", later, after(1.0)), globally=first)
+    before, now = played.frames[0].environment, played.frames[-1].environment
+    assert (before.name, before.fog_range, before.precipitation, before.precipitation_intensity) == (
+        *("morning", 150.0, "rain", 4.0),
+    )
+    assert (now.name, now.fog_range, now.friction, now.clouds) == ("clearer", 900.0, 0.7, "fourOktas")
+    assert (now.illuminance, now.sun_elevation, now.temperature) == (9000.0, 0.2, 283.0)
+    assert now.clock(2.0).isoformat() == "2024-06-01T06:00:02"
+
+
+def test_a_value_from_outside_starts_an_event(run: Any) -> None:
+    condition = '<UserDefinedValueCondition name="signal strength" rule="lessThan" value="5"/>'
+    condition = f"<ByValueCondition>{condition}</ByValueCondition>"
+
+    def during(simulation: Simulation, frame: Frame) -> None:
+        if frame.view.tick == 10:
+            simulation.set_user_value("signal strength", "3.5")
+
+    assert run(1, ("Ego", NOTHING, condition)).begun("event 0") == []
+    assert run(1, ("Ego", NOTHING, condition), during=during).begun("event 0") == pytest.approx([0.55])
+    given = RunSettings(dt=0.05, user_values={"signal strength": "4"})
+    assert run(1, ("Ego", NOTHING, condition), settings=given).begun("event 0") == [0.0]
+
+
+def test_a_monitor_is_seen_in_frames_metrics_and_a_verdict(run: Any) -> None:
+    criterion = (
+        '<UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{{monitor: {{of: Passed{0}}}}}]'
+        "</CustomCommandAction></UserDefinedAction>"
+    )
+    passed = everywhere('<SetMonitorAction monitorRef="Passed" value="true"/>')
+    played = run(2, ("Ego", passed, after(1.0)), globally=criterion.format(""))
+    assert [frame.monitors["Passed"] for frame in played.frames] == [False] * 21 + [True] * 20
+    assert played.result.metrics["monitor.Passed"] == 1.0
+    assert played.result.metrics["monitor.Passed.changed"] == pytest.approx(1.05)
+    (verdict,) = played.result.criteria
+    assert (verdict.passed, verdict.reason) == (True, "Passed is true since 1.05 s")
+    failed = run(2, globally=criterion.format("")).result
+    assert (failed.passed, failed.metrics["monitor.Passed"]) == (False, 0.0)
+    assert not run(2, ("Ego", passed, after(1.0)), globally=criterion.format(", throughout: true")).result.passed
+
+
+def test_lights_and_animations_are_in_the_frames(run: Any) -> None:
+    light = private("""<AppearanceAction><LightStateAction transitionTime="0.5"><LightType><UserDefinedLight
+      userDefinedLightType="rotating beacon"/></LightType><LightState mode="flashing" flashingOnDuration="0.2"
+      flashingOffDuration="0.3" luminousIntensity="40"><Color colorType="blue">
+      <ColorRgb red="0" green="0" blue="1"/></Color></LightState></LightStateAction>
+      </AppearanceAction>""")
+    door = private("""<AppearanceAction><AnimationAction animationDuration="1"><AnimationType><ComponentAnimation>
+      <VehicleComponent vehicleComponentType="doorFrontLeft"/></ComponentAnimation></AnimationType>
+      <AnimationState state="0.8"/></AnimationAction></AppearanceAction>""")
+    played = run(2, ("Ego", light, after(0.3)), ("Ego", door, after(0.5)))
+    looks = played.frames[-1].appearances["Ego"]
+    beacon = looks.lights["rotating beacon"]
+    assert (beacon.mode, beacon.colour, beacon.intensity, beacon.since) == (
+        "flashing",
+        (0, 0, 1),
+        40.0,
+        pytest.approx(0.35),
+    )
+    assert [beacon.brightness(0.35 + t) for t in (0.0, 0.15, 0.25, 0.45, 0.5)] == [1, 1, 0, 0, 1]
+    opened = looks.animations["doorFrontLeft"]
+    assert (opened.kind, opened.state, opened.duration, opened.since) == ("component", 0.8, 1.0, pytest.approx(0.55))
+    ended = [
+        change.time
+        for frame in played.frames
+        for change in frame.changes
+        if change.element == "action 1" and change.after.value == "completeState"
+    ]
+    assert ended == pytest.approx([1.5])
+    assert played.frames[0].appearances == {}
+
+
+@pytest.mark.parametrize(
+    ("colour", "expected"),
+    [
+        ('colorType="other"><ColorRgb red="0.1" green="0.2" blue="0.3"/>', (0.1, 0.2, 0.3)),
+        ('colorType="other"><ColorCmyk cyan="0.5" magenta="0" yellow="1" key="0.5"/>', (0.25, 0.5, 0.0)),
+    ],
+)
+def test_colours_of_lights(run: Any, colour: str, expected: tuple[float, ...]) -> None:
+    light = private(f"""<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="highBeam"/>
+      </LightType><LightState mode="on"><Color {colour}</Color></LightState></LightStateAction></AppearanceAction>""")
+    found = run(0.2, ("Ego", light)).frames[-1].appearances["Ego"].lights["highBeam"].colour
+    assert found == pytest.approx(expected)
+
+
+def test_a_light_fades_over_its_transition(run: Any) -> None:
+    light = private("""<AppearanceAction><LightStateAction transitionTime="1"><LightType><VehicleLight
+      vehicleLightType="lowBeam"/></LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>""")
+    lights = run(0.5, ("Ego", light.format("on"))).frames[-1].appearances["Ego"].lights
+    assert [lights["lowBeam"].brightness(t) for t in (0.0, 0.25, 1.0, 3.0)] == [0.0, 0.25, 1.0, 1.0]
+    lights = run(0.5, ("Ego", light.format("off"))).frames[-1].appearances["Ego"].lights
+    assert [lights["lowBeam"].brightness(t) for t in (0.0, 0.25, 1.0)] == [1.0, 0.75, 0.0]
+
+
+def test_a_pedestrian_waves_and_a_loop_goes_on(run: Any) -> None:
+    wave = private("""<AppearanceAction><AnimationAction loop="true" animationDuration="0.2"><AnimationType>
+      <PedestrianAnimation motion="standing"><PedestrianGesture gesture="wavingRightArm"/></PedestrianAnimation>
+      </AnimationType></AnimationAction></AppearanceAction>""")
+    played = run(1, ("Ego", wave))
+    held = played.frames[-1].appearances["Ego"]
+    assert (held.motion, held.animations["motion"].gestures) == ("standing", ("wavingRightArm",))
+    assert not any(c.element == "action 0" and c.transition is Transition.END for f in played.frames for c in f.changes)

@@ -1,0 +1,49 @@
+"""Monitors have a value at the end, or throughout."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from eidrive_criteria.monitor import Monitor, MonitorSettings
+
+from eidrive_scenario.api import Verdict, judge
+
+
+def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:
+    """Over frames a second apart."""
+    frames = [
+        replace(frame(float(time), {}), monitors={} if value is None else {"Seen": value})
+        for time, value in enumerate(values)
+    ]
+    (found,) = judge(frames, [Monitor(MonitorSettings(of="Seen", **settings))])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("values", "settings", "passed", "violation"),
+    [
+        ([False, False, True], {}, True, None),
+        ([False, True, False], {}, False, 2.0),
+        ([True, True], {"throughout": True}, True, None),
+        ([True, False, True], {"throughout": True}, False, 1.0),
+        ([False, False], {"expected": False}, True, None),
+        ([None], {}, False, 0.0),
+    ],
+)
+def test_the_value_counts(
+    frame: Any, values: list[bool | None], settings: dict[str, Any], passed: bool, violation: float | None
+) -> None:
+    found = verdict(frame, values, **settings)
+    assert (found.passed, found.first_violation) == (passed, violation)
+
+
+def test_only_what_must_hold_throughout_can_end_a_run(frame: Any) -> None:
+    assert verdict(frame, [True, False], fatal=True, throughout=True).fatal
+    assert not verdict(frame, [False, False], fatal=True).fatal
+
+
+def test_reasons(frame: Any) -> None:
+    assert verdict(frame, [False, False, True]).reason == "Seen is true since 2.00 s"
+    assert verdict(frame, [None]).reason == "the scenario has no monitor 'Seen'"
