@@ -62,8 +62,9 @@ description="traffic" author="-"/>
 <Storyboard><Init><Actions>{swarm}{placed}</Actions></Init><Story name="story"><Act name="act">{groups}<StartTrigger>
 <ConditionGroup><Condition name="start" delay="0" conditionEdge="none"><ByValueCondition>
 <SimulationTimeCondition value="0" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
-</StartTrigger></Act></Story><StopTrigger><ConditionGroup><Condition name="stop" delay="0" conditionEdge="none"><ByValueCondition>
-<SimulationTimeCondition value="{seconds}" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+</StartTrigger></Act></Story><StopTrigger><ConditionGroup>
+<Condition name="stop" delay="0" conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="{seconds}"
+rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
 </StopTrigger></Storyboard></OpenSCENARIO>"""
 
 

@@ -52,12 +52,20 @@ class Curve:
         """The point `ds` metres behind the start."""
         raise NotImplementedError
 
+    def bend(self, ds: float) -> tuple[float, float]:
+        """Curvature and metres of path per metre of s there: `at` without the place."""
+        point = self.at(ds)
+        return point.curvature, point.speed
+
 
 @dataclass(frozen=True)
 class Arc(Curve):
     """Constant curvature [1/m], positive to the left; a line has 0."""
 
     curvature: float = 0.0
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        return self.curvature, 1.0
 
     def at(self, ds: float) -> CurvePoint:
         half = 0.5 * self.curvature * ds
@@ -90,6 +98,9 @@ class Spiral(Curve):
         object.__setattr__(self, "phase", -self.curvature * self.curvature / (2.0 * self.rate))
         sine, cosine = fresnel(self.curvature / self.rate * self.scale)
         object.__setattr__(self, "origin", (float(cosine), float(sine)))
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        return self.curvature + self.rate * ds, 1.0
 
     def at(self, ds: float) -> CurvePoint:
         sine, cosine = fresnel((ds + self.curvature / self.rate) * self.scale)
@@ -196,6 +207,11 @@ class ReferenceLine:
         """The point at s [m]; the first and last curve go on beyond the ends."""
         curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
         return curve.at(s - curve.s)
+
+    def bend(self, s: float) -> tuple[float, float]:
+        """Curvature [1/m] and metres of path per metre of s at s [m]."""
+        curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
+        return curve.bend(s - curve.s)
 
 
 class CurveTable:

@@ -196,8 +196,8 @@ def _along(
 def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
     """Metres of path at an offset from a lane's centre per metre of s."""
     t, slope = lane_t(road, section, lane, s)
-    point = road.reference.at(s)
-    across = point.speed * (1.0 - point.curvature * (t + offset))
+    curvature, speed = road.reference.bend(s)
+    across = speed * (1.0 - curvature * (t + offset))
     return max(math.hypot(across, slope) if slope else across, 0.05)
 
 
