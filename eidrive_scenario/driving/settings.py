@@ -10,6 +10,8 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, mo
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.tracking import TrackerSettings, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,
@@ -102,12 +104,18 @@ class AgentSettings(Settings):
     """One station. Lengths in m, speeds in m/s, times in s, angles in degrees, rates in Hz; world frame.
 
     detector, fusion, planner   names of extensions; planner `none` parks a vehicle, and is all that a mast can have
+    detector_settings  what the detector itself may be told
+    detector_latency   how long the detector computes: what it saw at t is known from t + latency on
+    tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
+    localization    `oracle`, or `ekf`: the station finds out by GNSS and IMU where it is
+    obey_signals    whether the vehicle stops at red traffic lights and stop signs
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the detector needs
     range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
     cooperates_with senders whose messages count; None is all
     message_rate    how often the station sends what it sees, None is each tick
     report_timeout  a report older than this is forgotten: 1 s, the longest interval between two collective perception
                     messages (ETSI TS 103 324, T_GenCpmMax)
+    antenna_height  over the reference point; None is the roof
     target_speed    where the storyboard asks for none; None keeps the first one
     conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
     conflict_brake  [m/s²], until
@@ -116,6 +124,11 @@ class AgentSettings(Settings):
 
     module: Literal["eidrive"] = "eidrive"
     detector: str = "oracle"
+    detector_settings: dict[str, Any] = Field(default_factory=dict)
+    detector_latency: NonNegativeFloat = 0.0
+    tracker: Annotated[TrackerSettings | None, BeforeValidator(tracker_setting)] = None
+    localization: Literal["oracle", "ekf"] = "oracle"
+    obey_signals: bool = False
     fusion: str = "average"
     planner: str | None = None
     sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
@@ -126,6 +139,7 @@ class AgentSettings(Settings):
     cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
     message_rate: PositiveFloat | None = None
     report_timeout: PositiveFloat = 1.0
+    antenna_height: PositiveFloat | None = None
     target_speed: NonNegativeFloat | None = None
     conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
     conflict_brake: PositiveFloat = 5.0
@@ -137,6 +151,19 @@ class AgentSettings(Settings):
         if len(truths) > 1:
             raise ValueError(f"a station has one truth sensor, found {', '.join(truths)}")
         return self
+
+    @model_validator(mode="after")
+    def _in_time(self) -> AgentSettings:
+        if self.detector_latency >= self.report_timeout:
+            raise ValueError(
+                f"detections {self.detector_latency:g} s late are forgotten at once: "
+                f"report_timeout is {self.report_timeout:g} s"
+            )
+        return self
+
+    def needs(self, detector: type[Detector]) -> frozenset[str]:
+        """The kinds of sensors that this station reads, with this detector."""
+        return detector.needs | (frozenset({"gnss", "imu"}) if self.localization == "ekf" else frozenset())
 
     def rig_sensors(self, needs: frozenset[str]) -> dict[str, AnySensorSettings]:
         """The sensors of this station, for a detector that reads these kinds."""

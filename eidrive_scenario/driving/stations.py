@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from eidrive_scenario.driving.agent import Agent, build_agent, build_rig
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
+from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
 from eidrive_scenario.driving.step import AgentStep, Goal
 from eidrive_scenario.errors import Problem, SettingError, suggestion
@@ -16,9 +18,11 @@ from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig, read_all
+from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.message import LinkEvent, Received
 from eidrive_scenario.v2x.profile import NO_COOPERATION, build_channel, load_profile
+from eidrive_scenario.v2x.surroundings import Surroundings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
@@ -94,6 +98,8 @@ class Stations:
         """Sensors read, messages that have arrived are heard, every agent acts."""
         if not self._agents:
             return {}
+        if self._channel is not None:
+            self._channel.around(self._surroundings(world, view))
         readings = read_all(list(self._rigs.values()), world, view)
         now = view.time
         return {
@@ -116,13 +122,12 @@ class Stations:
         """What the agents said goes on the air, each message on the link to each station that listens."""
         if self._channel is None:
             return
-        links: list[LinkEvent] = []
+        outbox = []
         for sender, step in steps.items():
             receivers = self._listeners(sender)
             if receivers:
-                for message in step.outbox:
-                    links.extend(self._channel.send(message, receivers, now))
-        self.links = tuple(links)
+                outbox += [(message, receivers) for message in step.outbox]
+        self.links = tuple(self._channel.transmit(outbox, now))
 
     def metrics(self, now: float) -> dict[str, float]:
         """Counts of messages over all links."""
@@ -135,6 +140,16 @@ class Stations:
             "messages.lost": sum(book.lost for book in books),
             "messages.bytes": sum(book.bytes_sent for book in books),
         }
+
+    def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
+        """The books of every link, by (sender, receiver); empty without a channel."""
+        return self._channel.statistics(now) if self._channel is not None else {}
+
+    def _surroundings(self, world: World, view: WorldView) -> Surroundings:
+        places = {
+            name: antenna_place(view, agent.spec, agent.settings.antenna_height) for name, agent in self._agents.items()
+        }
+        return Surroundings(places, partial(sight_lines, world, places))
 
     def _deliver(self, receiver: str, now: float) -> Sequence[Received]:
         return self._channel.deliver(receiver, now) if self._channel is not None else ()

@@ -7,27 +7,39 @@ from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.v2x.links import LinkStatistics
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+Outgoing = tuple[Message, Sequence[str]]
+"""A message and those who listen."""
 
 
 class Channel(ABC):
     """Carries messages between stations. Nobody hears a message before it has arrived, nor in the tick it was said.
 
-    Loss and delay are drawn once per message and link, at sending, from a generator keyed by
+    Loss and delay are drawn once per message and link, from a generator keyed by
     (seed, purpose, sender, receiver, message number).
 
     A model is a class with `settings`, the ChannelProfile that it reads, and is built as `Model(profile, seed)`.
+    In each tick `around` comes first, then `deliver` for every station, then one `transmit`.
     """
 
     own_perception: bool = False
     """True: a station's own detections travel this channel too, as a link from the station to itself."""
 
+    def around(self, surroundings: Surroundings) -> None:  # noqa: B027 - a channel need not care
+        """Where the antennas are now, and whom to ask for lines of sight between them."""
+
     @abstractmethod
-    def send(self, message: Message, receivers: Sequence[str], now: float) -> tuple[LinkEvent, ...]:
-        """Put a message on its links; the answer says what becomes of it on each.
+    def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
+        """Put a message on its links; the answer says what is known by now of the fates of messages.
 
         A link from a station to itself is one like any other: list the sender among the receivers where
         `own_perception` asks for it.
         """
+
+    def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
+        """All that the stations say in one tick; it may be nothing."""
+        return [event for message, receivers in outbox for event in self.send(message, receivers, now)]
 
     @abstractmethod
     def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:

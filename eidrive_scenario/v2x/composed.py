@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.v2x.delay import ConstantDelay, Delay
+from eidrive_scenario.v2x.delay_trace import TraceDelay
 from eidrive_scenario.v2x.draws import LinkDraws
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.loss import BernoulliLoss, Loss, NoLoss
+from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.loss import Loss, NoLoss
+from eidrive_scenario.v2x.loss_draws import LossDraws
 from eidrive_scenario.v2x.message import Message
 from eidrive_scenario.v2x.profile import ChannelProfile
 
@@ -40,17 +42,16 @@ class ComposedChannel(LinkChannel):
         super().__init__()
         self.profile = profile
         self.own_perception = profile.own_perception
-        self._seed = seed
+        self._losses = LossDraws(profile.loss, seed)
         self._draws = LinkDraws(seed)
         self._last_arrival: dict[tuple[str, str], float] = {}
-        self._frames: dict[str, tuple[float, float]] = {}
 
     def fate(self, message: Message, receiver: str, now: float) -> float | str:
-        loss, delay = self.profile.loss, self.profile.delay
-        if isinstance(loss, BernoulliLoss) and self._loss_draw(loss, message, receiver, now) < loss.probability:
-            return "loss"
-        u = self._draws.uniform("delay", message.sender, receiver, message.number) if delay.random else 0.5
-        seconds = delay.quantile(u)
+        distance = self.surroundings.distance(message.sender, receiver)
+        reason = self._losses.reason(message, receiver, now, distance)
+        if reason is not None:
+            return reason
+        seconds = delay_of(self.profile.delay, self._draws, message, receiver)
         if not self.profile.reordering:
             link = (message.sender, receiver)
             last = self._last_arrival.get(link, now)
@@ -60,12 +61,14 @@ class ComposedChannel(LinkChannel):
             self._last_arrival[link] = now + seconds
         return seconds
 
-    def _loss_draw(self, loss: BernoulliLoss, message: Message, receiver: str, now: float) -> float:
-        if loss.scope == "link":
-            return self._draws.uniform("loss", message.sender, receiver, message.number)
-        held = self._frames.get(receiver)
-        if held is None or held[0] != now:
-            instant = round(now * 1e6)
-            held = (now, float(generator(self._seed, "frame loss", receiver, instant).random()))
-            self._frames[receiver] = held
-        return held[1]
+    def busy_ratio(self, station: str) -> float | None:
+        loss = self.profile.loss
+        return loss.table().busy_ratio if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss) else None
+
+
+def delay_of(delay: Delay, draws: LinkDraws, message: Message, receiver: str) -> float:
+    """How long this message takes on this link [s]."""
+    if isinstance(delay, TraceDelay) and delay.replay:
+        return delay.at(message.number)
+    u = draws.uniform("delay", message.sender, receiver, message.number) if delay.random else 0.5
+    return delay.quantile(u)

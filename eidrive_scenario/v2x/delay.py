@@ -13,6 +13,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 from scipy.special import gammaincinv, ndtr, ndtri
 
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.delay_trace import TraceDelay
 
 
 class ConstantDelay(Settings):
@@ -120,6 +121,6 @@ class LognormalDelay(_RandomDelay):
 
 
 Delay = Annotated[
-    ConstantDelay | UniformDelay | TruncatedNormalDelay | ShiftedGammaDelay | LognormalDelay,
+    ConstantDelay | UniformDelay | TruncatedNormalDelay | ShiftedGammaDelay | LognormalDelay | TraceDelay,
     Field(discriminator="kind"),
 ]

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.links import Links, LinkStatistics
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.surroundings import NOWHERE, Surroundings
 
 
 class LinkChannel(Channel):
@@ -15,19 +16,25 @@ class LinkChannel(Channel):
 
     def __init__(self) -> None:
         self._links = Links()
+        self.surroundings = NOWHERE
+        """Where the antennas are."""
 
     @abstractmethod
     def fate(self, message: Message, receiver: str, now: float) -> float | str:
         """The delay on this link, at least 0 [s]; or the reason for which the message is lost."""
 
-    def send(self, message: Message, receivers: Sequence[str], now: float) -> tuple[LinkEvent, ...]:
+    def around(self, surroundings: Surroundings) -> None:
+        self.surroundings = surroundings
+
+    def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         events = []
         for receiver in receivers:
             fate = self.fate(message, receiver, now)
+            distance = self.surroundings.distance(message.sender, receiver)
             if isinstance(fate, str):
-                events.append(self._links.lose(message, receiver, now, fate))
+                events.append(self._links.lose(message, receiver, now, fate, distance))
             else:
-                events.append(self._links.put(message, receiver, now, fate))
+                events.append(self._links.put(message, receiver, now, fate, distance))
         return tuple(events)
 
     def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
@@ -37,10 +44,18 @@ class LinkChannel(Channel):
         return self._links.in_flight()
 
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        return self._links.statistics(now)
+        return self._links.statistics(now, self.busy_ratio)
+
+    def busy_ratio(self, station: str) -> float | None:
+        """Share of the time in which this station found the channel busy; None where there is no such thing."""
+        return None
 
     def take_over(self, previous: Channel) -> None:
         """Share the links of the previous channel. Raises TypeError if that is no LinkChannel."""
         if not isinstance(previous, LinkChannel):
             raise TypeError(f"{type(self).__name__} cannot carry on for a {type(previous).__name__}")
+        previous.settle()
         self._links = previous._links
+
+    def settle(self) -> None:
+        """Decide at once whatever is undecided: another channel takes over."""

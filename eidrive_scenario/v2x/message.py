@@ -7,10 +7,13 @@ from typing import Literal
 
 from eidrive_scenario.detections import Detections
 
+LineOfSight = Literal["los", "nlosv", "nlos"]
+"""Between two antennas: nothing, vehicles only, or a building or the ground (3GPP TR 37.885, 6.2.1)."""
+
 
 @dataclass(frozen=True)
 class StationState:
-    """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s]."""
+    """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s] of its own clock."""
 
     time: float
     x: float
@@ -22,7 +25,13 @@ class StationState:
 
 @dataclass(frozen=True)
 class Message:
-    """A collective perception message: what the sender perceived at `detections.time`, said at `generated` [s]."""
+    """What a station says of the objects that it knows at `detections.time` of its own clock, said at `generated` [s].
+
+    kind     cpm  collective perception message (ETSI TS 103 324): what the sender perceives
+             cam  cooperative awareness message (ETSI EN 302 637-2): the sender itself, as the only object
+    objects  the sender's numbers of its objects, one per row of `detections`: the others are still what an earlier
+             message said of them. None: the list is all that the sender knows now
+    """
 
     sender: str
     number: int
@@ -32,6 +41,8 @@ class Message:
     detections: Detections
     size: int
     """[bytes]"""
+    kind: Literal["cpm", "cam"] = "cpm"
+    objects: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,11 @@ class Received:
 
 @dataclass(frozen=True)
 class LinkEvent:
-    """The fate of one message on one link, known at sending: it arrives at `arrives` [s], or is lost for a reason."""
+    """The fate of one message on one link, told when it is known: it arrives at `arrives` [s], or is lost for a reason.
+
+    Channels that know a radio say too: the path loss with shadowing and blocking bodies [dB], the ratio of signal to
+    noise without interference [dB], what stands between the antennas, and whose bodies those are.
+    """
 
     sender: str
     receiver: str
@@ -54,3 +69,7 @@ class LinkEvent:
     arrives: float | None
     reason: str
     size: int
+    path_loss_db: float | None = None
+    snr_db: float | None = None
+    los: LineOfSight | None = None
+    blockers: tuple[str, ...] = ()

@@ -59,7 +59,8 @@ def load_profile(
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         raise SettingError(Problem(f"no channel profile {str(source)!r}", suggestion(str(source), names), origin, line))
     data, lines = load_yaml_file(path)
-    return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines)
+    placed = _with_paths(_mapping(data, str(path), 1), path.parent)
+    return _parse(placed, path.stem, str(path), 1, lines)
 
 
 def profile_names(folder: Path) -> tuple[str, ...]:
@@ -90,6 +91,17 @@ def _find(source: Path, folders: Sequence[Path]) -> Path | None:
     else:
         candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
     return next((path for path in candidates if path.is_file()), None)
+
+
+def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The settings of a profile with every `file` in it relative to the profile's own folder."""
+    placed = dict(data)
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            placed[key] = _with_paths(value, folder)
+        elif key == "file" and isinstance(value, str):
+            placed[key] = str(folder / value)
+    return placed
 
 
 def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:

@@ -1,0 +1,74 @@
+"""The world as the radio sees it: where the antennas are, and what stands between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, SightLines
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.view import WorldView
+
+Array = NDArray[np.float64]
+Place = tuple[float, float, float]
+
+_BEYOND = 5e-3
+"""How far behind a hit the ray goes on [m]: from inside a body pybullet does not see that body again."""
+_MOST_BODIES = 16
+"""So many bodies on one ray are looked at; whatever comes after them changes no path loss."""
+
+
+def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Place:
+    """The antenna of a station: above the middle of its box, at this height over its reference point, or on the roof.
+
+    In the world frame [m]; pitch and roll are neglected.
+    """
+    row = view.rows[spec.name]
+    x, y, z = view.position[row].tolist()
+    yaw = view.yaw[row]
+    cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
+    ahead, aside, up = spec.offset
+    over = up + spec.size[2] / 2.0 if height is None else height
+    return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + over)
+
+
+def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> SightLines:
+    """What the rays between the antennas of these pairs meet; their own two bodies do not count.
+
+    A vehicle or any other actor in between makes NLOSv, a building or the ground NLOS.
+    """
+    view = world.view()
+    count = len(pairs)
+    origins = np.array([places[first] for first, _ in pairs], dtype=float).reshape(-1, 3)
+    targets = np.array([places[second] for _, second in pairs], dtype=float).reshape(-1, 3)
+    states, heights = np.full(count, LOS), np.full(count, -np.inf)
+    found: list[list[str]] = [[] for _ in pairs]
+    tops = view.centres[:, 2] + view.size[:, 2] / 2.0
+    length = np.maximum(np.linalg.norm(targets - origins, axis=1), _BEYOND)
+    begun = np.zeros(count)
+    open_rays = np.arange(count)
+    for _ in range(_MOST_BODIES):
+        if not len(open_rays):
+            break
+        way = targets[open_rays] - origins[open_rays]
+        hits = world.cast(origins[open_rays] + begun[open_rays, None] * way, targets[open_rays])
+        going_on = []
+        for ray, row, fraction in zip(open_rays.tolist(), hits.rows.tolist(), hits.fraction.tolist(), strict=True):
+            if fraction >= 1.0:
+                continue
+            if row < 0:
+                states[ray] = NLOS
+                continue
+            name = view.names[row]
+            if name not in pairs[ray] and name not in found[ray]:
+                found[ray].append(name)
+                states[ray] = NLOSV
+                heights[ray] = max(heights[ray], tops[row])
+            begun[ray] += fraction * (1.0 - begun[ray]) + _BEYOND / length[ray]
+            if begun[ray] < 1.0:
+                going_on.append(ray)
+        open_rays = np.array(going_on, dtype=np.int64)
+    return SightLines(states, heights, tuple(map(tuple, found)))

@@ -1,0 +1,99 @@
+"""Measured delays, from a list or a file."""
+
+from __future__ import annotations
+
+import csv
+import math
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, NonNegativeFloat, model_validator
+
+from eidrive_scenario.settings import Settings
+
+UNITS = {"s": 1.0, "ms": 1e-3}
+
+
+class TraceDelay(Settings):
+    """Delays that somebody measured.
+
+    seconds  the values [s]; or
+    file     a CSV file, relative to the profile, with
+    column   the name of its column in the first row, or its number from 0 on, and
+    unit     `s` or `ms`
+    replay   false: drawn from the values, with straight lines between neighbouring ones; true: message n of a link
+             takes value n, and begins anew at the end
+    """
+
+    kind: Literal["trace"]
+    seconds: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1, repr=False)]
+    file: Path | None = None
+    column: str | int = 0
+    unit: Literal["s", "ms"] = "s"
+    replay: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or data.get("file") is None:
+            return data
+        if data.get("seconds") is not None:
+            raise ValueError("give either seconds or a file")
+        scale = UNITS.get(data.get("unit", "s"), 1.0)
+        values = _column(Path(str(data["file"])), data.get("column", 0))
+        return {**data, "seconds": [scale * value for value in values]}
+
+    @cached_property
+    def _ascending(self) -> list[float]:
+        return sorted(self.seconds)
+
+    @property
+    def random(self) -> bool:
+        """Whether a draw decides."""
+        return not self.replay
+
+    def quantile(self, u: float) -> float:
+        """The delay that a share `u` of all messages does not exceed [s]."""
+        ascending = self._ascending
+        place = u * (len(ascending) - 1)
+        below = min(int(place), len(ascending) - 1)
+        above = min(below + 1, len(ascending) - 1)
+        return ascending[below] + (place - below) * (ascending[above] - ascending[below])
+
+    def at(self, number: int) -> float:
+        """The delay of message `number` of a link, where the trace is replayed [s]."""
+        return self.seconds[number % len(self.seconds)]
+
+
+def _column(path: Path, column: str | int) -> list[float]:
+    """The numbers in a column of a CSV file; a first row of words names the columns. Raises ValueError."""
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+    if not rows:
+        raise ValueError(f"{path} is empty")
+    header = [cell.strip() for cell in rows[0]]
+    if isinstance(column, str):
+        if column not in header:
+            raise ValueError(f"{path} has no column {column!r}; it has {', '.join(header)}")
+        place = header.index(column)
+    else:
+        place = column
+    body = rows[1:] if isinstance(column, str) or not _is_number(header[min(place, len(header) - 1)]) else rows
+    values = []
+    for number, row in enumerate(body, start=1 + len(rows) - len(body)):
+        if place >= len(row) or not _is_number(row[place]):
+            found = row[place] if place < len(row) else "nothing"
+            raise ValueError(f"{path}:{number}: {found!r} is no delay")
+        values.append(float(row[place]))
+    return values
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

@@ -1,0 +1,1 @@
+"""How a channel shared by many vehicles fares: the published analytic models of packet delivery."""

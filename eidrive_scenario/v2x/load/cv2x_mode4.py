@@ -1,0 +1,143 @@
+"""C-V2X Mode 4 (LTE-V2X sidelink, resources chosen by the vehicles) among many vehicles on a straight road.
+
+M. Gonzalez-Martín, M. Sepulcre, R. Molina-Masegosa, J. Gozalvez: Analytical Models of the Performance of C-V2X Mode 4
+Vehicular Communications, IEEE Transactions on Vehicular Technology 68(2), 2019, arXiv:1807.06508. Numbers in brackets
+are those of its equations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.load.levels import (
+    RATIOS,
+    STEP,
+    autocorrelation,
+    errors_over,
+    interference,
+    sensed_share,
+    signal,
+)
+from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.radio.propagation import winner_b1
+
+Array = NDArray[np.float64]
+
+FREQUENCY = 5.91
+"""[GHz]"""
+ANTENNA = 1.5
+"""Height of all antennas [m]."""
+ENVIRONMENT = 0.0
+"""Height of the environment [m], which the path loss takes off the antennas'."""
+SHADOWING = 3.0
+"""Standard deviation [dB]."""
+SENSING, NOISE = -90.5, -95.0
+"""Threshold of sensing, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
+BLOCKS = 50
+"""Resource blocks in 10 MHz."""
+NO_INTERFERENCE = -180.0
+"""Power of an interferer that is not there [dBm]."""
+REACH, FARTHEST_INTERFERER = 1500, 1000
+"""How far away vehicles count for the load and as interferers [m]."""
+CANDIDATES = 0.2
+"""Share of the resources that sensing leaves to choose from (3GPP TS 36.213, 14.1.1.6)."""
+
+_TAIL = (20.0, 20.0 + 1e-6)
+CODINGS = {
+    4: (10, (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, *_TAIL),
+        (1.0, 0.9, 0.7, 0.4, 0.13, 0.045, 0.017, 0.007, 1e-3, 1e-3, 1e-3, 1e-4)),
+    2: (12, (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, *_TAIL),
+        (1.0, 0.9, 0.7, 0.3, 0.09, 0.02, 0.002, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4)),
+}  # fmt: skip
+"""Subchannels to (resource blocks of 190 bytes, SINR [dB], block error rate there): 3GPP R1-160284, QPSK with r = 0.7
+or 0.5, 280 km/h."""
+
+MESSAGE = 190
+"""Size for which the block error rates are published [bytes]."""
+
+
+def cv2x_mode4_errors(
+    distance: Array,
+    *,
+    density: float,
+    rate: float,
+    power: float = 20.0,
+    subchannels: int = 4,
+    environment_height: float = ENVIRONMENT,
+) -> ErrorTable:
+    """Causes of loss over `distance` (D,) [m]: half_duplex, sensing, propagation, collision. Packets have 190 bytes.
+
+    density  vehicles per metre;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
+    """
+    height = ANTENNA - environment_height
+
+    def received(metres: Array) -> Array:
+        return power - winner_b1(metres, FREQUENCY, height, height)
+
+    blocks, ratios, block_errors = CODINGS[subchannels]
+    noise = NOISE - 10.0 * np.log10(BLOCKS / blocks)
+    curve = np.interp(RATIOS, ratios, block_errors)
+    errors = errors_over(signal(received(distance), SHADOWING, SENSING), curve)
+    propagation = errors @ interference(np.array([NO_INTERFERENCE]), SHADOWING, noise)[0]  # (13)
+    not_sensed = 1.0 - sensed_share(received(distance), SENSING, SHADOWING)  # (10)
+
+    count = round(FARTHEST_INTERFERER * density)
+    to_receiver = np.arange(-count, count + 1) / density
+    to_receiver = to_receiver[to_receiver != 0.0]
+    to_sender = np.abs(to_receiver + distance[:, None])
+    with_interferer = errors @ interference(received(to_receiver), SHADOWING, noise).T  # (17)
+    certain = propagation[:, None] >= 1.0
+    spoils = np.where(
+        certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
+    )  # (18)
+
+    resources = subchannels * 1000.0 / rate  # (28)
+    around = received(np.arange(-REACH, REACH + 1.0))
+    sensed = sensed_share(around, SENSING, SHADOWING)  # (11)
+    in_reach = density * float(sensed.sum())  # (29.1)
+    overlap = autocorrelation(sensed)  # (30.2)
+
+    def collides(excluded: float, threshold: float) -> Array:
+        """(14), (15), (23) to (27), (30): that some interferer has chosen the same resource and spoils the packet."""
+        apart = excluded**2 / resources
+        common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
+        candidates = CANDIDATES * resources
+        both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
+        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received(to_sender), threshold, SHADOWING)
+        chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
+        lost: Array = 1.0 - np.prod(1.0 - chosen * spoils, axis=1)
+        return lost
+
+    excluded = _excluded(in_reach, resources)
+    busy_ratio = excluded / resources  # (34)
+    weight = float(np.clip(2.0 * busy_ratio - 0.4, 0.0, 1.0))  # (22)
+    collision = weight * collides(excluded, SENSING)
+    if weight < 1.0:
+        raised, excluded = _raised(around, density, resources)
+        collision = collision + (1.0 - weight) * collides(excluded, raised)  # (21)
+    given = {
+        "half_duplex": np.full_like(distance, rate / 1000.0),  # (7)
+        "sensing": not_sensed,
+        "propagation": propagation,
+        "collision": collision,
+    }
+    return ErrorTable(distance, given, busy_ratio)
+
+
+def _excluded(in_reach: float, resources: float) -> float:
+    """Resources that sensing excludes, with `in_reach` vehicles in reach (29), (33)."""
+    half = in_reach / 2.0
+    shared = np.maximum(1.0 - np.arange(1.0, half + 1e-9) / (resources - half), 0.0)
+    return half + float(shared.sum())
+
+
+def _raised(around: Array, density: float, resources: float) -> tuple[float, float]:
+    """Step 3 raises the threshold [dBm] until enough resources are left: it, and how many are excluded then (32)."""
+    threshold = SENSING
+    while True:
+        in_reach = 2.0 * density * float(sensed_share(around, threshold, SHADOWING).sum())
+        excluded = _excluded(in_reach, resources)
+        if resources - excluded >= CANDIDATES * resources:
+            return threshold, excluded
+        threshold += STEP

@@ -1,0 +1,114 @@
+"""IEEE 802.11p among many vehicles on a straight road.
+
+M. Sepulcre, M. Gonzalez-Martín, J. Gozalvez, R. Molina-Masegosa, B. Coll-Perales: Analytical Models of the Performance
+of IEEE 802.11p Vehicle to Vehicle Communications, IEEE Transactions on Vehicular Technology 2021, arXiv:2104.07923.
+Numbers in brackets are those of its equations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.load.levels import (
+    RATIOS,
+    autocorrelation,
+    errors_over,
+    interference,
+    noise_alone,
+    sensed_share,
+    signal,
+)
+from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.radio.propagation import winner_b1
+
+Array = NDArray[np.float64]
+
+FREQUENCY = 5.89
+"""[GHz]"""
+ANTENNA = 1.5
+"""Height of all antennas [m]."""
+ENVIRONMENT = 0.5
+"""Height of the environment [m], which the path loss takes off the antennas'."""
+SHADOWING = 3.0
+"""Standard deviation [dB]."""
+SENSING, NOISE = -85.0, -95.0
+"""Threshold of sensing, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
+SLOT, PREAMBLE, HEADERS = 13e-6, 40e-6, 30
+"""aSlotTime and preamble with signal field [s]; headers below the message [bytes]."""
+BANDWIDTH = 10e6
+"""[Hz]"""
+REACH, FARTHEST_INTERFERER = 1500, 1000
+"""How far away vehicles count for the load and as interferers [m]."""
+
+FRAME_ERRORS = ((5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0), (1.0, 0.4, 0.015, 0.004, 0.003, 0.002, 0.001))
+"""Frame error rate by Eb/N0 [dB]: O. Goubet et al., IEEE Transactions on Vehicular Technology 64(9), 2015, fig. 14."""
+
+
+def airtime(size: int, bit_rate: float) -> float:
+    """Duration of a packet [s] of `size` bytes at `bit_rate` [bit/s]."""
+    return PREAMBLE + (size + HEADERS) * 8.0 / bit_rate
+
+
+def ieee80211p_errors(
+    distance: Array,
+    *,
+    density: float,
+    rate: float,
+    size: int,
+    power: float = 23.0,
+    bit_rate: float = 6e6,
+    environment_height: float = ENVIRONMENT,
+) -> ErrorTable:
+    """Causes of loss over `distance` (D,) [m]: sensing, busy, propagation, collision.
+
+    density  vehicles per metre;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
+    """
+    height = ANTENNA - environment_height
+
+    def received(metres: Array) -> Array:
+        return power - winner_b1(metres, FREQUENCY, height, height)
+
+    duration = airtime(size, bit_rate)
+    sensed = sensed_share(received(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
+    unsaturated = density * rate * duration * float(sensed.sum())  # (34)
+    busy_ratio = -0.2481 * unsaturated**2 + 0.913 * unsaturated + 0.003844  # (35)
+    overlap = autocorrelation(sensed)
+    overlap /= overlap.max()  # (20)
+
+    curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
+    not_sensed = 1.0 - sensed_share(received(distance), SENSING, SHADOWING)  # (12)
+    errors = errors_over(signal(received(distance), SHADOWING, SENSING), curve)
+    propagation = errors @ noise_alone(NOISE)[0]  # (24)
+
+    to_receiver = _interferers(density)
+    to_sender = np.abs(to_receiver + distance[:, None])
+    closer = np.abs(to_receiver) < np.abs(distance)[:, None]
+    with_interferer = errors @ interference(received(to_receiver), SHADOWING, NOISE).T  # (30)
+    certain = propagation[:, None] >= 1.0
+    spoils = np.where(
+        certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
+    )  # (31)
+    hears = sensed_share(received(to_receiver), SENSING, SHADOWING)
+    senses = sensed_share(received(to_sender), SENSING, SHADOWING)
+    share = rate / (1.0 - busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
+    same_slot = SLOT * share * senses  # (22)
+    hidden = duration * share * (1.0 - senses)  # (18)
+    busy = _any(np.where(closer, same_slot * hears, 0.0) + hidden * hears)  # (14), (16), (21)
+    collision = _any(np.where(closer, 0.0, spoils * same_slot) + spoils * hidden * (2.0 - hears))  # (26), (28), (32)
+    given = {"sensing": not_sensed, "busy": busy, "propagation": propagation, "collision": collision}
+    return ErrorTable(distance, given, busy_ratio)
+
+
+def _interferers(density: float) -> Array:
+    """Their places relative to the receiver [m], one per 1/density on both sides."""
+    count = round(FARTHEST_INTERFERER * density)
+    places = np.arange(-count, count + 1) / density
+    others: Array = places[places != 0.0]
+    return others
+
+
+def _any(probability: Array) -> Array:
+    """That at least one of the independent events along the last axis happens."""
+    happens: Array = 1.0 - np.prod(1.0 - np.clip(probability, 0.0, 1.0), axis=-1)
+    return happens

@@ -1,0 +1,90 @@
+"""The analytic models as settings: a loss of the composed channel, and the background load of a radio."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.load.cv2x_mode4 import cv2x_mode4_errors
+from eidrive_scenario.v2x.load.ieee80211p import ieee80211p_errors
+from eidrive_scenario.v2x.load.table import ErrorTable
+
+FARTHEST, STEP = 1000.0, 10.0
+"""Tables reach this far, in these steps [m]; beyond, nothing of either model gets through."""
+
+Density = Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class Ieee80211pLoss(Settings):
+    """The losses of IEEE 802.11p among other vehicles, by distance (Sepulcre et al. 2021).
+
+    density    vehicles per metre of road
+    rate, size, power_dbm, data_rate_mbps   what all of them send: packets per second, bytes, dBm, Mbit/s
+    environment_height   taken off the antennas' 1.5 m in the path loss [m]
+    """
+
+    kind: Literal["80211p"]
+    density: Density
+    rate: PositiveFloat = 10.0
+    size: PositiveInt = 300
+    power_dbm: float = 23.0
+    data_rate_mbps: PositiveFloat = 6.0
+    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.5
+
+    def table(self) -> ErrorTable:
+        """What the model says."""
+        return _ieee80211p(self)
+
+
+class Cv2xMode4Loss(Settings):
+    """The losses of C-V2X Mode 4 among other vehicles that send 190 bytes, by distance (Gonzalez-Martín et al. 2019).
+
+    density    vehicles per metre of road
+    rate, power_dbm   what all of them send: packets per second (published for 10 and 20), dBm
+    subchannels   4 (QPSK, r = 0.7) or 2 (r = 0.5)
+    environment_height   taken off the antennas' 1.5 m in the path loss [m]
+    """
+
+    kind: Literal["cv2x_mode4"]
+    density: Density
+    rate: PositiveFloat = 10.0
+    power_dbm: float = 20.0
+    subchannels: Literal[2, 4] = 4
+    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.0
+
+    def table(self) -> ErrorTable:
+        """What the model says."""
+        return _cv2x_mode4(self)
+
+
+def _distances() -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    return np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
+
+
+@cache
+def _ieee80211p(loss: Ieee80211pLoss) -> ErrorTable:
+    return ieee80211p_errors(
+        _distances(),
+        density=loss.density,
+        rate=loss.rate,
+        size=loss.size,
+        power=loss.power_dbm,
+        bit_rate=loss.data_rate_mbps * 1e6,
+        environment_height=loss.environment_height,
+    )
+
+
+@cache
+def _cv2x_mode4(loss: Cv2xMode4Loss) -> ErrorTable:
+    return cv2x_mode4_errors(
+        _distances(),
+        density=loss.density,
+        rate=loss.rate,
+        power=loss.power_dbm,
+        subchannels=loss.subchannels,
+        environment_height=loss.environment_height,
+    )

@@ -1,0 +1,69 @@
+"""Path loss between two antennas, as published; arrays in, decibels out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SPEED_OF_LIGHT = 3e8
+"""As the models round it [m/s]."""
+
+NEAREST = 3.0
+"""The WINNER+ formulas are kept at their value for this distance below it [m] (TR 36.885, A.1.4)."""
+
+
+def highway_los(distance: Array, frequency_ghz: float) -> Array:
+    """3GPP TR 37.885, table 6.2.1-1, highway, LOS [dB]; distance in m."""
+    loss: Array = 32.4 + 20.0 * np.log10(distance) + 20.0 * np.log10(frequency_ghz)
+    return loss
+
+
+def urban_los(distance: Array, frequency_ghz: float) -> Array:
+    """3GPP TR 37.885, table 6.2.1-1, urban, LOS [dB]; distance in m."""
+    loss: Array = 38.77 + 16.7 * np.log10(distance) + 18.2 * np.log10(frequency_ghz)
+    return loss
+
+
+def building_nlos(distance: Array, frequency_ghz: float) -> Array:
+    """3GPP TR 37.885, table 6.2.1-1, NLOS behind buildings [dB]; distance in m."""
+    loss: Array = 36.85 + 30.0 * np.log10(distance) + 18.9 * np.log10(frequency_ghz)
+    return loss
+
+
+def blockage_moments(distance: Array, lower: Array, upper: Array, blocker: Array) -> tuple[Array, Array]:
+    """Mean and standard deviation [dB] of the loss that vehicles in between add (3GPP TR 37.885, 6.2.1).
+
+    lower, upper  heights of the lower and the higher antenna; blocker  top of the highest vehicle in between [m]
+    """
+    far = np.maximum(0.0, 15.0 * np.log10(distance) - 41.0)
+    mean = np.where(upper < blocker, 9.0 + far, 5.0 + far)
+    spread = np.where(upper < blocker, 4.5, 4.0)
+    over = lower > blocker
+    return np.where(over, 0.0, mean), np.where(over, 0.0, spread)
+
+
+def winner_b1(distance: Array, frequency_ghz: float, first: float, second: float) -> Array:
+    """WINNER+ B1 with LOS, as 3GPP TR 36.885, A.1.4 takes it over [dB]; distance in m.
+
+    `first` and `second` are the effective antenna heights: above the ground, less the environment height [m]. Published
+    implementations differ in that height (1.0, 0.5 or 0 m), which moves the break point and 16 dB at 200 m.
+    """
+    distance = np.maximum(np.abs(distance), NEAREST)
+    break_point = 4.0 * first * second * frequency_ghz * 1e9 / SPEED_OF_LIGHT
+    decades = np.log10(distance)
+    near = 22.7 * decades + 27.0 + 20.0 * np.log10(frequency_ghz)
+    heights = 17.3 * np.log10(first) + 17.3 * np.log10(second)
+    far = 40.0 * decades + 7.56 - heights + 2.7 * np.log10(frequency_ghz)
+    free_space = 20.0 * decades + 46.4 + 20.0 * np.log10(frequency_ghz / 5.0)
+    loss: Array = np.maximum(np.where(distance < break_point, near, far), free_space)
+    return loss
+
+
+def probability_of_los(distance: Array, environment: str) -> Array:
+    """That nothing stands between two cars of random traffic (3GPP TR 37.885, table 6.2-1), `highway` or `urban`."""
+    if environment == "urban":
+        return np.minimum(1.0, 1.05 * np.exp(-0.0114 * distance))
+    near = np.minimum(1.0, 2.1013e-6 * distance**2 - 0.002 * distance + 1.0193)
+    return np.where(distance <= 475.0, near, np.maximum(0.0, 0.54 - 0.001 * (distance - 475.0)))

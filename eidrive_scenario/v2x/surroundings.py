@@ -1,0 +1,67 @@
+"""Where the antennas are, and what stands between them: all that a channel is told about the world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.message import LineOfSight
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LOS, NLOSV, NLOS = range(3)
+"""Codes of the states of a line of sight in arrays."""
+
+STATES: tuple[LineOfSight, ...] = ("los", "nlosv", "nlos")
+"""Their names, by code."""
+
+
+class SightLines(NamedTuple):
+    """What M rays from antenna to antenna met.
+
+    states    (M,) LOS, NLOSV or NLOS
+    heights   (M,) top of the highest vehicle in between, in the world frame [m]; minus infinity where there is none
+    blockers  M tuples with the names of those in between, from the first antenna on
+    """
+
+    states: Integers
+    heights: Array
+    blockers: tuple[tuple[str, ...], ...]
+
+
+Sight = Callable[[Sequence[tuple[str, str]]], SightLines]
+"""Asks for the lines of sight between pairs of stations, now."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Antennas by the name of their station, in the world frame [m]; `sight` is None where nobody can look."""
+
+    places: Mapping[str, tuple[float, float, float]]
+    sight: Sight | None = None
+
+    def distance(self, first: str, second: str) -> float | None:
+        """Between two antennas [m]; None if one of them is nowhere."""
+        a, b = self.places.get(first), self.places.get(second)
+        return None if a is None or b is None else math.dist(a, b)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """In alphabetical order, so that no sum over stations depends on the order in which they joined."""
+        return tuple(sorted(self.places))
+
+    @cached_property
+    def positions(self) -> Array:
+        """(N, 3) in the order of `names` [m]."""
+        return np.array([self.places[name] for name in self.names], dtype=float).reshape(-1, 3)
+
+
+NOWHERE = Surroundings({})
+"""Before anybody said where the antennas are."""

@@ -1,0 +1,78 @@
+"""Both analytic models against golden numbers, and what must hold whatever the numbers are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.v2x.load.cv2x_mode4 import cv2x_mode4_errors
+from eidrive_scenario.v2x.load.ieee80211p import airtime, ieee80211p_errors
+from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
+DISTANCE = np.array(GOLDEN["distance_m"], dtype=float)
+CAUSES = {"err_sen": "sensing", "err_rxb": "busy", "err_pro": "propagation", "err_col": "collision"}
+TOLERANCE = 1e-3
+
+
+@pytest.mark.parametrize("golden", GOLDEN["ieee80211p"], ids=lambda g: f"{g['veh_per_m']}-{g['rate_hz']}-{g['bytes']}")
+def test_802_11p_gives_the_golden_curves(golden: dict[str, Any]) -> None:
+    table = ieee80211p_errors(
+        DISTANCE,
+        density=golden["veh_per_m"],
+        rate=golden["rate_hz"],
+        size=golden["bytes"],
+        power=golden["ptx_dbm"],
+        bit_rate=golden["rate_bps"],
+    )
+    assert table.busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
+    assert table.delivery_ratio == pytest.approx(golden["pdr"], abs=TOLERANCE)
+    for key, cause in CAUSES.items():
+        assert table.errors[cause] == pytest.approx(golden[key], abs=TOLERANCE), cause
+
+
+@pytest.mark.parametrize("golden", GOLDEN["cv2x_mode4"], ids=lambda g: f"{g['veh_per_m']}-{g['rate_hz']}")
+def test_c_v2x_mode_4_gives_the_golden_curves(golden: dict[str, Any]) -> None:
+    table = cv2x_mode4_errors(
+        DISTANCE,
+        density=golden["veh_per_m"],
+        rate=golden["rate_hz"],
+        power=golden["ptx_dbm"],
+        subchannels=golden["subch"],
+    )
+    assert table.busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
+    assert table.delivery_ratio == pytest.approx(golden["pdr"], abs=TOLERANCE)
+    assert table.errors["half_duplex"] == pytest.approx(golden["err_hd"], abs=TOLERANCE)
+    for key, cause in CAUSES.items():
+        if key in golden:
+            assert table.errors[cause] == pytest.approx(golden[key], abs=TOLERANCE), cause
+
+
+def test_more_vehicles_cost_delivery_at_every_distance() -> None:
+    sparse, dense = (Ieee80211pLoss(kind="80211p", density=density).table() for density in (0.03, 0.12))
+    assert np.all(dense.delivery_ratio <= sparse.delivery_ratio)
+    assert dense.busy_ratio > sparse.busy_ratio
+    sparse, dense = (Cv2xMode4Loss(kind="cv2x_mode4", density=density).table() for density in (0.1, 0.3))
+    assert np.all(dense.delivery_ratio <= sparse.delivery_ratio)
+    assert dense.busy_ratio > sparse.busy_ratio
+
+
+def test_causes_share_the_draw_in_their_order() -> None:
+    """Draws spread evenly over (0, 1) meet each cause as often as the table says, and none as often as it delivers."""
+    table = Ieee80211pLoss(kind="80211p", density=0.12, rate=25, size=500).table()
+    draws = (np.arange(20000) + 0.5) / 20000
+    met = [table.cause(150.0, float(draw)) for draw in draws]
+    place = list(table.distance).index(150.0)
+    for cause, probability in table.errors.items():
+        assert met.count(cause) / 20000 == pytest.approx(probability[place], abs=1e-4)
+    assert met.count(None) / 20000 == pytest.approx(table.delivery_ratio[place], abs=1e-4)
+    assert table.cause(5000.0, 0.999) == "sensing"
+
+
+def test_airtime_of_the_model() -> None:
+    """40 µs and (B + 30) bytes at 6 Mbit/s: 220 · 8 / 6 = 293.33 µs."""
+    assert airtime(190, 6e6) == pytest.approx(333.333e-6, abs=1e-9)
