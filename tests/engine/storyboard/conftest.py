@@ -151,12 +151,12 @@ def build() -> Callable[..., Storyboard]:
         events: str = "",
         stop: str = "<StopTrigger/>",
         everywhere: str = "",
-        actions: Registry | None = None,
+        registered: Registry | None = None,
     ) -> Storyboard:
         text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
         actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
         stories = ACT.format(events=events) if events else ""
         text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)
-        return Storyboard(load_scenario(text.encode()), None, dt=0.1, actions=actions)
+        return Storyboard(load_scenario(text.encode()), None, dt=0.1, actions=registered)
 
     return made

@@ -141,7 +141,7 @@ def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) 
             STARTS,
             EVENT.format(name="odd", action=swarm, trigger=""),
             everywhere=swarm,
-            actions=Registry("actions", all_but_one),
+            registered=Registry("actions", all_but_one),
         )
     messages = [problem.message for problem in caught.value.problems]
     assert messages == ["TrafficStopAction is not executed yet"] * 2
