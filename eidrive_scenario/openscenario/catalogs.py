@@ -133,9 +133,35 @@ class CatalogLibrary:
                 line = line_of(catalog.document.root)
                 self._findings.warn(message, f"name it {name!r}", source=catalog.document.name, line=line)
                 return catalog
+        beside = self._beside(name)
+        if beside is not None:
+            place = Path(beside.document.name).parent
+            self._findings.warn(
+                f"the catalog {name!r} lies in none of the places given, but in {place}",
+                f"name that place, {place}",
+                source=found.reference.source,
+                line=found.reference.line,
+            )
+            return beside
         where = ", ".join(str(place) for place in places)
         known = suggestion(name, {catalog.name for catalog in catalogs.values()})
         self._wrong(found.reference, f"no catalog {name!r} in {where}", known)
+        return None
+
+    def _beside(self, name: str) -> CatalogFile | None:
+        """The catalog in a folder beside those that are given, which files find that were moved in parts."""
+        folders = {
+            folder
+            for place in self._places.values()
+            if place.is_dir()
+            for folder in place.parent.iterdir()
+            if folder.is_dir() and folder not in self._places.values()
+        }
+        for folder in sorted(folders):
+            path = folder / f"{name}.xosc"
+            catalog = self._file(path) if path.is_file() else None
+            if catalog is not None and catalog.name == name:
+                return catalog
         return None
 
     def _ordered_places(self, kinds: Iterable[type[Element]]) -> list[Path]:

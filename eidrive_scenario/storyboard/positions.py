@@ -57,8 +57,7 @@ def _relative_object(frame: model.RelativeObjectPosition, stage: Stage, actor: s
 
 def _road(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
     roads = _roads(frame, stage)
-    _check_road(frame, roads, frame.road_id, frame.s)
-    return _in_road(roads, frame.road_id, frame.s, frame.t, frame.orientation)
+    return _in_road(roads, frame.road_id, _on_road(frame, stage, roads), frame.t, frame.orientation)
 
 
 def _relative_road(frame: model.RelativeRoadPosition, stage: Stage, actor: str | None) -> Place:
@@ -71,15 +70,13 @@ def _relative_road(frame: model.RelativeRoadPosition, stage: Stage, actor: str |
 
 def _lane(frame: model.LanePosition, stage: Stage, actor: str | None) -> Place:
     roads = _roads(frame, stage)
-    _check_road(frame, roads, frame.road_id, frame.s)
+    s = _on_road(frame, stage, roads)
     lane = _lane_id(frame, frame.lane_id)
-    known = roads.lane_ids(frame.road_id, frame.s)
+    known = roads.lane_ids(frame.road_id, s)
     if lane not in known and lane != 0:
         shown = ", ".join(str(number) for number in known)
-        raise _missing(
-            frame, f"names lane {lane} of road {frame.road_id!r} at s = {frame.s:g}", f"its lanes there: {shown}"
-        )
-    return _in_lane(roads, frame.road_id, lane, frame.s, frame.offset or 0.0, frame.orientation)
+        raise _missing(frame, f"names lane {lane} of road {frame.road_id!r} at s = {s:g}", f"its lanes there: {shown}")
+    return _in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
 
 
 def _relative_lane(frame: model.RelativeLanePosition, stage: Stage, actor: str | None) -> Place:
@@ -253,13 +250,20 @@ def _roads(frame: model.Element, stage: Stage) -> RoadNetwork:
     return stage.roads
 
 
-def _check_road(frame: model.Element, roads: RoadNetwork, road: str, s: float) -> None:
+def _on_road(frame: model.RoadPosition | model.LanePosition, stage: Stage, roads: RoadNetwork) -> float:
+    """The position's s; one that lies beyond an end of its road means that end, with a warning."""
+    road, s = frame.road_id, frame.s
     if road not in roads.roads:
         shown = ", ".join(sorted(roads.roads)[:12])
         raise _missing(frame, f"names road {road!r}, which the road network does not have", f"it has {shown}")
     length = roads.roads[road].length
-    if not -1e-3 <= s <= length + 1e-3:
-        raise _missing(frame, f"says s = {s:g} on road {road!r}", f"that road is {length:.2f} m long")
+    on_road = min(max(s, 0.0), length)
+    if abs(on_road - s) > 1e-3:
+        message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
+        problem = Problem(message, f"that road is {length:.2f} m long", frame.source, frame.line)
+        if problem not in stage.warnings:
+            stage.warnings.append(problem)
+    return on_road
 
 
 def _lane_id(frame: model.Element, text: str) -> int:
