@@ -13,11 +13,15 @@ from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.localization import Localizer
+from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.v2x.message import Message, Received, StationState
 from eidrive_scenario.v2x.size import cpm_size
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -41,7 +45,7 @@ class Agent:
         spec: ActorSpec,
         settings: AgentSettings,
         *,
-        detector: Detector,
+        perception: Perception,
         fusion: FusionMethod,
         planner: Planner | None,
         controller: Controller | None,
@@ -52,7 +56,7 @@ class Agent:
         self.name = spec.name
         self.spec = spec
         self.settings = settings
-        self.detector = detector
+        self.perception = perception
         self.fusion = fusion
         self.planner = planner
         self.controller = controller
@@ -68,17 +72,22 @@ class Agent:
 
     def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
         """One tick at `now` [s]."""
+        readings = self.perception.locate(readings)
         ego = readings.ego
         self._remember_place(ego)
-        fresh = _has_all(readings, self.detector.needs)
-        if fresh:
-            self._detections = self.detector.detect(readings)
+        fresh = self.perception.perceive(readings)
+        if fresh is not None:
+            self._detections = fresh
         detections = self._detections
         self._listen(inbox, now)
-        if fresh and not self.own_perception:
+        if fresh is not None and not self.own_perception:
             self._reports[self.name] = Report(self.name, detections, now)
         fused = self.fusion.fuse(list(self._reports.values()), now)
-        plan = self.planner.plan(ego, fused, goal, now) if self.planner is not None else None
+        plan = None
+        if self.planner is not None:
+            if self.settings.obey_signals:
+                self.planner.heed(readings.signals)
+            plan = self.planner.plan(ego, fused, goal, now)
         return AgentStep(
             detections=detections,
             inbox=tuple(inbox),
@@ -86,6 +95,7 @@ class Agent:
             plan=plan,
             control=self._control(ego, plan),
             outbox=self._speak(ego, detections, now),
+            estimate=ego if self.settings.localization != "oracle" else None,
         )
 
     def _remember_place(self, ego: EgoState) -> None:
@@ -157,13 +167,20 @@ class Agent:
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
-    needs = registry("detectors").load(settings.detector).needs
-    sensors = settings.rig_sensors(needs)
-    missing = needs - {sensor.kind for sensor in sensors.values()}
-    if missing:
-        message = f"detector {settings.detector!r} of {spec.name!r} needs a sensor of kind {', '.join(sorted(missing))}"
-        raise SettingError(Problem(message, "add it to the property 'sensors'"))
-    return Rig(spec, sensors, seed=seed)
+    return Rig(spec, settings.rig_sensors(registry("detectors").load(settings.detector).needs), seed=seed)
+
+
+def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
+    """The detector that the settings name. Raises SettingError, with this place, if its own settings are wrong."""
+    kind: type[Detector] = registry("detectors").load(settings.detector)
+    given = settings.detector_settings
+    if kind.settings_type is not None:
+        own = parse_settings(kind.settings_type, given, source=source, line=line)
+        return kind(own)  # type: ignore[call-arg]
+    if given:
+        message = f"detector {settings.detector!r} has no settings of its own"
+        raise SettingError(Problem(message, "remove the property 'detector_settings'", source, line))
+    return kind()
 
 
 def build_agent(
@@ -174,9 +191,10 @@ def build_agent(
     seed: int,
     dt: float,
     own_perception: bool = False,
+    detector: Detector | None = None,
 ) -> Agent:
-    """The agent of the station on this body. Extensions are built as `Detector()`, `FusionMethod()` and
-    `Planner(settings, spec, roads, dt=dt, seed=seed)`.
+    """The agent of the station on this body. Extensions are built as `Detector()` or `Detector(detector_settings)`,
+    `FusionMethod()` and `Planner(settings, spec, roads, dt=dt, seed=seed)`; `detector` gives one that is built already.
 
     A body with wheels follows a route if the settings name no planner; one without drives never.
     Raises SettingError if a planner is asked of a body without wheels.
@@ -185,23 +203,31 @@ def build_agent(
     planner = settings.planner or ("route" if wheels else NO_PLANNER)
     if planner != NO_PLANNER and not wheels:
         raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
-    detector: Detector = registry("detectors").load(settings.detector)()
+    detector = detector or build_detector(settings)
+    sensors = settings.rig_sensors(detector.needs)
+    detector.install(Installation(spec, sensors, roads, seed))
     return Agent(
         spec,
         settings,
-        detector=detector,
+        perception=Perception(
+            detector,
+            tracker=_tracker(settings, detector),
+            localizer=Localizer(spec.name, seed) if settings.localization == "ekf" else None,
+            latency=settings.detector_latency,
+        ),
         fusion=registry("fusion").load(settings.fusion)(),
         planner=None
         if planner == NO_PLANNER
         else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
         controller=Controller(spec, dt) if wheels else None,
-        sensors=len(settings.rig_sensors(detector.needs)),
+        sensors=len(sensors),
         dt=dt,
         own_perception=own_perception,
     )
 
 
-def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:
-    """Whether a sensor of each of these kinds was due."""
-    present = {"truth": readings.truth is not None, "camera": bool(readings.cameras), "lidar": bool(readings.lidars)}
-    return all(present[kind] for kind in kinds)
+def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:
+    """The tracker that the settings ask for; without a word of theirs, one where the detector gives no velocities."""
+    if settings.tracker is None:
+        return None if detector.gives_velocity else Tracker(TrackerSettings())
+    return None if settings.tracker.kind == "none" else Tracker(settings.tracker)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Goal, Plan
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
 
@@ -23,6 +24,9 @@ class Planner(ABC):
         self.roads = roads
         self.dt = dt
         self.seed = seed
+
+    def heed(self, signals: Sequence[SignalReading]) -> None:  # noqa: B027 - for planners that know signals
+        """The traffic lights and stop signs in sight now; called before `plan` where the station obeys them."""
 
     @abstractmethod
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:

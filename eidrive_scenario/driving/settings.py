@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import yaml
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
-from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.tracking import TrackerSettings, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,
     AnySensorSettings,
-    CameraSettings,
-    LidarSettings,
     MountSetting,
     TruthSettings,
 )
@@ -31,6 +28,14 @@ NO_PLANNER = "none"
 
 _TEXTS = frozenset({"module", "detector", "fusion", "planner"})
 """Properties whose values are names, not YAML."""
+
+USUAL: Mapping[str, Any] = {
+    model.model_fields["kind"].default: model for model in get_args(get_args(AnySensorSettings)[0])
+}
+"""The settings of each kind of sensor; as they are, where nothing else is said."""
+
+LOCALIZING = ("gnss", "imu")
+"""The kinds of sensors by which a station finds out where it is."""
 
 _OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
 
@@ -161,14 +166,18 @@ class AgentSettings(Settings):
             )
         return self
 
-    def needs(self, detector: type[Detector]) -> frozenset[str]:
-        """The kinds of sensors that this station reads, with this detector."""
-        return detector.needs | (frozenset({"gnss", "imu"}) if self.localization == "ekf" else frozenset())
-
     def rig_sensors(self, needs: frozenset[str]) -> dict[str, AnySensorSettings]:
-        """The sensors of this station, for a detector that reads these kinds."""
-        usual = {"truth": TruthSettings, "camera": CameraSettings, "lidar": LidarSettings}
-        sensors = dict(self.sensors) if self.sensors is not None else {kind: usual[kind]() for kind in sorted(needs)}
+        """The sensors of this station, for a detector that reads these kinds; those to localize by are added.
+
+        Raises SettingError if the settings leave one out that the detector needs.
+        """
+        sensors = dict(self.sensors) if self.sensors is not None else {kind: USUAL[kind]() for kind in sorted(needs)}
+        present = {sensor.kind for sensor in sensors.values()}
+        missing = needs - present
+        if missing:
+            message = f"detector {self.detector!r} needs a sensor of kind {', '.join(sorted(missing))}"
+            raise SettingError(Problem(message, "add it to the property 'sensors'"))
+        sensors |= {kind: USUAL[kind]() for kind in LOCALIZING if self.localization == "ekf" and kind not in present}
         for name, sensor in sensors.items():
             if isinstance(sensor, TruthSettings):
                 own = {key: getattr(self, key) for key in _OF_THE_TRUTH_SENSOR if key not in sensor.model_fields_set}

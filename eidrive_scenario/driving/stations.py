@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from eidrive_scenario.driving.agent import Agent, build_agent, build_rig
+from eidrive_scenario.driving.agent import Agent, build_agent, build_detector, build_rig
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
@@ -15,6 +17,7 @@ from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
+from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig, read_all
@@ -63,6 +66,8 @@ class Stations:
         self._rigs: dict[str, Rig] = {}
         self._held: dict[str, HeldControls] = {}
         self._settings = _all_settings(scenario, detector, cooperate)
+        self._detectors = _all_detectors(scenario, self._settings, detector)
+        """Built beforehand, as what they cannot work with shall be told before the run."""
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None)
 
@@ -78,7 +83,13 @@ class Stations:
             return
         self._rigs[spec.name] = build_rig(settings, spec, seed=self._seed)
         self._agents[spec.name] = build_agent(
-            settings, spec, self._roads, seed=self._seed, dt=self._dt, own_perception=self._own_perception
+            settings,
+            spec,
+            self._roads,
+            seed=self._seed,
+            dt=self._dt,
+            own_perception=self._own_perception,
+            detector=self._detectors.pop(spec.name, None),
         )
         if self._agents[spec.name].controller is not None:
             self._held[spec.name] = HeldControls(spec, self._dt)
@@ -203,13 +214,47 @@ def _all_settings(
         raise SettingError(problems)
     options = {"detector": detector, "cooperates_with": cooperate}
     update = {key: value for key, value in options.items() if value is not None}
-    return {name: settings.model_copy(update=update) for name, settings in found.items()}
+    return {name: settings.model_copy(update=update | _own(settings, detector)) for name, settings in found.items()}
+
+
+def _own(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
+    """What a detector by option changes: the settings in the file are those of the detector in the file."""
+    return {"detector_settings": {}} if detector is not None and detector != settings.detector else {}
+
+
+def _all_detectors(
+    scenario: Scenario, settings: Mapping[str, AgentSettings], option: str | None
+) -> dict[str, Detector]:
+    """The detector of every station. Raises SettingError with all that is wrong with any of them or their sensors."""
+    problems: list[Problem] = []
+    found: dict[str, Detector] = {}
+    for name, station in settings.items():
+        controller = list(filter(is_agent, scenario.controllers[name]))[-1]
+        by_option = option is not None and not station.detector_settings
+        source = "--detector" if by_option else controller.source
+        line = None if by_option else _line(controller, "detector_settings", "detector")
+        try:
+            found[name] = build_detector(station, source=source, line=line)
+            source, line = controller.source, _line(controller, "sensors")
+            station.rig_sensors(found[name].needs)
+        except SettingError as error:
+            problems += [
+                problem if problem.source else replace(problem, source=source, line=line) for problem in error.problems
+            ]
+    if problems:
+        raise SettingError(list(dict.fromkeys(problems)))
+    return found
+
+
+def _line(controller: Controller, *properties: str) -> int:
+    """The line of the first of these properties that a controller has, else its own."""
+    entries = controller.properties.property if controller.properties is not None else ()
+    lines = {entry.name: entry.line for entry in entries}
+    return next((lines[name] for name in properties if name in lines), controller.line)
 
 
 def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Problem]:
-    properties = controllers[name].properties
-    entries = properties.property if properties is not None else ()
-    line = next((entry.line for entry in entries if entry.name == "cooperates_with"), controllers[name].line)
+    line = _line(controllers[name], "cooperates_with")
     others = [other for other in controllers if other != name]
     return [
         Problem(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.v2x.message import Message, Received
 from eidrive_scenario.world.actor import Control
 
@@ -54,3 +55,5 @@ class AgentStep:
     control: Control | None
     """None for a station that does not drive (a roadside unit)."""
     outbox: tuple[Message, ...]
+    estimate: EgoState | None = None
+    """Its own motion as it takes it to be, where that is not the truth."""

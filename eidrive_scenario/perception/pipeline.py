@@ -1,0 +1,64 @@
+"""From the readings of a station to the objects that it knows of: detector, its latency, tracker."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.localization import Localizer
+from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.sensing.readings import Readings
+
+TIME_TOLERANCE = 1e-9
+
+
+class Perception:
+    """What one station makes of its sensors.
+
+    latency    how long the detector computes: what it saw at t is known from t + latency on; readings that come
+               meanwhile are worked on beside each other, each as long [s]
+    tracker    None where the boxes are passed on as they are
+    localizer  None where the station knows where it is
+    """
+
+    def __init__(
+        self,
+        detector: Detector,
+        *,
+        tracker: Tracker | None = None,
+        localizer: Localizer | None = None,
+        latency: float = 0.0,
+    ) -> None:
+        self.detector = detector
+        self._tracker = tracker
+        self._localizer = localizer
+        self._latency = latency
+        self._computing: deque[tuple[float, Detections]] = deque()
+
+    def locate(self, readings: Readings) -> Readings:
+        """The readings as the station can know them, if it has to find out by itself where it is."""
+        return readings if self._localizer is None else self._localizer.located(readings)
+
+    def perceive(self, readings: Readings) -> Detections | None:
+        """The newest objects that become known now; None if there is nothing new."""
+        now = readings.time
+        if _has_all(readings, self.detector.needs):
+            found = self.detector.detect(readings)
+            if self._localizer is not None:
+                found = self._localizer.blurred(found)
+            if self._latency <= 0.0 and not self._computing:
+                return found if self._tracker is None else self._tracker.update(found)
+            self._computing.append((now + self._latency, found))
+        newest = None
+        while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
+            newest = self._computing.popleft()[1]
+            if self._tracker is not None:
+                newest = self._tracker.update(newest)
+        return newest
+
+
+def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:
+    """Whether a sensor of each of these kinds was due."""
+    present = {"truth": readings.truth is not None, "camera": bool(readings.cameras), "lidar": bool(readings.lidars)}
+    return all(present[kind] for kind in kinds)
