@@ -11,6 +11,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.exposure import develop, metered
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.optics import Optics, lens_of
+from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import CameraSettings
@@ -18,6 +19,9 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
+
+DROPS_STAY = 2.0
+"""How long drops sit on a lens before others have come [s]."""
 
 
 class Camera:
@@ -35,7 +39,13 @@ class Camera:
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """A picture from the actor in this row."""
         seed, *key = self._key
-        return self._photographer.take(scene, self.mounting.camera_pose(view, row), generator(seed, *key, view.tick))
+        return self._photographer.take(
+            scene,
+            self.mounting.camera_pose(view, row),
+            generator(seed, *key, view.tick),
+            velocity=view.velocity[row],
+            lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
+        )
 
 
 class Photographer:
@@ -43,18 +53,30 @@ class Photographer:
 
     def __init__(self, settings: CameraSettings) -> None:
         self.settings = settings
-        self.intrinsics = lens_of(settings).intrinsics
+        self._lens = lens_of(settings)
+        self.intrinsics = self._lens.intrinsics
         self._optics = Optics(settings)
 
     def take(
-        self, scene: Scene, pose: Array, draws: np.random.Generator, *, ignore: Iterable[str] = ()
+        self,
+        scene: Scene,
+        pose: Array,
+        draws: np.random.Generator,
+        *,
+        ignore: Iterable[str] = (),
+        velocity: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+        lens: np.random.Generator | None = None,
     ) -> CameraReading:
         """A picture from `pose` (4, 4): camera to world, x right, y down, z forward; actors in `ignore` are not seen.
 
-        The same scene, pose and state of `draws` give the same picture.
+        `draws` are for noise and falling drops, `lens` for drops that sit on it (None: there are none); velocity (3,)
+        of the camera [m/s]. The same scene, pose and state of the generators give the same picture.
         """
         settings = self.settings
         seen = self._optics.bent(scene.radiance(pose, self._optics.pinhole, ignore=ignore))
+        draw_precipitation(seen.luminance, scene.weather, pose, self._lens, draws, velocity)
+        if lens is not None and settings.lens_drops:
+            draw_drops_on_lens(seen.luminance, scene.weather, lens)
         exposure = metered(seen.luminance, settings)
         rgb = develop(seen.luminance, exposure, settings.noise, draws)
         return CameraReading(rgb, seen.depth, seen.segmentation, self.intrinsics, pose, np.array(settings.distortion))

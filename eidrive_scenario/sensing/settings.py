@@ -85,6 +85,7 @@ class CameraSettings(SensorSettings):
     near, far      what is nearer or farther is not drawn
     noise          of the sensor; None is a sensor without
     exposure_time, gain   [s], [dB]; None is automatic, within longest_exposure and highest_gain
+    lens_drops     whether rain reaches the lens
     supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
     """
 
@@ -101,6 +102,7 @@ class CameraSettings(SensorSettings):
     gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None
     longest_exposure: PositiveFloat = 0.03
     highest_gain: float = Field(default=36.0, ge=0.0, le=80.0)
+    lens_drops: bool = True
     supersampling: int = Field(default=1, ge=1, le=4)
 
     @model_validator(mode="after")

@@ -40,10 +40,10 @@ class Pinhole:
         """With a horizontal field of view [rad] and its axis in the middle."""
         return cls(width, height, width / 2 / math.tan(fov / 2), width / 2, height / 2, near, far)
 
-    def finer(self, times: int) -> Pinhole:
+    def finer(self, times: float) -> Pinhole:
         """The same view on `times` as many pixels along each axis."""
         lens = (self.focal * times, self.centre_x * times, self.centre_y * times)
-        return Pinhole(self.width * times, self.height * times, *lens, self.near, self.far)
+        return Pinhole(round(self.width * times), round(self.height * times), *lens, self.near, self.far)
 
     @property
     def intrinsics(self) -> Array:

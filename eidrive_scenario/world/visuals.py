@@ -19,7 +19,7 @@ from eidrive_scenario.world.meshes.buildings import building as building_mesh
 from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.render.lamps import Beam
-from eidrive_scenario.world.render.model import Array, Instance, Light, Model, merged, model, placed
+from eidrive_scenario.world.render.model import Array, Instance, Light, Model, gridded, merged, model, placed
 from eidrive_scenario.world.render.props import Props
 from eidrive_scenario.world.render.renderer import render
 from eidrive_scenario.world.scenery import Building, Scenery
@@ -33,7 +33,7 @@ _LIT_WINDOWS = 0.3
 """Share of a building's windows with a light behind them at night."""
 WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
 HEADLIGHT: Light = (6_500.0, 6_000.0, 4_900.0)
-TAILLIGHT: Light = (300.0, 9.0, 6.0)
+TAILLIGHT: Light = (300.0, 0.8, 0.5)
 """Luminance of what shines at night [cd/m²]."""
 
 
@@ -45,20 +45,22 @@ class Visuals:
         self._props = Props()
         self._shown_buildings = 0
         self._ground = self._ground_parts()
-        self._buildings: list[Instance] = []
+        self._buildings: Model | None = None
         self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
     def radiance(
         self, bodies: Mapping[int, Body], hidden: Iterable[str], pose: Array, pinhole: Pinhole, weather: Weather
     ) -> Radiance:
         """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine."""
-        for building in self._scenery.buildings[self._shown_buildings :]:
-            self._buildings.append(_building_instance(building))
-        self._shown_buildings = len(self._scenery.buildings)
+        if self._shown_buildings < len(self._scenery.buildings):
+            self._shown_buildings = len(self._scenery.buildings)
+            self._buildings = gridded(merged(_building_model(each) for each in self._scenery.buildings))
         dark = weather.lamps_on
         actors = {body.name: _actor_instance(row, body, self.glow_of(body, weather)) for row, body in bodies.items()}
         glowing = {"window_lit": WINDOW_LIGHT} if dark and weather.sun_elevation < 3.0 else {}
-        houses = [Instance(each.model, each.rotation, each.position, -1, glowing) for each in self._buildings]
+        houses = []
+        if self._buildings is not None:
+            houses = [Instance(self._buildings, np.eye(3), np.zeros(3), -1, glowing)]
         beams = [beam for body in bodies.values() for beam in self.beams_of(body, weather)]
         left_out = frozenset(hidden)
         props = self._props.instances()
@@ -117,7 +119,7 @@ class Visuals:
         z += _BESIDE_ROADS - _BELOW_ROADS
         kind = "grass" if self._scenery.roads is not None else "asphalt"
         land = model({kind: polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])}, {})
-        pieces = [land, *(merged(parts).parts() if parts else ())]
+        pieces = [land, gridded(merged(parts))] if parts else [land]
         return [Instance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
 
 
@@ -157,7 +159,7 @@ def _stance(body: Body) -> tuple[Array, Array]:
     return rotation, foot
 
 
-def _building_instance(building: Building) -> Instance:
+def _building_model(building: Building) -> Model:
     """A building; behind some of its windows, by its name, somebody has a light on."""
     own = building.colour or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))
@@ -170,4 +172,4 @@ def _building_instance(building: Building) -> Instance:
     colours = {"wall": own, "window_lit": MATERIALS["window"]}
     foot = np.array([*building.centre[:2], building.centre[2] - building.size[2] / 2])
     turn = rotation_matrix(building.yaw, 0.0, 0.0)
-    return Instance(placed(model(mesh, colours), turn, foot), np.eye(3), np.zeros(3))
+    return placed(model(mesh, colours), turn, foot)

@@ -24,6 +24,8 @@ TWILIGHT = ((0.0, 800.0), (-6.0, 3.4), (-12.0, 0.0083), (-18.0, 0.00065))
 NIGHT_GLOW = 0.02
 """Of a town's sky at night [lx]: 18 mag/arcsec², a bright suburb."""
 GROUND_ALBEDO = 0.12
+THICKENING = 50.0
+"""Clouds that give this much rain let half as much light through as others [mm/h]."""
 FOG_HEIGHT = 120.0
 """Of the layer of thick air that light from above passes [m]."""
 
@@ -64,6 +66,8 @@ def daylight(weather: Weather) -> Daylight:
         beam = 0.0
         clear_sky = _twilight(weather.sun_elevation)
     total = (beam * height + clear_sky) * (1.0 - 0.75 * cover**3.4)
+    if weather.precipitation != "none":
+        total /= 1.0 + weather.precipitation_intensity / THICKENING
     direct = beam * (1.0 - cover)
     clear = min(clear_sky * (1.0 - cover), total)
     clouds = max(total - direct * height - clear, 0.0) if height > 0.0 else max(total - clear, 0.0)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.render.model import Array, Floats
 
-REACH = 90.0
+REACH = 70.0
 """Where the light of a lamp is forgotten [m]."""
+_WIDTH, _HEIGHT = 1.2, 0.6
+"""Tangents of the angles to the axis beyond which it is forgotten."""
+_STRIDE = 5
+"""Of so many points one is looked at first, to find where the light goes."""
+_FINE = 200
+"""Steps of the table of intensities per unit of the tangent sideways; twice as many upwards."""
+_COLUMNS = round(2 * _WIDTH * _FINE) + 1
 LOW_BEAM = 24_000.0
 """Greatest luminous intensity of one lamp on low beam [cd]; in UN Regulation No. 112, class B, the brightest part lies
 0.57 to 1.3 degrees below the horizon, with at most 50,000 cd."""
@@ -35,24 +43,26 @@ class Beam(NamedTuple):
 
 
 def shine(
-    beam: Beam, eye: Array, x: Floats, y: Floats, z: Floats, normals: tuple[Floats, Floats, Floats]
+    beam: Beam, eye: Array, x: Floats, y: Floats, z: Floats, normals: tuple[Floats, Floats, Floats], margin: int
 ) -> tuple[NDArray[np.intp], Floats, Floats] | None:
     """Illuminance of points before a pair of lamps.
 
-    x, y, z   points relative to the camera at `eye` (3,) [m];  normals  of their surfaces
+    x, y, z   points relative to the camera at `eye` (3,) [m], line by line of a picture;  normals  of their surfaces
+    margin    points in a few of these lines: where the light ends is looked for only so closely
     Returns the rows of the points that get any, their illuminance, and that across the beam [lx].
     """
-    px, py, pz = (np.float32(value) for value in (beam.position - eye).tolist())
-    dx, dy, dz = x - px, y - py, z - pz
-    (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = beam.axes.astype(np.float32)
-    ahead = dx * fx + dy * fy + dz * fz
-    rows = np.flatnonzero((ahead > 0.3) & (ahead < REACH))
-    if not len(rows):
+    place = (beam.position - eye).astype(np.float32)
+    axes = beam.axes.astype(np.float32)
+    some = _within(place, axes, x[::_STRIDE], y[::_STRIDE], z[::_STRIDE])[0]
+    if not len(some):
         return None
-    dx, dy, dz, ahead = dx[rows], dy[rows], dz[rows], ahead[rows]
-    aside = (dx * lx + dy * ly + dz * lz) / ahead
-    above = (dx * ux + dy * uy + dz * uz) / ahead
-    intensity = _intensity(aside, above, beam.high) * np.float32(2.0 * beam.brightness)
+    first = max(int(some[0]) * _STRIDE - margin, 0)
+    part = slice(first, int(some[-1]) * _STRIDE + margin)
+    rows, dx, dy, dz, _, aside, above = _within(place, axes, x[part], y[part], z[part])
+    rows = rows + first
+    column = (aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE)).astype(np.int32)
+    line = (above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)).astype(np.int32)
+    intensity = _table(beam.high)[line * np.int32(_COLUMNS) + column] * np.float32(2.0 * beam.brightness)
     square = dx * dx + dy * dy + dz * dz
     across = intensity / square
     nx, ny, nz = normals
@@ -60,20 +70,42 @@ def shine(
     return rows, across * np.maximum(cosine, np.float32(0.0)), across
 
 
-def _intensity(aside: Floats, above: Floats, high: bool) -> Floats:
+def _within(
+    place: Floats, axes: Floats, x: Floats, y: Floats, z: Floats
+) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats, Floats, Floats]:
+    """The rows of the points that the lamps may reach, where these lie from the lamps in the world's axes, how far
+    ahead they lie, and the tangents of the angles to the axis, sideways and upwards."""
+    (fx, lx, ux), (fy, ly, uy), (fz, lz, uz) = axes
+    dx, dy, dz = x - place[0], y - place[1], z - place[2]
+    ahead = dx * fx + dy * fy + dz * fz
+    rows = np.flatnonzero((ahead > 0.3) & (ahead < REACH))
+    dx, dy, dz, ahead = dx[rows], dy[rows], dz[rows], ahead[rows]
+    aside = (dx * lx + dy * ly + dz * lz) / ahead
+    above = (dx * ux + dy * uy + dz * uz) / ahead
+    inside = np.flatnonzero((np.abs(aside) < _WIDTH) & (np.abs(above) < _HEIGHT))
+    dx, dy, dz, ahead = dx[inside], dy[inside], dz[inside], ahead[inside]
+    return rows[inside], dx, dy, dz, ahead, aside[inside], above[inside]
+
+
+@lru_cache(maxsize=2)
+def _table(high: bool) -> Floats:
+    """`intensity` on a grid of the tangents, line by line."""
+    aside = (np.arange(_COLUMNS) + 0.5) / _FINE - _WIDTH
+    above = (np.arange(round(4 * _HEIGHT * _FINE) + 1) + 0.5) / (2 * _FINE) - _HEIGHT
+    return intensity(aside[None], above[:, None], high).astype(np.float32).ravel()
+
+
+def intensity(aside: Array, above: Array, high: bool) -> Array:
     """Of one lamp [cd], by the tangents of the angles to its axis: a hot spot under the cut-off, and a wide carpet."""
-    below = np.float32(CUT_OFF) - above
-    spot = np.exp(-((aside / np.float32(0.20)) ** 2) - ((below - np.float32(0.012)) / np.float32(0.045)) ** 2)
-    carpet = np.exp(-((aside / np.float32(0.55)) ** 2) - (below / np.float32(0.16)) ** 2)
-    shape = np.float32(LOW_BEAM) * (np.float32(0.85) * spot + np.float32(0.15) * carpet)
-    edge = np.clip(below / np.float32(0.006) + np.float32(0.5), np.float32(0.0), np.float32(1.0))
-    stray = np.float32(ABOVE_CUT_OFF) * np.exp(-((aside / np.float32(0.5)) ** 2) - (above / np.float32(0.35)) ** 2)
-    found: Any = shape * edge + stray * (np.float32(1.0) - edge)
+    below = CUT_OFF - above
+    spot = np.exp(-((aside / 0.20) ** 2) - ((below - 0.012) / 0.045) ** 2)
+    carpet = np.exp(-((aside / 0.55) ** 2) - (below / 0.16) ** 2)
+    edge = np.clip(below / 0.006 + 0.5, 0.0, 1.0)
+    stray = ABOVE_CUT_OFF * np.exp(-((aside / 0.5) ** 2) - (above / 0.35) ** 2)
+    found: Array = LOW_BEAM * (0.85 * spot + 0.15 * carpet) * edge + stray * (1.0 - edge)
     if high:
-        found = found + np.float32(HIGH_BEAM) * np.exp(
-            -((aside / np.float32(0.12)) ** 2) - (above / np.float32(0.06)) ** 2
-        )
-    return np.asarray(found, dtype=np.float32)
+        found = found + HIGH_BEAM * np.exp(-((aside / 0.12) ** 2) - (above / 0.06) ** 2)
+    return found
 
 
 def colour() -> Floats:

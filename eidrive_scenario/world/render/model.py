@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ Light = tuple[float, float, float]
 
 _COARSE_SHARE = 0.97
 """Of a model's surface, the share that its coarse version keeps: the largest triangles."""
-_CELL = 40.0
+_CELL = 30.0
 """Scenery is cut into squares of this side, of which those out of sight cost nothing [m]."""
 
 
@@ -29,7 +30,8 @@ class Model:
     """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front.
 
     normals (K, 3) unit, plane (K,) = normal · corner, albedo (K, 3) linear, finish (K,) index of FINISHES,
-    material (K,) index of `materials`, coarse indices of the triangles that matter from afar
+    material (K,) index of `materials`, coarse indices of the triangles that matter from afar; centre (3,), half (3,)
+    extents and radius around it
     """
 
     triangles: Floats
@@ -41,22 +43,27 @@ class Model:
     materials: tuple[str, ...]
     coarse: Integers
     centre: Array
+    half: Array
     radius: float
 
-    def parts(self) -> Iterator[Model]:
-        """The model cut along a grid on the ground."""
-        cells = np.floor(self.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
-        _, cell = np.unique(cells, axis=0, return_inverse=True)
-        order = np.argsort(cell.ravel(), kind="stable")
-        for chosen in np.split(order, np.flatnonzero(np.diff(cell.ravel()[order])) + 1):
-            yield _model(
-                self.triangles[chosen],
-                self.normals[chosen],
-                self.albedo[chosen],
-                self.finish[chosen],
-                self.material[chosen],
-                self.materials,
-            )
+    cells: Cells | None = None
+
+
+class Cells(NamedTuple):
+    """The squares of a grid on the ground by which a large model is sorted: the first triangle of each, their numbers,
+    and the spheres (centre, radius) around them."""
+
+    first: Integers
+    counts: Integers
+    centre: Array
+    radius: Array
+
+    def rows(self, chosen: NDArray[np.bool_]) -> Integers:
+        """The triangles of the chosen cells."""
+        first, count = self.first[chosen], self.counts[chosen]
+        ends = np.cumsum(count)
+        found: Integers = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - (ends - count), count)
+        return found
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,28 @@ def merged(models: Iterable[Model]) -> Model:
     )
 
 
+def gridded(whole: Model) -> Model:
+    """The same model, cut along a grid, so that what is out of sight costs little."""
+    squares = np.floor(whole.triangles.mean(axis=1)[:, :2] / _CELL).astype(np.int64)
+    _, cell = np.unique(squares, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    order = np.argsort(cell, kind="stable")
+    count = np.bincount(cell)
+    first = np.cumsum(count) - count
+    corners = whole.triangles[order].astype(np.float64)
+    low = np.minimum.reduceat(corners.min(axis=1), first, axis=0)
+    high = np.maximum.reduceat(corners.max(axis=1), first, axis=0)
+    sorted_one = _model(
+        whole.triangles[order],
+        whole.normals[order],
+        whole.albedo[order],
+        whole.finish[order],
+        whole.material[order],
+        whole.materials,
+    )
+    return replace(sorted_one, cells=Cells(first, count, (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2))
+
+
 def placed(part: Model, rotation: Array, position: Array) -> Model:
     """The model in the frame in which it stands at this rotation and position."""
     turn = rotation.T
@@ -149,7 +178,8 @@ def _model(
     order = np.argsort(-area, kind="stable")
     kept = int(np.searchsorted(np.cumsum(area[order]), _COARSE_SHARE * area.sum())) + 1
     corners = triangles.reshape(-1, 3).astype(np.float64)
-    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre = (low + high) / 2
     return Model(
         triangles,
         normals,
@@ -160,5 +190,6 @@ def _model(
         materials,
         np.sort(order[:kept]),
         centre,
+        (high - low) / 2,
         float(np.sqrt(((corners - centre) ** 2).sum(axis=1).max())),
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eidrive_scenario.world.meshes.palette import Colour
-from eidrive_scenario.world.render.model import Array, Instance, Light, merged, model, placed
+from eidrive_scenario.world.render.model import Array, Instance, Light, gridded, merged, model, placed
 
 
 @dataclass
@@ -57,5 +57,5 @@ class Props:
                     by_label.setdefault(prop.instance.label, []).append(prop.instance)
             for label, group in by_label.items():
                 whole = merged(placed(each.model, each.rotation, each.position) for each in group)
-                self._still += [Instance(part, np.eye(3), np.zeros(3), label) for part in whole.parts()]
+                self._still.append(Instance(gridded(whole), np.eye(3), np.zeros(3), label))
         return [*self._still, *(prop.instance for prop in self._props if prop.lit)]

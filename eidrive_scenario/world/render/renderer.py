@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
+from eidrive_scenario.world.render.contact import Ground, dimmed
 from eidrive_scenario.world.render.daylight import daylight
 from eidrive_scenario.world.render.lamps import Beam
 from eidrive_scenario.world.render.materials import SOAKS
@@ -20,10 +22,10 @@ from eidrive_scenario.world.render.shading import Points, shade
 from eidrive_scenario.world.render.shadows import shadow_map
 from eidrive_scenario.world.render.sky import dome, horizon, sample
 from eidrive_scenario.world.render.staging import stage
-from eidrive_scenario.world.render.surfaces import patches
+from eidrive_scenario.world.render.surfaces import hollows
 from eidrive_scenario.world.weather import Weather
 
-DAYLIGHT = 3000.0
+DAYLIGHT = 1000.0
 """Light on the ground under which headlamps add nothing to see [lx]."""
 GLARE = 0.03
 """Share of light that a lens scatters around a bright spot."""
@@ -60,14 +62,18 @@ def render(
             rz[shown] * far,
             (rays[0][shown], rays[1][shown], rays[2][shown]),
             length[shown] * far,
+            pinhole.width,
         )
         shadows = shadow_map(casters, light.towards, pose, pinhole) if light.sun.any() else None
+        where = np.full(len(cover.triangle), -1, dtype=np.int32)
+        where[shown] = np.arange(len(shown), dtype=np.int32)
+        upright = staged.normal[:, 2][points.triangle] > 0.9
+        ground_points = Ground(points.x, points.y, points.z, upright, where.reshape(shape))
+        open_sky = dimmed([each for each in instances if each.label >= 0], ground_points, pose, pinhole)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
-        luminance = shade(points, staged, eye, light, weather, heaven, shadows, felt)
+        luminance = shade(points, staged, eye, light, weather, heaven, shadows, felt, open_sky)
         if weather.wetness > 0.0:
-            _wet(
-                luminance, picture, shown, points, staged.finish, cover.nearness, weather, pose, pinhole, ground, heaven
-            )
+            _wet(luminance, shown, points, staged.finish, cover.nearness, open_sky, weather, pose, pinhole, ground)
         through = np.exp(np.float32(-weather.extinction) * points.distance)[:, None]
         air = horizon(weather).astype(np.float32)
         picture[shown] = luminance * through + air * (np.float32(1.0) - through)
@@ -99,41 +105,45 @@ def _rays(pinhole: Pinhole, pose: Array) -> tuple[Floats, Floats, Floats, Floats
 
 def _wet(
     luminance: Floats,
-    sky: Floats,
     shown: NDArray[np.int64],
     points: Points,
     finish: NDArray[np.uint8],
     nearness: Floats,
+    open_sky: Floats,
     weather: Weather,
     pose: Array,
     pinhole: Pinhole,
     ground: float,
-    heaven: Floats,
 ) -> None:
-    """Add to luminance (n, 3) what a wet road mirrors."""
+    """Add to luminance (n, 3) what a wet road mirrors, from a picture of half as many lines and columns."""
     on_road = np.flatnonzero(SOAKS[finish[points.triangle]])
     if not len(on_road):
         return
-    rows = shown[on_road]
-    ray = [part[on_road] for part in points.ray]
-    whole = np.zeros((pinhole.height * pinhole.width, 3), dtype=np.float32)
-    rx, ry, rz, length = _rays(pinhole, pose)
     shape = (pinhole.height, pinhole.width)
-    reflected = sample(
-        heaven,
-        (rx / length).reshape(shape),
-        (ry / length).reshape(shape),
-        np.abs(rz / length).reshape(shape),
-    ).reshape(-1, 3)
-    whole[shown] = luminance
-    x, y, z = (np.zeros(len(whole), dtype=np.float32) for _ in range(3))
-    x[shown], y[shown], z[shown] = points.x, points.y, points.z
-    image = wet_road.mirrored(whole, reflected, nearness, x, y, z, ground - float(pose[2, 3]), pose, pinhole)
-    image = wet_road.blurred(image, pinhole.height, pinhole.width)
-    places = [points.x[on_road] + np.float32(pose[0, 3] % 4096.0), points.y[on_road] + np.float32(pose[1, 3] % 4096.0)]
-    smooth = wet_road.puddles(places[0], places[1], weather.wetness, patches())
-    share = wet_road.reflectance(np.abs(ray[2])) * smooth
-    luminance[on_road] += share[:, None] * (image[rows] - luminance[on_road])
+    whole = np.zeros((pinhole.height * pinhole.width, 6), dtype=np.float32)
+    whole[shown, :3] = luminance
+    whole[shown, 3], whole[shown, 4], whole[shown, 5] = points.x, points.y, points.z
+    small = np.ascontiguousarray(whole.reshape(*shape, 6)[::2, ::2])
+    lines, columns = small.shape[:2]
+    small = small.reshape(-1, 6)
+    rx, ry, rz, length = (part.reshape(shape)[::2, ::2] for part in _rays(pinhole, pose))
+    reflected = sample(dome(weather), rx / length, ry / length, np.abs(rz / length)).reshape(-1, 3)
+    image = wet_road.mirrored(
+        small[:, :3],
+        reflected,
+        nearness.reshape(shape)[::2, ::2].ravel(),
+        (small[:, 3], small[:, 4], small[:, 5]),
+        ground - float(pose[2, 3]),
+        pose,
+        replace(pinhole.finer(0.5), width=columns, height=lines),
+    )
+    image = wet_road.blurred(image, lines, columns)
+    image = np.asarray(cv2.resize(image.reshape(lines, columns, 3), shape[::-1], interpolation=cv2.INTER_LINEAR))
+    x, y = points.x[on_road] + np.float32(pose[0, 3] % 4096.0), points.y[on_road] + np.float32(pose[1, 3] % 4096.0)
+    share = wet_road.reflectance(np.abs(points.ray[2][on_road]))
+    share *= wet_road.puddles(x, y, weather.wetness, hollows())
+    seen = image.reshape(-1, 3)[shown[on_road]] * open_sky[on_road][:, None]
+    luminance[on_road] += share[:, None] * (seen - luminance[on_road])
 
 
 def _with_glare(picture: Floats) -> Floats:

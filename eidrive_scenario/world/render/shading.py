@@ -19,12 +19,15 @@ from eidrive_scenario.world.render.staging import Stage
 from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather
 
+_BESIDE_THE_CAMERA = 4.0
+"""Lamps as near as this send light along the camera's own rays, so that sheeting returns it there [m]."""
 _GLINT = 350.0
 """Exponent of the sun's image in a car's paint: a spot of some four degrees."""
 
 
 class Points(NamedTuple):
-    """What pixels (n,) show: their triangles, places relative to the camera [m] and directions (unit) from it."""
+    """What pixels (n,), line by line of a picture, show: their triangles, places relative to the camera [m], directions
+    (unit) and distance [m] from it; and the width of the picture."""
 
     triangle: NDArray[np.int32]
     x: Floats
@@ -32,6 +35,7 @@ class Points(NamedTuple):
     z: Floats
     ray: tuple[Floats, Floats, Floats]
     distance: Floats
+    width: int
 
 
 def shade(
@@ -43,12 +47,16 @@ def shade(
     sky: Floats,
     shadows: ShadowMap | None,
     beams: Sequence[lamps.Beam],
+    open_sky: Floats,
 ) -> Floats:
-    """(n, 3) luminance of the points as seen from near [cd/m²]: sun and sky, lamps, and what shines itself."""
+    """(n, 3) luminance of the points as seen from near [cd/m²]: sun and sky, lamps, and what shines itself.
+
+    open_sky (n,) is the share of the sky's light that bodies near by leave to them.
+    """
     triangle, normal = points.triangle, stage.normal
     finish = stage.finish[triangle]
     steady, sunny = _by_triangle(stage, light, weather)
-    luminance = steady[triangle]
+    luminance = steady[triangle] * open_sky[:, None]
     lit = None
     if sunny is not None:
         lit = shadows.lit(points.x, points.y, points.z) if shadows is not None else np.ones(len(triangle), np.float32)
@@ -94,18 +102,20 @@ def _add_beams(
     normals: tuple[Floats, Floats, Floats],
     finish: NDArray[np.uint8],
 ) -> None:
-    tint = lamps.colour()
+    received = np.zeros(len(points.triangle), dtype=np.float32)
+    returned = np.zeros(len(points.triangle), dtype=np.float32)
+    sheeting = RETURNS[finish]
     for beam in beams:
-        shone = lamps.shine(beam, eye, points.x, points.y, points.z, normals)
+        shone = lamps.shine(beam, eye, points.x, points.y, points.z, normals, 4 * points.width)
         if shone is None:
             continue
         rows, onto, across = shone
-        albedo = stage.albedo[points.triangle[rows]]
-        luminance[rows] += albedo * (onto * np.float32(1.0 / math.pi))[:, None] * tint
-        if float(np.linalg.norm(beam.position - eye)) < 4.0:
-            sheeting = np.flatnonzero(RETURNS[finish[rows]] > 0.0)
-            returned = RETURNS[finish[rows[sheeting]]] * across[sheeting]
-            luminance[rows[sheeting]] += albedo[sheeting] * returned[:, None] * tint
+        received[rows] += onto
+        if float(np.linalg.norm(beam.position - eye)) < _BESIDE_THE_CAMERA:
+            returned[rows] += across * sheeting[rows]
+    lit = np.flatnonzero(received + returned)
+    light = received[lit] * np.float32(1.0 / math.pi) + returned[lit]
+    luminance[lit] += stage.albedo[points.triangle[lit]] * (light[:, None] * lamps.colour())
 
 
 def _add_mirrors(

@@ -15,8 +15,8 @@ from eidrive_scenario.world.render.rasterise import rasterise
 
 REACH = 80.0
 """How far from the camera shadows are drawn [m]."""
-RESOLUTION = 512
-"""Pixels of the sun's picture along its longer side."""
+_COARSEST, _FINEST = 256, 640
+"""Pixels of the sun's picture along its longer side; between these, a little more than the camera's has across."""
 _SLACK = 0.04
 """A point must lie this far behind what the sun sees before it is in shadow [m]; more for large pixels."""
 _LOWEST = 0.035
@@ -73,7 +73,8 @@ def shadow_map(casters: Sequence[Instance], towards: Array, pose: Array, pinhole
     seen = _seen_ground(pose, pinhole)
     flat = seen @ axes.T
     low, high = flat.min(axis=0) - 0.5, flat.max(axis=0) + 0.5
-    scale = min(RESOLUTION / float((high - low).max()), 20.0)
+    pixels = min(max(1.2 * pinhole.width, _COARSEST), _FINEST)
+    scale = min(pixels / float((high - low).max()), 20.0)
     width, height = (max(math.ceil(extent * scale), 2) for extent in (high - low).tolist())
     found = [
         corners for caster in casters if (corners := _away(caster, towards, axes, pose[:3, 3], low, high)) is not None
@@ -126,8 +127,15 @@ def _away(caster: Instance, towards: Array, axes: Array, eye: Array, low: Array,
     flat = axes @ centre
     if (flat + model.radius < low).any() or (flat - model.radius > high).any():
         return None
-    away = model.normals[model.coarse] @ (caster.rotation.T @ towards).astype(np.float32) < 0.0
-    rows = model.coarse[away]
+    sun = (caster.rotation.T @ towards).astype(np.float32)
+    if model.cells is not None:
+        flat = (model.cells.centre @ caster.rotation.T + caster.position - eye) @ axes.T
+        radius = model.cells.radius[:, None]
+        within = (flat + radius >= low) & (flat - radius <= high)
+        rows = model.cells.rows(within[:, 0] & within[:, 1])
+    else:
+        rows = model.coarse
+    rows = rows[model.normals[rows] @ sun < 0.0]
     if not len(rows):
         return None
     corners: NDArray[np.float64] = model.triangles[rows] @ caster.rotation.T + (caster.position - eye)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import cv2
@@ -21,6 +22,8 @@ _CLEAR = (-1.0, -0.32, 10.0, -3.0, 0.45)
 _OVERCAST = (4.0, -0.7, 0.0, -1.0, 0.0)
 """Coefficients a to e of the CIE standard general sky (CIE S 011 / ISO 15469), types 12 and 1."""
 _CLOUD_HEIGHT = 1.0
+_NIGHT_CLOUDS = 0.3
+"""How much of clouds can be made out at night, when a town lights sky and clouds alike."""
 
 
 def sample(dome: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
@@ -55,9 +58,15 @@ def dome(weather: Weather) -> Floats:
     tint /= (tint @ LUMA)[..., None]
     colour_clouds = light.clouds / max(float(light.clouds @ LUMA), 1e-12)
     share, relief = _clouds(weather.cloud_cover)
+    if weather.sun_elevation < -6.0:
+        share = share * _NIGHT_CLOUDS
     whole = clear[..., None] * tint * (1.0 / max(1.0 - weather.cloud_cover, 0.15))
-    above = covered[..., None] * colour_clouds * relief[..., None] / max(weather.cloud_cover, 0.35)
-    mixed = whole + (above - whole) * share[..., None]
+    above = covered[..., None] / max(weather.cloud_cover, 0.35)
+    lit_from_above = (
+        0.45 * float(light.sun @ LUMA) * max(float(light.towards[2]), 0.3) + float(light.sky @ LUMA)
+    ) / math.pi
+    above = above + (1.0 - weather.cloud_cover) * np.maximum(lit_from_above - above, 0.0)
+    mixed = whole + (above * colour_clouds * relief[..., None] - whole) * share[..., None]
     # Thick air before the sky: as far as the layer reaches in that direction.
     fog = max(weather.extinction - EXTINCTION_AT_RANGE / 20_000.0, 0.0)
     through = np.exp(-fog * FOG_HEIGHT / np.maximum(z, 0.004))[..., None]
@@ -121,16 +130,17 @@ def _clouds(cover: float) -> tuple[Array, Array]:
     """Where clouds hide the sky, in [0, 1], and how bright they are against their mean."""
     if cover <= 0.0:
         return np.zeros((SIZE, SIZE)), np.ones((SIZE, SIZE))
-    _, _, z = _directions()
-    x, y, _ = _directions()
-    away = _CLOUD_HEIGHT / (z + 0.12)
+    x, y, z = _directions()
+    away = _CLOUD_HEIGHT / (z + 0.10)
     noise = _noise(x * away, y * away)
     shape = np.hypot(x, y) < 1.0
     edge = float(np.quantile(noise[shape], 1.0 - cover)) if cover < 1.0 else float(noise.min()) - 1.0
     spread = float(noise.std())
     share = np.clip((noise - edge) / (0.9 * spread) + 0.5, 0.0, 1.0)
     share = share * share * (3.0 - 2.0 * share)
-    relief = np.clip(1.0 + 0.16 * (_noise(x * away + 3.1, y * away - 1.7) / spread), 0.6, 1.4)
+    near = np.clip(z / 0.16, 0.0, 1.0)
+    share = cover + (share - cover) * near * near * (3.0 - 2.0 * near)
+    relief = np.clip(1.0 + (0.10 + 0.14 * cover) * _noise(x * away + 3.1, y * away - 1.7) / spread, 0.45, 1.6)
     return share, relief
 
 
@@ -138,7 +148,7 @@ def _noise(u: Array, v: Array) -> Array:
     """Smooth noise of zero mean: octaves of a table drawn once, repeated without seam."""
     total = np.zeros_like(u)
     for octave in range(5):
-        scale = 12.0 * 2.0**octave
+        scale = 3.2 * 2.1**octave
         fine = np.asarray(
             cv2.remap(
                 _table(),

@@ -43,7 +43,7 @@ def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage
     sides = _sides(pinhole)
     chosen = []
     for instance, pixels in _in_sight(instances, pose, pinhole, sides):
-        found = _facing(instance, pose, pixels)
+        found = _facing(instance, pose, pinhole, sides, pixels)
         if found is not None:
             chosen.append(found)
     if not chosen:
@@ -52,11 +52,7 @@ def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage
     normal, albedo, finish, label, glow = (
         np.concatenate([part[column] for part in chosen]) for column in range(1, len(_Chosen._fields))
     )
-    beyond = corners @ sides.T < 0.0
-    inside = np.flatnonzero(~(beyond[:, 0] & beyond[:, 1] & beyond[:, 2]).any(axis=1))
-    corners = corners[inside]
-    corners, whose = _cut(corners, pinhole.near)
-    inside = inside[whose]
+    corners, inside = _cut(corners, pinhole.near)
     nearness = 1.0 / corners[..., 2]
     x = pinhole.focal * corners[..., 0] * nearness + pinhole.centre_x
     y = pinhole.focal * corners[..., 1] * nearness + pinhole.centre_y
@@ -96,17 +92,22 @@ def _in_sight(
     return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
 
 
-def _facing(instance: Instance, pose: Array, pixels: float) -> _Chosen | None:
+def _facing(instance: Instance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
     """The triangles of one instance that face the camera, corners in its frame; None where there are none."""
     model = instance.model
     to_camera = pose[:3, :3].T @ instance.rotation
     shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
-    eye = -(to_camera.T @ shift)
-    facing = model.normals @ eye.astype(np.float32) > model.plane
-    if instance.label >= 0 and pixels < _COARSE_PIXELS:
-        rows = model.coarse[facing[model.coarse]]
+    eye = -(to_camera.T @ shift).astype(np.float32)
+    if model.cells is not None:
+        centres = model.cells.centre @ to_camera.T + shift
+        near = (centres @ sides.T >= -model.cells.radius[:, None]).all(axis=1)
+        near &= centres[:, 2] - model.cells.radius <= pinhole.far
+        rows = model.cells.rows(near)
+        rows = rows[model.normals[rows] @ eye > model.plane[rows]]
+    elif instance.label >= 0 and pixels < _COARSE_PIXELS:
+        rows = model.coarse[model.normals[model.coarse] @ eye > model.plane[model.coarse]]
     else:
-        rows = np.flatnonzero(facing)
+        rows = np.flatnonzero(model.normals @ eye > model.plane)
     if not len(rows):
         return None
     corners = model.triangles[rows] @ to_camera.T.astype(np.float32) + shift.astype(np.float32)

@@ -37,6 +37,18 @@ def grit() -> Floats:
     return found
 
 
+@lru_cache(maxsize=1)
+def hollows() -> Floats:
+    """(SIZE, SIZE) smooth noise of mean 0 and deviation 1, of greater extent than `patches`."""
+    draws = generator(0, "hollows").standard_normal((SIZE, SIZE), dtype=np.float32)
+    total = np.zeros((SIZE, SIZE), dtype=np.float32)
+    for width, weight in ((8.0, 0.35), (22.0, 1.0)):
+        layer = np.asarray(cv2.GaussianBlur(np.tile(draws, (3, 3)), (0, 0), width))[SIZE : 2 * SIZE, SIZE : 2 * SIZE]
+        total += weight * layer / layer.std()
+    found: Floats = (total / total.std()).astype(np.float32)
+    return found
+
+
 def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
     """How much lighter or darker a surface is at places in the world [m], about ±1: fine grit near the camera, patches
     everywhere."""

@@ -16,6 +16,8 @@ HEADROOM = 4.0
 BRIGHTNESS = 0.65
 """Share of the published key, which lets white road markings keep below white."""
 DARKEST = 0.03
+BLACK = 0.02
+"""What is darker does not ask for a longer exposure [cd/m²]."""
 _STEPS = 8192
 
 
@@ -25,7 +27,7 @@ def white_level(luminance: Floats) -> float:
     The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
     1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
-    mean = math.exp(float(np.log(np.maximum(luminance[::2, ::2] @ LUMA, np.float32(1e-4))).mean()))
+    mean = math.exp(float(np.log(np.maximum(luminance[::2, ::2] @ LUMA, np.float32(BLACK))).mean()))
     key = max(BRIGHTNESS * (1.03 - 2.0 / (2.0 + math.log10(mean + 1.0))), DARKEST)
     return HEADROOM * mean / key
 

@@ -21,18 +21,17 @@ def mirrored(
     light: Floats,
     sky: Floats,
     nearness: Floats,
-    x: Floats,
-    y: Floats,
-    z: Floats,
+    places: tuple[Floats, Floats, Floats],
     ground: float,
     pose: Array,
     pinhole: Pinhole,
 ) -> Floats:
     """(H · W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
 
-    light (H · W, 3), nearness and places x, y, z relative to the camera of what the picture shows; `sky` is what the
+    light (H · W, 3), nearness and places (x, y, z relative to the camera) of what the picture shows; `sky` is what the
     mirror shows where it has nothing else. Only what the picture shows is mirrored.
     """
+    x, y, z = places
     standing = np.flatnonzero((z > ground + _HEIGHT) & (nearness > 0.0))
     image = sky.copy()
     if not len(standing):
@@ -75,8 +74,8 @@ def reflectance(cosine: Floats) -> Floats:
 
 def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) -> Floats:
     """How smooth the water lies at places in the world [m], in [0, 1]: a film on a moist road, puddles on a wet one."""
-    size = table.shape[0]
-    noise = table[np.mod(y * 2.0, size).astype(np.intp), np.mod(x * 2.0, size).astype(np.intp)]
+    mask = table.shape[0] - 1
+    noise = table[(y * 12.0).astype(np.int64) & mask, (x * 12.0).astype(np.int64) & mask]
     film = np.float32(0.25 * min(2.0 * wetness, 1.0))
     pool = np.clip((noise + np.float32(2.6 * wetness - 1.6)) * np.float32(1.5), np.float32(0.0), np.float32(1.0))
     found: Floats = film + (np.float32(1.0) - film) * pool
