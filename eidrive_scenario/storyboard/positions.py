@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from eidrive_scenario.errors import Problem, ScenarioError
@@ -15,6 +16,9 @@ from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.trajectory import lay_out
+
+CARLA = "CARLA:"
+"""How the description of a scenario in CARLA's axes begins."""
 
 
 def resolve(position: model.Position, stage: Stage, actor: str | None = None) -> Place:
@@ -32,27 +36,44 @@ def references(position: model.Position) -> tuple[str, ...]:
     return tuple(name for below in position.walk() if (name := getattr(below, "entity_ref", None)) is not None)
 
 
+def left_handed(stage: Stage) -> bool:
+    """True for a scenario whose world has CARLA's axes: y to the right, headings clockwise, pitch nose up.
+
+    ScenarioRunner reads a description that begins with `CARLA:` so. Roads and lanes have the standard's axes all the
+    same.
+    """
+    return str(stage.scenario.document.file_header.description).startswith(CARLA)
+
+
 def _world(frame: model.WorldPosition, stage: Stage, actor: str | None) -> Place:
-    h, p, r = frame.h or 0.0, frame.p or 0.0, frame.r or 0.0
-    return _on_ground(stage, Pose(frame.x, frame.y, frame.z or 0.0, h, p, r), z_given=frame.z is not None)
+    side = -1.0 if left_handed(stage) else 1.0
+    h, p, r = side * (frame.h or 0.0), side * (frame.p or 0.0), frame.r or 0.0
+    return _on_ground(stage, Pose(frame.x, side * frame.y, frame.z or 0.0, h, p, r), z_given=frame.z is not None)
 
 
 def _relative_world(frame: model.RelativeWorldPosition, stage: Stage, actor: str | None) -> Place:
-    origin = stage.pose(frame.entity_ref)
-    x, y, z = origin.x + frame.dx, origin.y + frame.dy, origin.z + (frame.dz or 0.0)
-    h, p, r = _angles(frame.orientation, origin)
+    origin, side = stage.pose(frame.entity_ref), -1.0 if left_handed(stage) else 1.0
+    x, y, z = origin.x + frame.dx, origin.y + side * frame.dy, origin.z + (frame.dz or 0.0)
+    h, p, r = _angles(_turned(frame.orientation, side), origin)
     return _on_ground(stage, Pose(x, y, z, h, p, r), z_given=bool(frame.dz), near=frame.entity_ref)
 
 
 def _relative_object(frame: model.RelativeObjectPosition, stage: Stage, actor: str | None) -> Place:
-    origin = stage.pose(frame.entity_ref)
-    cos, sin = math.cos(origin.h), math.sin(origin.h)
-    x = origin.x + frame.dx * cos - frame.dy * sin
-    y = origin.y + frame.dx * sin + frame.dy * cos
-    h, p, r = _angles(frame.orientation, origin)
+    origin, side = stage.pose(frame.entity_ref), -1.0 if left_handed(stage) else 1.0
+    cos, sin, dy = math.cos(origin.h), math.sin(origin.h), side * frame.dy
+    x = origin.x + frame.dx * cos - dy * sin
+    y = origin.y + frame.dx * sin + dy * cos
+    h, p, r = _angles(_turned(frame.orientation, side), origin)
     return _on_ground(
         stage, Pose(x, y, origin.z + (frame.dz or 0.0), h, p, r), z_given=bool(frame.dz), near=frame.entity_ref
     )
+
+
+def _turned(orientation: model.Orientation | None, side: float) -> model.Orientation | None:
+    """An orientation in the standard's axes, whose headings and pitches count to the other side in CARLA's."""
+    if orientation is None or side > 0.0:
+        return orientation
+    return replace(orientation, h=side * (orientation.h or 0.0), p=side * (orientation.p or 0.0))
 
 
 def _road(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
