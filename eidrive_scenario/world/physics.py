@@ -112,7 +112,7 @@ class Physics:
             handle = second if first == body.handle else first
             if handle not in owners:
                 speed = relative_speed(before[body.handle], (0.0, 0.0, 0.0))
-                touches.setdefault((body.name, self._scenery.name_of(handle)), Touch(position, speed))
+                touches.setdefault((body.name, self._scenery.name_of(handle, position)), Touch(position, speed))
                 continue
             row, other = owners[handle]
             pair = (body.name, other.name) if owners[body.handle][0] < row else (other.name, body.name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,13 +12,13 @@ from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_o
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
 from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.furniture import Fixture, fixtures
 from eidrive_scenario.world.ground import is_level
+from eidrive_scenario.world.obstacles import MOST_FACES, Obstacles
 
 GROUND = "ground"
 STOREY = 3.2
 """Height of a building whose height the map does not say [m]."""
-_MOST_FACES = 20_000
-"""In one collision shape; pybullet refuses much more."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,10 @@ class Building:
 
 
 class Scenery:
-    """The bodies in pybullet of ground and buildings, those of the road network's objects included."""
+    """The bodies in pybullet of ground, buildings and what else stands at the roads.
+
+    What stands at the roads gets its bodies when somebody may run into it, or looks at it by rays.
+    """
 
     def __init__(self, client: int, roads: RoadNetwork | None) -> None:
         self.roads = roads
@@ -41,6 +45,8 @@ class Scenery:
         self._names: dict[int, str] = {}
         self.level = is_level(roads)
         self._raised = False
+        self._obstacles: Obstacles | None = None
+        self._obstacle_handles: frozenset[int] = frozenset()
         if roads is not None:
             for placed in placed_objects(roads):
                 if placed.object.type == "building":
@@ -72,8 +78,8 @@ class Scenery:
         for mesh in surface_meshes(self.roads, 4.0):
             if mesh.kind.startswith("marking"):
                 continue
-            for start in range(0, len(mesh.faces), _MOST_FACES):
-                used, faces = np.unique(mesh.faces[start : start + _MOST_FACES], return_inverse=True)
+            for start in range(0, len(mesh.faces), MOST_FACES):
+                used, faces = np.unique(mesh.faces[start : start + MOST_FACES], return_inverse=True)
                 shape = bullet.createCollisionShape(
                     bullet.GEOM_MESH,
                     vertices=mesh.vertices[used].tolist(),
@@ -84,17 +90,35 @@ class Scenery:
                 self._add_static(shape, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
         return True
 
-    def name_of(self, handle: int) -> str:
-        """The name of the building with this body in pybullet."""
+    @cached_property
+    def furniture(self) -> tuple[Fixture, ...]:
+        """What stands at the roads, buildings aside."""
+        return tuple(fixtures(self.roads)) if self.roads is not None else ()
+
+    def raise_obstacles(self) -> bool:
+        """Give what stands at the roads its bodies, where it has none yet; True if they were made now."""
+        if self._obstacles is not None:
+            return False
+        self._obstacles = Obstacles(self.furniture)
+        handles = self._obstacles.raise_bodies(self._client)
+        self._obstacle_handles = frozenset(handles)
+        return bool(handles)
+
+    def name_of(self, handle: int, position: Vector3) -> str:
+        """The name of what has this body in pybullet, touched at a point."""
+        if handle in self._obstacle_handles and self._obstacles is not None:
+            return self._obstacles.name_at(position[0], position[1])
         return self._names[handle]
 
     @property
     def highest_handle(self) -> int:
         """The greatest number that pybullet gave to any of these bodies; -1 without any."""
-        return max(self._names, default=-1)
+        return max([*self._names, *self._obstacle_handles], default=-1)
 
     def near(self, x: float, y: float, reach: float) -> bool:
-        """Whether any building may be within reach of a point [m]."""
+        """Whether anything that stands may be within reach of a point [m]."""
+        if self._obstacles is not None and self._obstacles.near(x, y, reach):
+            return True
         for building in self.buildings:
             bound = reach + math.hypot(building.size[0], building.size[1]) / 2
             if math.hypot(building.centre[0] - x, building.centre[1] - y) <= bound:

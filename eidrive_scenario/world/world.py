@@ -257,6 +257,7 @@ class World:
 
     def _enter(self, spec: ActorSpec, placement: Placement, driven: bool) -> None:
         if driven:
+            self._scenery.raise_obstacles()
             ground = GroundUnder(None if self._scenery.level else self._roads, placement.z)
             body = DrivenBody(self._client, spec, placement, self.dt, self._physics.step, ground)
             self._driven[spec.name] = body
@@ -293,7 +294,8 @@ class World:
 
     def _refresh(self) -> None:
         """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
-        if self._scenery.raise_ground():
+        raised = self._scenery.raise_ground()
+        if self._scenery.raise_obstacles() or raised:
             self._changed()
         if not self._broadphase_fresh:
             self._settle()

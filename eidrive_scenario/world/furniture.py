@@ -1,0 +1,185 @@
+"""What stands at the roads: poles, trees, barriers and the posts of signals, as the road network's objects say.
+
+Buildings are the scenery's own. What is painted on the road, or has no height, is no piece of furniture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.roads import PlacedObject, RoadNetwork, Signal, outlines, placed_objects
+from eidrive_scenario.roads.location import Pose
+
+SIZES: Mapping[str, tuple[float, float, float]] = {
+    "tree": (4.0, 4.0, 7.0),
+    "vegetation": (1.5, 1.5, 1.2),
+    "pole": (0.12, 0.12, 4.0),
+    "lamp": (0.16, 0.16, 8.0),
+    "guide post": (0.12, 0.12, 1.0),
+    "barrier": (2.0, 0.3, 0.9),
+    "railing": (2.0, 0.3, 0.3),
+    "obstacle": (0.5, 0.5, 0.8),
+    "gantry": (0.5, 8.0, 6.0),
+    "island": (2.0, 1.0, 0.15),
+}
+"""Usual length, width and height by kind, where the map leaves them open [m]."""
+
+_KINDS: Mapping[str, str] = {
+    "tree": "tree",
+    "vegetation": "vegetation",
+    "pole": "pole",
+    "rail-pole": "guide post",
+    "guide-post": "guide post",
+    "streetLamp": "lamp",
+    "lamppost": "lamp",
+    "barrier": "barrier",
+    "soundBarrier": "barrier",
+    "wall": "barrier",
+    "fence": "railing",
+    "railing": "railing",
+    "obstacle": "obstacle",
+    "gantry": "gantry",
+    "trafficIsland": "island",
+}
+"""OpenDRIVE's types of objects that are furniture."""
+_WITHOUT_TYPE = ("none", "-1", "")
+LEAST = 0.1
+"""Flatter things are paint [m]."""
+STEP = 0.2
+"""Vehicles roll over what is lower [m]."""
+TRUNK = 0.05
+"""Radius of a trunk as a share of the tree's height."""
+POST = 0.05
+"""Radius of the post of a signal [m]."""
+CLEARANCE = 2.1
+"""Usual height of the lower edge of a signal, where the map has it on the ground [m]."""
+
+
+class Fixture(NamedTuple):
+    """One piece: kind (a key of SIZES, or `post` for a signal's), pose of its foot, length, width and height [m].
+
+    radius   of a round one; 0 for a box
+    blocks   sight, and where `solid` also vehicles
+    """
+
+    name: str
+    kind: str
+    pose: Pose
+    length: float
+    width: float
+    height: float
+    radius: float = 0.0
+    solid: bool = True
+
+
+class SignalHead(NamedTuple):
+    """The part of a signal that one looks at: pose of the middle of its lower edge, facing the traffic.
+
+    carried   whether a post below carries it
+    """
+
+    signal: Signal
+    pose: Pose
+    width: float
+    height: float
+    carried: bool
+
+
+def fixtures(roads: RoadNetwork) -> Iterator[Fixture]:
+    """All furniture of a road network, posts of signals included."""
+    for placed in placed_objects(roads):
+        found = _fixture(roads, placed)
+        if found is not None:
+            yield found
+    for head in signal_heads(roads):
+        if head.carried:
+            foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t).z
+            behind = -POST - 0.02
+            x, y = head.pose.x + behind * math.cos(head.pose.h), head.pose.y + behind * math.sin(head.pose.h)
+            top = head.pose.z + head.height - foot
+            name = f"signal {head.signal.id}"
+            yield Fixture(name, "post", Pose(x, y, foot, head.pose.h, 0.0, 0.0), 0.0, 0.0, top, POST)
+
+
+def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
+    """Signals that stand or hang, in the order of the map; one that is painted on the road has no head."""
+    standing = [signal for signal in roads.signals.values() if not _painted(signal)]
+    if not standing:
+        return []
+    poses = [roads.signal_pose(signal) for signal in standing]
+    below = roads.locate([pose.x for pose in poses], [pose.y for pose in poses], [pose.z for pose in poses])
+    heads = []
+    for row, (signal, pose) in enumerate(zip(standing, poses, strict=True)):
+        here = below.location(row)
+        over_traffic = here is not None and below.outside[row] <= 0.0 and _drivable(roads, here)
+        heads.append(_head(signal, pose, carried=not over_traffic))
+    return heads
+
+
+def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
+    """With its usual size where the map has none, or has the whole assembly of post and head."""
+    lamps = signal.dynamic
+    width, height = (0.34, 0.94) if lamps else (0.61, 0.61)
+    if 0.1 <= signal.width <= 1.2:
+        width = signal.width
+    low, top = pose.z, pose.z + signal.height
+    if signal.z_offset >= 1.0:
+        height = signal.height if 0.25 <= signal.height <= 1.5 else height
+    elif signal.height >= 2.0:
+        low = top - height
+    else:
+        low = pose.z - signal.z_offset + CLEARANCE
+        height = signal.height if 0.3 <= signal.height <= 1.3 else height
+    return SignalHead(signal, pose._replace(z=low), width, height, carried)
+
+
+def _painted(signal: Signal) -> bool:
+    return not signal.dynamic and signal.height < 0.3 and signal.z_offset < 1.0
+
+
+def _drivable(roads: RoadNetwork, here: tuple[str, int, float, float, float]) -> bool:
+    road, lane, s = here[:3]
+    found = roads.roads[road].section_at(s).lanes.get(lane)
+    return found is not None and found.drivable
+
+
+def _fixture(roads: RoadNetwork, placed: PlacedObject) -> Fixture | None:
+    entry = placed.object
+    kind = _KINDS.get(entry.type)
+    if kind is None and entry.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
+        kind = "obstacle"
+    if kind is None:
+        return None
+    pose, length, width = placed.pose, placed.length, placed.width
+    height = max([placed.height, *(corner.height for outline in entry.outlines for corner in outline)])
+    if entry.outlines and not entry.repeats:
+        pose, length, width = _around(roads, placed)
+    usual = SIZES[kind]
+    length, width, height = length or usual[0], width or usual[1], height or usual[2]
+    if height < LEAST:
+        return None
+    name = entry.name or f"{kind} {entry.id}"
+    if kind == "tree":
+        return Fixture(name, kind, pose, length, width, height, TRUNK * height)
+    if kind == "vegetation":
+        return Fixture(name, kind, pose, length, width, height, solid=False)
+    if kind in ("pole", "lamp", "guide post") or entry.radius:
+        return Fixture(name, kind, pose, length, width, height, max(length, width) / 2)
+    return Fixture(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+
+
+def _around(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:
+    """The box around an object's outlines: pose of the middle of its foot, length and width [m]."""
+    pose = placed.pose
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    offset = np.concatenate(outlines(roads, placed.object))[:, :2] - (pose.x, pose.y)
+    corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    ahead, aside = ((low + high) / 2).tolist()
+    length, width = (high - low).tolist()
+    middle = pose._replace(x=pose.x + cos * ahead - sin * aside, y=pose.y + sin * ahead + cos * aside)
+    return middle, length, width

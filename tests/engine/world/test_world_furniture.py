@@ -1,0 +1,172 @@
+"""What stands at the roads: which objects of a map become what, what they stop, and what they hide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.furniture import Fixture, fixtures, signal_heads
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+  <road name="" length="200" id="1" junction="-1"><link/>
+    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
+    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+    <lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
+    <objects>{objects}</objects><signals>{signals}</signals></road></OpenDRIVE>"""
+
+
+def network(*objects: str, signals: str = "") -> RoadNetwork:
+    """A street along x whose only lane has its centre at y = -2; objects are given by their attributes."""
+    listed = "".join(f'<object id="{number}" hdg="0" {one}</object>' for number, one in enumerate(objects))
+    return RoadNetwork.parse(ROAD.format(objects=listed, signals=signals))
+
+
+def only(*objects: str) -> Fixture:
+    (found,) = fixtures(network(*objects))
+    return found
+
+
+def signal(rest: str, kind: str = "206", dynamic: str = "no") -> str:
+    return f'<signal id="7" name="" type="{kind}" subtype="-1" dynamic="{dynamic}" orientation="+" {rest}/>'
+
+
+# Which objects become what
+
+
+def test_sizes_are_the_map_s_or_usual_ones() -> None:
+    tree = only('type="tree" name="oak" s="50" t="-8" zOffset="0" length="5" width="5" height="8">')
+    assert (tree.name, tree.kind, tree.solid) == ("oak", "tree", True)
+    assert (tree.pose.x, tree.pose.y, tree.height, tree.radius) == (50.0, -8.0, 8.0, pytest.approx(0.4))
+    pole = only('type="pole" s="50" t="-8" zOffset="0">')
+    assert (pole.name, pole.height, pole.radius) == ("pole 0", 4.0, 0.06)
+    round_one = only('type="obstacle" s="50" t="-8" zOffset="0" radius="0.4" height="1">')
+    assert (round_one.radius, round_one.height) == (0.4, 1.0)
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        'type="crosswalk" s="50" t="-2" zOffset="0" length="4" width="3" height="0">',
+        'type="roadMark" s="50" t="-2" zOffset="0" length="4" width="3" height="0.01">',
+        'type="parkingSpace" s="50" t="-6" zOffset="0" length="5" width="2.5" height="4">',
+        'type="building" s="50" t="-20" zOffset="0" length="5" width="5" height="9">',
+        'type="-1" name="Speed_30" s="50" t="-5" zOffset="0" length="0" width="0" height="0">',
+        'type="barrier" s="50" t="-5" zOffset="0" length="5" width="0.3" height="0.05">',
+    ],
+)
+def test_paint_buildings_and_things_without_a_body_are_no_furniture(attributes: str) -> None:
+    assert list(fixtures(network(attributes))) == []
+
+
+def test_a_nameless_type_with_a_body_is_an_obstacle() -> None:
+    assert only('type="none" s="50" t="-8" zOffset="0" length="2" width="1" height="1">').kind == "obstacle"
+
+
+def test_an_outline_gives_place_and_size() -> None:
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2)))
+    piece = only(f'type="obstacle" s="50" t="-10" zOffset="0"><outline>{corners}</outline>')
+    assert (piece.pose.x, piece.pose.y, piece.length, piece.width, piece.height) == (53.0, -9.0, 6.0, 2.0, 1.2)
+
+
+# Signals
+
+
+def test_a_sign_beside_the_road_has_a_post() -> None:
+    roads = network(signals=signal('s="50" t="-6" zOffset="2.2" height="0.75" width="0.75"'))
+    (post,) = fixtures(roads)
+    assert (post.kind, post.name, post.height) == ("post", "signal 7", pytest.approx(2.95))
+    (head,) = signal_heads(roads)
+    assert (head.pose.z, head.width, head.height, head.carried) == (2.2, 0.75, 0.75, True)
+    assert abs(head.pose.h) == pytest.approx(3.14159, abs=1e-4)
+    assert post.pose.x > head.pose.x
+
+
+def test_a_light_over_the_lane_hangs_and_paint_has_no_head() -> None:
+    light = signal('s="50" t="-2" zOffset="5" height="0.9" width="0.3"', "1000001", "yes")
+    roads = network(signals=light)
+    assert [head.carried for head in signal_heads(roads)] == [False]
+    assert list(fixtures(roads)) == []
+    line = signal('s="50" t="-2" zOffset="0" height="0.01" width="3.5"', "294")
+    assert signal_heads(network(signals=line)) == []
+
+
+def test_a_signal_whose_whole_assembly_is_given_has_its_head_on_top() -> None:
+    whole = signal('s="50" t="-6" zOffset="0" height="3.2" width="0.45"', "1000001", "yes")
+    (head,) = signal_heads(network(signals=whole))
+    assert head.pose.z + head.height == pytest.approx(3.2)
+    ground = signal('s="50" t="-6" zOffset="-0.4" height="0.8" width="0.8"')
+    (head,) = signal_heads(network(signals=ground))
+    assert head.pose.z == pytest.approx(2.1)
+
+
+# What they stop and hide
+
+
+def driven_into(roads: RoadNetwork, seconds: float = 4.0) -> tuple[Any, list[Any]]:
+    """A car that starts at x = 20 with 10 m/s along the lane, its foot off both pedals; the last view, all contacts."""
+    spec = ActorSpec("Ego", "car", "car", (4.4, 1.8, 1.5), (1.3, 0.0, 0.75), wheelbase=2.7, max_steering=0.5)
+    contacts: list[Any] = []
+    with World(roads, dt=0.05) as world:
+        world.add(spec, Placement(20.0, -2.0, speed=10.0), driven=True)
+        for _ in range(round(seconds / 0.05)):
+            world.step({}, {"Ego": Control()})
+            contacts += world.view().contacts
+        return world.view(), contacts
+
+
+def test_a_pole_in_the_way_stops_a_car_and_is_named() -> None:
+    view, contacts = driven_into(network('type="pole" name="bollard" s="40" t="-2" zOffset="0" height="1">'))
+    assert view.position[0, 0] + 1.3 + 2.2 < 40.3
+    assert abs(view.speed[0]) < 2.0
+    assert [(contact.first, contact.second) for contact in contacts] == [("Ego", "bollard")]
+    assert contacts[0].impact_speed == pytest.approx(9.7, abs=0.4)
+
+
+def test_a_long_barrier_of_many_parts_stops_a_car() -> None:
+    repeat = '<repeat s="0" length="200" distance="0" tStart="-4.2" tEnd="0" widthStart="0.3" widthEnd="0.3"'
+    rail = f'type="barrier" name="rail" s="0" t="-4.2" zOffset="0" height="0.9">{repeat} heightStart="0.9"'
+    roads = network(f'{rail} heightEnd="0.9" zOffsetStart="0" zOffsetEnd="0"/>')
+    _, contacts = driven_into(roads, 10.0)
+    assert {contact.second for contact in contacts} == {"rail"}
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        'type="vegetation" s="40" t="-2" zOffset="0" length="2" width="2" height="1.5">',
+        'type="trafficIsland" s="40" t="-2" zOffset="0" length="2" width="2" height="0.12">',
+        'type="gantry" s="40" t="-2" zOffset="0" length="0.5" width="9" height="6">',
+        'type="tree" s="40" t="-6" zOffset="0" length="9" width="9" height="8">',
+    ],
+    ids=["bush", "kerb", "gantry", "crown of a tree beside the road"],
+)
+def test_what_a_car_passes(attributes: str) -> None:
+    view, contacts = driven_into(network(attributes))
+    assert view.position[0, 0] > 50.0
+    assert contacts == []
+
+
+def test_foliage_and_trunks_hide_and_crowns_let_see_below_them() -> None:
+    objects = (
+        'type="vegetation" s="50" t="-8" zOffset="0" length="2" width="2" height="1.5">',
+        'type="tree" s="100" t="-8" zOffset="0" length="5" width="5" height="8">',
+    )
+    with World(network(*objects)) as world:
+        x = [50.0, 50.0, 100.0, 101.0, 101.0]
+        z = [1.0, 1.7, 1.0, 1.0, 4.0]
+        clear = [bool(world.line_of_sight((at, -2.0, up), [(at, -14.0, up)])[0]) for at, up in zip(x, z, strict=True)]
+    assert clear == [False, True, False, True, False]
+
+
+def test_a_ray_meets_one_of_ten_thousand_posts() -> None:
+    repeat = '<repeat s="0" length="200" distance="0.02" tStart="{0}" tEnd="{0}" widthStart="0.1" widthEnd="0.1"'
+    post = 'type="pole" name="post" s="0" t="-9" zOffset="0" height="1">' + repeat.format(-9)
+    roads = network(f'{post} heightStart="1" heightEnd="1" zOffsetStart="0" zOffsetEnd="0"/>')
+    assert len(list(fixtures(roads))) == 10_001
+    with World(roads) as world:
+        hit = world.cast((50.0, -2.0, 0.5), [(50.0, -20.0, 0.5)])
+    assert hit.position[0, 1] == pytest.approx(-8.91, abs=0.05)
