@@ -14,14 +14,14 @@ install: $(STAMP)  ## create .venv and install the project with its development 
 $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not installed; name another with: make PYTHON=python3 …"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,learned]'
 	@touch $@
 
 demo: install   ## run the main job: scenarios 1 and 2 of the paper, all arms, reports/demo.html
 	$(BIN)/python -m eidrive_scenario.reporting.demo --out reports/demo.html
 
 test: install   ## run the test suite and the scenario library's own tests
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto tests xosc/coop
 
 lint: install   ## style, types, import arrows
 	$(BIN)/ruff check .
