@@ -31,6 +31,8 @@ lint: install   ## style, types, import arrows
 
 bench: install  ## simulated seconds per wall second, and where the time goes
 	$(BIN)/python benchmarks/bench_scenario_1.py
+	@test -z "$$EIDRIVE_MAPS" && echo 'EIDRIVE_MAPS is not set: no bench_traffic' || $(BIN)/python benchmarks/bench_traffic.py
+	@test -z "$$EIDRIVE_CORPORA" && echo 'EIDRIVE_CORPORA is not set: no bench_corpora' || $(BIN)/python benchmarks/bench_corpora.py
 
 clean:          ## remove the virtual environment and everything generated
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -33,6 +33,8 @@ class Locator:
         poses = tables.lane_poses(self._row, self._s, np.zeros_like(self._s))
         self._road = tables.section_road[tables.lane_section[self._row]]
         self.sample_points: Array = np.column_stack([poses.x, poses.y])
+        self._from_samples = tables.widest_lane + NARROW + SPACING
+        """No point on a road is further away from the nearest of its samples [m]."""
         self._flat = cKDTree(self.sample_points)
         self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
 
@@ -41,15 +43,18 @@ class Locator:
         solid = z is not None and self._solid is not None
         tree = self._solid if solid and self._solid is not None else self._flat
         points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
-        _, nearest = tree.query(points, k=1)
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1))
         road, s = self._road[nearest], self._s[nearest]
         s, t, beyond = self._refine(road, s, x, y)
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
-        doubtful = np.flatnonzero(outside > 0.0)
+        # What is far from all samples is out of reach of every road: no need to look for the nearest one.
+        hopeless = np.inf if solid else reach + self._from_samples
+        doubtful = np.flatnonzero((outside > 0.0) & (distance <= hopeless))
         if doubtful.size and len(self._s) > 1:
             height = z[doubtful] if solid and z is not None else None
-            best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height)
+            limit = np.full(len(doubtful), np.inf) if solid else outside[doubtful] + self._from_samples
+            best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height, limit)
             road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
         heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
@@ -79,20 +84,23 @@ class Locator:
 
     @cached_property
     def _overlaps(self) -> Overlaps:
-        reach = self._tables.widest_lane + NARROW + SPACING
-        return Overlaps(self._tables, self.sample_points, self._road, self._s, reach)
+        return Overlaps(self._tables, self.sample_points, self._road, self._s, self._from_samples)
 
     def _compare(
-        self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None
+        self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None, limit: Array
     ) -> tuple[Integers, Array, Array, Integers, Array]:
-        """The best of the roads of the nearest samples: the one whose surface is nearest."""
+        """The best of the roads of the nearest samples: the one whose surface is nearest.
+
+        limit  (N,) distance beyond which a sample's road cannot be nearer than what is known already [m]
+        """
         k = min(CANDIDATES, len(self._s))
-        _, nearest = tree.query(points, k=k)
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=k))
         nearest = nearest.reshape(len(points), k)
         road = self._road[nearest]
         first = np.ones_like(road, dtype=bool)
         for k_th in range(1, k):
             first[:, k_th] = ~np.any(road[:, :k_th] == road[:, k_th : k_th + 1], axis=1)
+        first[:, 1:] &= distance.reshape(len(points), k)[:, 1:] <= limit[:, None]
         point, column = np.nonzero(first)
         road, s = road[point, column], self._s[nearest[point, column]]
         s, t, beyond = self._refine(road, s, x[point], y[point])

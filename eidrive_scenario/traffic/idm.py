@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,9 @@ class IntelligentDriver:
         return (self.standstill_gap + speed * self.time_gap) / float(np.sqrt(free))
 
 
+COLUMNS = tuple(entry.name for entry in fields(IntelligentDriver))
+
+
 @dataclass(frozen=True)
 class Drivers:
     """The parameters of many drivers: one row for each, one column for each field of IntelligentDriver."""
@@ -58,7 +61,8 @@ class Drivers:
     @classmethod
     def of(cls, drivers: list[IntelligentDriver]) -> Drivers:
         """Drivers as a table."""
-        return cls(np.array([astuple(driver) for driver in drivers]).reshape(-1, len(fields(IntelligentDriver))))
+        rows = [[getattr(driver, name) for name in COLUMNS] for driver in drivers]
+        return cls(np.array(rows, dtype=np.float64).reshape(-1, len(COLUMNS)))
 
     def of_rows(self, rows: NDArray[np.int64]) -> Drivers:
         """Some of them."""

@@ -145,7 +145,7 @@ def free(fleet: Fleet, sites: Sites, participant: Participant, speed: Array, for
     nobody = np.full(count, -9)
     leaders = find_leaders(lanes, lanes.chain(sites.row, PLANNED + 1), sites.progress, front, occupants, own=nobody)
     followers = find_followers(lanes, sites.row, sites.progress, rear, occupants, nobody)
-    own = Drivers.of([driver] * count)
+    own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
     braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
     behind = followers.number
     known = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.row) else behind >= 0
