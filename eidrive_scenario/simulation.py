@@ -261,6 +261,7 @@ class Simulation:
         for name in self.stations.drivers:
             self.world.set_driven(name, name in commands.driven)
         self.stations.goals = commands.goals
+        self.stations.signals = commands.signals
         if commands.environment is not None:
             self._environment = commands.environment
             if self._weather is None:

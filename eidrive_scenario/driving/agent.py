@@ -86,7 +86,7 @@ class Agent:
         plan = None
         if self.planner is not None:
             if self.settings.obey_signals:
-                self.planner.heed(readings.signals)
+                self.planner.heed(self.perception.signals(readings))
             plan = self.planner.plan(ego, fused, goal, now)
         return AgentStep(
             detections=detections,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,10 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.path import SPACING, Path
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.signal_stops import SignalStops, Stop
 from eidrive_scenario.driving.step import Goal, Plan
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
 Array = NDArray[np.float64]
@@ -33,7 +35,8 @@ class RoutePlanner(Planner):
     """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
 
     Without either it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
-    joined by a smooth curve. Objects are not looked at. Raises RouteError if no road leads to a waypoint.
+    joined by a smooth curve. Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that
+    it has seen. Raises RouteError if no road leads to a waypoint.
     """
 
     def __init__(
@@ -45,6 +48,12 @@ class RoutePlanner(Planner):
         self._progress = 0
         self._lane: list[LaneLocation] = []
         self._first_speed: float | None = None
+        self._stops = SignalStops(roads, spec) if settings.obey_signals else None
+        self._laid: Path | None = None
+
+    def heed(self, signals: Sequence[SignalReading]) -> None:
+        if self._stops is not None:
+            self._stops.signals.see(signals)
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         x, y, _ = ego.position.tolist()
@@ -62,8 +71,22 @@ class RoutePlanner(Planner):
         speeds = np.minimum(path.limits[part], target)
         free = bool(speeds[0] >= target)
         reason = "keep speed" if free else "curve or end of route ahead"
+        stop = self._stop(path, ego, x, y, now)
+        if stop is not None and self._stops is not None:
+            held = self._stops.limits(stop, part)
+            if np.any(held < speeds):
+                speeds, free, reason = np.minimum(speeds, held), False, stop.reason
         acceleration = goal.acceleration if goal is not None and free else 0.0
         return Plan(path.points[part], speeds, reason, acceleration)
+
+    def _stop(self, path: Path, ego: EgoState, x: float, y: float, now: float) -> Stop | None:
+        """The traffic light or stop sign for which to stop next."""
+        if self._stops is None:
+            return None
+        if self._laid is not path:
+            self._laid = path
+            self._stops.follow(path.points)
+        return self._stops.next(self._stops.place_of(self._progress, path.points, x, y), ego.speed, now)
 
     def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
         if goal is not None and goal.speed is not None:

@@ -21,6 +21,7 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig, read_all
+from eidrive_scenario.sensing.signals import SignalLookout
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.message import LinkEvent, Received
@@ -60,10 +61,13 @@ class Stations:
         self._channel: Channel | None = None
         self.channel_name = NO_COOPERATION
         self.goals: Mapping[str, Goal] = {}
+        self.signals: Mapping[str, str] = {}
+        """What the traffic lights show, by their ids."""
         self.links: tuple[LinkEvent, ...] = ()
         """What became of the messages that were said in the last tick."""
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
+        self._lookouts: dict[str, SignalLookout] = {}
         self._held: dict[str, HeldControls] = {}
         self._settings = _all_settings(scenario, detector, cooperate)
         self._detectors = _all_detectors(scenario, self._settings, detector)
@@ -91,6 +95,8 @@ class Stations:
             own_perception=self._own_perception,
             detector=self._detectors.pop(spec.name, None),
         )
+        if settings.obey_signals and not self._agents[spec.name].perception.detector.sees_signals:
+            self._lookouts[spec.name] = SignalLookout(spec, self._roads)
         if self._agents[spec.name].controller is not None:
             self._held[spec.name] = HeldControls(spec, self._dt)
 
@@ -98,6 +104,7 @@ class Stations:
         """An actor has left the world."""
         self._agents.pop(name, None)
         self._rigs.pop(name, None)
+        self._lookouts.pop(name, None)
         self._held.pop(name, None)
 
     def use_channel(self, profile: str, *, source: str, line: int) -> None:
@@ -112,6 +119,9 @@ class Stations:
         if self._channel is not None:
             self._channel.around(self._surroundings(world, view))
         readings = read_all(list(self._rigs.values()), world, view)
+        for name, lookout in self._lookouts.items():
+            seen = lookout.read(world, view, view.row(name), self.signals)
+            readings[name] = replace(readings[name], signals=seen)
         now = view.time
         return {
             name: agent.act(readings[name], self._deliver(name, now), now, self.goals.get(name))

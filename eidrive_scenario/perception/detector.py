@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
@@ -38,6 +38,8 @@ class Detector(ABC):
     """The kinds of sensors it reads: truth, camera, lidar."""
     gives_velocity: ClassVar[bool] = False
     """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
+    sees_signals: ClassVar[bool] = False
+    """Whether it reads traffic lights; a station with another one knows by the map and the line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
     """What the property `detector_settings` may say; nothing where None."""
 
@@ -47,3 +49,7 @@ class Detector(ABC):
     @abstractmethod
     def detect(self, readings: Readings) -> Detections:
         """The objects in these readings."""
+
+    def signals(self) -> Sequence[SignalReading]:
+        """The traffic lights and stop signs of the map that it found in the last readings, if it `sees_signals`."""
+        return ()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.tracking import Tracker
-from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.readings import Readings, SignalReading
 
 TIME_TOLERANCE = 1e-9
 
@@ -39,6 +40,10 @@ class Perception:
     def locate(self, readings: Readings) -> Readings:
         """The readings as the station can know them, if it has to find out by itself where it is."""
         return readings if self._localizer is None else self._localizer.located(readings)
+
+    def signals(self, readings: Readings) -> Sequence[SignalReading]:
+        """The traffic lights and stop signs in sight, as the detector or else the lookout has them."""
+        return self.detector.signals() if self.detector.sees_signals else readings.signals
 
     def perceive(self, readings: Readings) -> Detections | None:
         """The newest objects that become known now; None if there is nothing new."""
