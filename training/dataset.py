@@ -55,14 +55,14 @@ class Dataset:
         return np.flatnonzero(self.columns["picture"] == picture)
 
     def to_find(self) -> NDArray[np.bool_]:
-        """(N,) whether an object shows enough to be asked for; the others are ignored, found or not.
+        """(N,) whether an object shows enough to be asked for; the others are ignored, found or not."""
+        return shows_enough(self.columns["height"], self.columns["seen"], self.columns["whole"])
 
-        At least 8 pixels high in the camera's picture, 40 pixels and a fifth of its silhouette in sight.
-        """
-        whole = np.maximum(self.columns["whole"], 1)
-        seen = self.columns["seen"]
-        enough: NDArray[np.bool_] = (self.columns["height"] >= 8.0) & (seen >= 40) & (seen / whole >= 0.2)
-        return enough
+
+def shows_enough(height: NDArray[Any], seen: NDArray[Any], whole: NDArray[Any]) -> NDArray[np.bool_]:
+    """(N,) whether an object is at least 8 pixels high, and 40 pixels and a fifth of its silhouette are in sight."""
+    enough: NDArray[np.bool_] = (height >= 8.0) & (seen >= 40) & (seen / np.maximum(whole, 1) >= 0.2)
+    return enough
 
 
 def write(folder: Path, pictures: Sequence[bytes], columns: dict[str, NDArray[Any]]) -> None:

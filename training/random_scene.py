@@ -88,15 +88,9 @@ def random_view(rng: np.random.Generator, spots: Spots) -> View:
     """On a vehicle, ahead or aside, or at the roadside up to 8 m high."""
     width, height = _PICTURE_SIZES[int(rng.choice(4, p=[0.5, 0.2, 0.15, 0.15]))]
     fov = 100.0 if rng.random() < 0.4 else float(rng.uniform(55.0, 115.0))
-    bent = rng.random() < 0.15
-    settings = CameraSettings(
-        width=width,
-        height=height,
-        fov=fov,
-        distortion=(float(rng.uniform(-0.15, 0.02)), float(rng.uniform(0.0, 0.03)), 0.0, 0.0, 0.0)
-        if bent
-        else (0.0,) * 5,
-    )
+    corner = math.tan(math.radians(fov) / 2) * math.hypot(1.0, height / width)
+    bend = float(rng.uniform(-0.11, 0.04)) / corner**2 if rng.random() < 0.15 else 0.0
+    settings = CameraSettings(width=width, height=height, fov=fov, distortion=(bend, 0.0, 0.0, 0.0, 0.0))
     if rng.random() < 0.35:
         return View(settings, _roadside(rng, spots), None)
     row = int(rng.choice(np.flatnonzero(spots.kinds == "driving")))

@@ -71,6 +71,7 @@ class LearnedDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
+    sees_signals: ClassVar[bool] = True
     settings_type: ClassVar[type[Settings] | None] = LearnedSettings
     network: ClassVar[Literal["yolov5", "ssd"]]
 
@@ -78,8 +79,7 @@ class LearnedDetector(Detector):
         self.settings = settings or LearnedSettings()
         self.pictures: dict[str, ImageDetections] = {}
         """What was found in the last picture of each camera."""
-        self.signals: tuple[SignalReading, ...] = ()
-        """The traffic lights and stop signs of the map that were found in the last pictures."""
+        self._signals: tuple[SignalReading, ...] = ()
         self._network = build_network(self.network, self.settings)
         self._surroundings = Surroundings(None)
         self._patterns: dict[str, Pattern] = {}
@@ -97,12 +97,16 @@ class LearnedDetector(Detector):
         """The road users in the pictures of all cameras that were read."""
         name, sweep = next(iter(readings.lidars.items()), ("", None))
         self.pictures = {camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()}
-        self.signals = self._lights.read(self.pictures, readings.cameras)
+        self._signals = self._lights.read(self.pictures, readings.cameras)
         parts = [
             self._lifted(found, readings, camera, sweep, self._patterns.get(name))
             for camera, found in self.pictures.items()
         ]
         return distinct(parts, readings.time)
+
+    def signals(self) -> tuple[SignalReading, ...]:
+        """The traffic lights and stop signs of the map that were found in the last pictures."""
+        return self._signals
 
     def _lifted(
         self,

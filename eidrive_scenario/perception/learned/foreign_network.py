@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -50,8 +52,8 @@ class ForeignNetwork(ImageNetwork):
             self._candidates(outputs)
         except (ValueError, IndexError) as error:
             shapes = ", ".join(str(output.shape) for output in outputs)
-            message = f"weights {path.name!r} give {shapes}, which is not {self._layout!r} for {len(classes)} classes"
-            raise SettingError(Problem(message, f"layouts: {LAYOUTS}", str(path))) from error
+            message = f"weights {str(path)!r} give {shapes}, which is not {self._layout!r} for {len(classes)} classes"
+            raise SettingError(Problem(message, f"layouts: {LAYOUTS}")) from error
 
     def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
         return self._candidates(self._outputs(picture))
@@ -59,12 +61,13 @@ class ForeignNetwork(ImageNetwork):
     def _outputs(self, picture: NDArray[np.uint8]) -> list[Floats]:
         pixels = np.ascontiguousarray(picture.transpose(2, 0, 1)[None], dtype=np.float32) / np.float32(255.0)
         try:
-            return self._compute(pixels)
+            with _quiet_opencv():
+                return self._compute(pixels)
         except (cv2.error, RuntimeError) as error:
             width, height = self.input_size
             reason = " ".join(str(error).split())[:160]
-            message = f"weights {self._path.name!r} do not take pictures of {width} x {height}: {reason}"
-            raise SettingError(Problem(message, "say the network's own with 'input_size'", str(self._path))) from error
+            message = f"weights {str(self._path)!r} do not take pictures of {width} x {height}: {reason}"
+            raise SettingError(Problem(message, "say the network's own with 'input_size'")) from error
 
     def _told_by_shape(self, outputs: list[Floats]) -> Layout:
         count = len(self.classes)
@@ -83,10 +86,10 @@ class ForeignNetwork(ImageNetwork):
             return fits[0]
         given = ", ".join(str(shape) for shape in shapes)
         if not fits:
-            message = f"weights {self._path.name!r} give {given}, which fits no layout for {count} classes"
-            raise SettingError(Problem(message, f"check 'classes'; layouts: {LAYOUTS}", str(self._path)))
-        message = f"weights {self._path.name!r} give {given}, which could be {' or '.join(fits)}"
-        raise SettingError(Problem(message, "say which with 'layout'", str(self._path)))
+            message = f"weights {str(self._path)!r} give {given}, which fits no layout for {count} classes"
+            raise SettingError(Problem(message, f"check 'classes'; layouts: {LAYOUTS}"))
+        message = f"weights {str(self._path)!r} give {given}, which could be {' or '.join(fits)}"
+        raise SettingError(Problem(message, "say which with 'layout'"))
 
     def _candidates(self, outputs: list[Floats]) -> Candidates:
         count = len(self.classes)
@@ -95,17 +98,17 @@ class ForeignNetwork(ImageNetwork):
             if boxes.shape[1] != 4:
                 boxes, shares = shares, boxes
         elif self._layout == "detections":
-            table = outputs[0].reshape(-1, 6)
+            table = outputs[0].reshape(-1, _sides(outputs[0], -1, 6))
             boxes, shares = table[:, :4], np.zeros((len(table), count), dtype=np.float32)
             numbers = table[:, 5].astype(np.int64)
             if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
                 raise ValueError("a class number is beyond the classes")
             shares[np.arange(len(table)), numbers] = table[:, 4]
         elif self._layout == "yolov5":
-            table = outputs[0].reshape(-1, 5 + count)
+            table = outputs[0].reshape(-1, _sides(outputs[0], -1, 5 + count))
             boxes, shares = _corners(table[:, :4]), table[:, 5:] * table[:, 4:5]
         else:
-            table = outputs[0].reshape(4 + count, -1).T
+            table = outputs[0].reshape(_sides(outputs[0], -2, 4 + count), -1).T
             boxes, shares = _corners(table[:, :4]), table[:, 4:]
         if boxes.shape[1] != 4 or shares.shape != (len(boxes), count):
             raise ValueError("the shapes do not fit")
@@ -113,6 +116,12 @@ class ForeignNetwork(ImageNetwork):
         scores = shares[np.arange(len(shares)), numbers]
         sure = scores >= self.confidence
         return Candidates(boxes[sure].astype(float), scores[sure].astype(float), numbers[sure].astype(np.int64))
+
+
+def _sides(output: Floats, axis: int, expected: int) -> int:
+    if output.shape[axis] != expected:
+        raise ValueError(f"{expected} numbers of each box are expected")
+    return expected
 
 
 def _corners(boxes: Floats) -> Floats:
@@ -123,7 +132,8 @@ def _corners(boxes: Floats) -> Floats:
 def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
     cv2.setNumThreads(threads)
     try:
-        network = cv2.dnn.readNetFromONNX(str(path))
+        with _quiet_opencv():
+            network = cv2.dnn.readNetFromONNX(str(path))
         names = network.getUnconnectedOutLayersNames()
     except cv2.error as error:
         raise _unreadable(path, "an ONNX model", error) from error
@@ -135,12 +145,25 @@ def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
     return compute
 
 
+@contextmanager
+def _quiet_opencv() -> Iterator[None]:
+    """OpenCV prints what it raises, too."""
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(before)
+
+
 def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
     import torch
 
     torch.set_num_threads(threads)
     try:
-        network: Any = torch.jit.load(str(path), map_location="cpu").eval()  # type: ignore[no-untyped-call]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # torch would rather have torch.export
+            network: Any = torch.jit.load(str(path), map_location="cpu").eval()  # type: ignore[no-untyped-call]
     except (RuntimeError, ValueError, OSError) as error:
         raise _unreadable(path, "a TorchScript model", error) from error
 
@@ -157,4 +180,4 @@ def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
 
 def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
     reason = " ".join(str(error).split())[:160]
-    return SettingError(Problem(f"weights {path.name!r} are not {kind}: {reason}", "export the model again", str(path)))
+    return SettingError(Problem(f"weights {str(path)!r} are not {kind}: {reason}", "export the model again"))

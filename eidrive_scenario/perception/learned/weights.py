@@ -68,7 +68,7 @@ def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
     except (OSError, KeyError, TypeError, ValueError, RuntimeError, EOFError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split())[:200]
         remedy = "give a file that training/train.py has written, an ONNX model (.onnx) or a TorchScript model (.pt)"
-        raise SettingError(Problem(f"weights {path.name!r} do not fit: {reason}", remedy, str(path))) from error
+        raise SettingError(Problem(f"weights {str(path)!r} do not fit: {reason}", remedy)) from error
     return description, network
 
 

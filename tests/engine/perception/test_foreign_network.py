@@ -1,0 +1,130 @@
+"""A user's own network, as an ONNX or a TorchScript file.
+
+red_boxes.onnx is the network below, exported with torch.onnx.export(network, (pictures,), path, opset_version=13).
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork
+
+ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
+CLASSES = ("truck", "car")
+SIZE = (96, 64)
+
+
+@pytest.fixture
+def torchscript(tmp_path: Path) -> Path:
+    """Red cells of 8 pixels: the objectness is the mean of red less green; the box is 16 x 16 about the cell."""
+    torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+
+    class RedBoxes(torch.nn.Module):  # type: ignore[misc, name-defined]
+        def __init__(self) -> None:
+            super().__init__()
+            self.conv = torch.nn.Conv2d(3, 7, 8, 8, bias=False)
+            weights = torch.zeros(7, 3, 8, 8)
+            weights[4, 0], weights[4, 1] = 1 / 64, -1 / 64
+            self.conv.weight = torch.nn.Parameter(weights)
+            constant = torch.zeros(1, 7, 8, 12)
+            constant[0, 0] = torch.arange(12.0)[None] * 8 + 4
+            constant[0, 1] = torch.arange(8.0)[:, None] * 8 + 4
+            constant[0, 2:4], constant[0, 6] = 16.0, 1.0
+            self.register_buffer("constant", constant)
+
+        def forward(self, pictures):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
+            return (self.conv(pictures) + self.constant).flatten(2).transpose(1, 2)
+
+    path = tmp_path / "red_boxes.pt"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        torch.jit.trace(RedBoxes().eval(), torch.zeros(1, 3, SIZE[1], SIZE[0])).save(str(path))
+    return path
+
+
+def red_square() -> NDArray[np.uint8]:
+    """Twice as large as the network's input, so that the square covers its cell in line 3, column 5."""
+    picture = np.full((128, 192, 3), 90, dtype=np.uint8)
+    picture[48:64, 80:96] = (255, 0, 0)
+    return picture
+
+
+def assert_finds_the_square(network: ForeignNetwork) -> None:
+    found = network.find(red_square())
+    assert found.classes == ("car",)
+    np.testing.assert_allclose(found.boxes, [[72.0, 40.0, 104.0, 72.0]], atol=1e-3)
+    np.testing.assert_allclose(found.scores, [1.0], atol=1e-5)
+    assert len(network.find(np.zeros((64, 96, 3), dtype=np.uint8))) == 0
+
+
+def test_an_onnx_model_finds_what_it_was_made_for() -> None:
+    assert_finds_the_square(ForeignNetwork(ONNX, CLASSES, SIZE, 0.5))
+
+
+def test_a_torchscript_model_finds_the_same(torchscript: Path) -> None:
+    assert_finds_the_square(ForeignNetwork(torchscript, CLASSES, SIZE, 0.5))
+
+
+def test_weights_that_do_not_fit_are_told_with_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"give \(1, 96, 7\), which fits no layout for 3 classes; check 'classes'"):
+        ForeignNetwork(ONNX, ("car", "truck", "bus"), SIZE, 0.5)
+    with pytest.raises(
+        SettingError, match=r"do not take pictures of 640 x 640.*say the network's own with 'input_size'"
+    ):
+        ForeignNetwork(ONNX, CLASSES, (640, 640), 0.5)
+    with pytest.raises(SettingError, match="is not 'yolov8' for 2 classes"):
+        ForeignNetwork(ONNX, CLASSES, SIZE, 0.5, layout="yolov8")
+    empty = tmp_path / "empty.onnx"
+    empty.write_bytes(b"not a model")
+    with pytest.raises(SettingError, match=r"are not an ONNX model.*export the model again"):
+        ForeignNetwork(empty, CLASSES, SIZE, 0.5)
+
+
+def test_a_torchscript_file_that_is_none(tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="needs the extra 'learned'")
+    path = tmp_path / "empty.pt"
+    path.write_bytes(b"not a model")
+    with pytest.raises(SettingError, match="are not a TorchScript model"):
+        ForeignNetwork(path, CLASSES, SIZE, 0.5)
+
+
+class Fixed(ForeignNetwork):
+    """A network of which the outputs are given."""
+
+    def __init__(self, outputs: list[NDArray[np.float32]], classes: tuple[str, ...]) -> None:
+        self._path = Path("own.onnx")
+        self.classes = classes
+        self.confidence = 0.3
+        self.outputs = outputs
+        self._layout = self._told_by_shape(outputs)
+
+    def found(self) -> list[tuple[list[float], float, int]]:
+        candidates = self._candidates(self.outputs)
+        rows = zip(candidates.boxes, candidates.scores, candidates.classes, strict=True)
+        return [
+            ([round(v, 4) for v in box.tolist()], round(float(score), 4), int(number)) for box, score, number in rows
+        ]
+
+
+def test_each_layout_says_the_same() -> None:
+    box, expected = [10.0, 20.0, 4.0, 6.0], [([8.0, 17.0, 12.0, 23.0], 0.8, 1)]
+    classes = ("car", "truck", "bus")
+    yolov5 = np.array([[[*box, 1.0, 0.1, 0.8, 0.0], [*box, 0.1, 0.9, 0.0, 0.0]]], dtype=np.float32)
+    yolov8 = np.zeros((1, 7, 40), dtype=np.float32)
+    yolov8[0, :, 3] = [*box, 0.1, 0.8, 0.0]
+    corners = np.array([[[8.0, 17.0, 12.0, 23.0]]], dtype=np.float32)
+    shares = np.array([[[0.1, 0.8, 0.0]]], dtype=np.float32)
+    table = np.array([[8.0, 17.0, 12.0, 23.0, 0.8, 1.0]], dtype=np.float32)
+    for outputs in ([yolov5], [yolov8], [corners, shares], [shares, corners], [table]):
+        assert Fixed(outputs, classes).found() == expected
+
+
+def test_a_layout_that_the_shape_leaves_open_must_be_said() -> None:
+    with pytest.raises(SettingError, match="could be yolov5 or detections; say which with 'layout'"):
+        Fixed([np.zeros((1, 10, 6), dtype=np.float32)], ("car",))

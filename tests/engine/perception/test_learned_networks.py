@@ -1,0 +1,214 @@
+"""The networks: shapes, encoding, assignment, folding, and that they can learn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+
+from eidrive_scenario.perception.learned.blocks import fold  # noqa: E402
+from eidrive_scenario.perception.learned.boxes import centred, complete_iou, corners, pairwise_iou  # noqa: E402
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES  # noqa: E402
+from eidrive_scenario.perception.learned.ssd import (  # noqa: E402
+    BOXES_PER_CELL,
+    STRIDES,
+    Ssd,
+    decode,
+    default_boxes,
+    encode,
+)
+from eidrive_scenario.perception.learned.ssd_loss import (  # noqa: E402
+    BACKGROUND,
+    NOT_ASKED,
+    SsdLoss,
+    hardest,
+    match,
+)
+from eidrive_scenario.perception.learned.targets import IGNORED, PADDING, Targets  # noqa: E402
+from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates  # noqa: E402
+from eidrive_scenario.perception.learned.yolov5 import YoloV5  # noqa: E402
+from eidrive_scenario.perception.learned.yolov5_loss import YoloLoss, assign  # noqa: E402
+
+ANCHORS = (
+    ((8.0, 10.0), (18.0, 14.0), (12.0, 30.0)),
+    ((40.0, 26.0), (30.0, 60.0), (70.0, 44.0)),
+    ((110.0, 70.0), (160.0, 120.0), (300.0, 200.0)),
+)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def yolo() -> YoloV5:
+    torch.manual_seed(0)
+    return YoloV5(len(IMAGE_CLASSES), ANCHORS)
+
+
+def ssd() -> Ssd:
+    torch.manual_seed(0)
+    return Ssd(len(IMAGE_CLASSES))
+
+
+def two_objects(boxes: list[list[float]], classes: list[int]) -> Targets:
+    return Targets(torch.tensor([boxes]), torch.tensor([classes]))
+
+
+def test_shapes_and_sizes() -> None:
+    pictures = torch.zeros(2, 3, 128, 256)
+    outputs = yolo()(pictures)
+    assert [tuple(output.shape) for output in outputs] == [
+        (2, 3, 16, 32, 16),
+        (2, 3, 8, 16, 16),
+        (2, 3, 4, 8, 16),
+    ]
+    assert yolo().decode(outputs).shape == (2, 3 * (16 * 32 + 8 * 16 + 4 * 8), 16)
+    encoded, logits = ssd()(pictures)
+    count = BOXES_PER_CELL * sum((128 // stride) * (256 // stride) for stride in STRIDES)
+    assert encoded.shape == (2, count, 4)
+    assert logits.shape == (2, count, 12)
+    assert default_boxes(128, 256).shape == (count, 4)
+    assert 1.6e6 < sum(value.numel() for value in yolo().parameters()) < 2.0e6
+    assert sum(value.numel() for value in ssd().parameters()) < 1.2e6
+
+
+def test_overlap_measures_by_hand() -> None:
+    a, b = torch.tensor([[5.0, 5.0, 10.0, 10.0]]), torch.tensor([[10.0, 5.0, 10.0, 10.0]])
+    assert pairwise_iou(corners(a), corners(b)).item() == pytest.approx(1 / 3)
+    # same shape, centres 5 apart, hull 15 x 10: CIoU = 1/3 - 25/325
+    assert complete_iou(a, b).item() == pytest.approx(1 / 3 - 25 / 325, abs=1e-6)
+    assert complete_iou(a, a).item() == pytest.approx(1.0, abs=1e-6)
+    # same centre and area, 10 x 10 and 20 x 5: iou 50/150, v = 4/pi² (atan 4 - atan 1)²
+    other = torch.tensor([[5.0, 5.0, 20.0, 5.0]])
+    unlike = 4 / math.pi**2 * (math.atan(4.0) - math.atan(1.0)) ** 2
+    expected = 1 / 3 - unlike * unlike / (1 - 1 / 3 + unlike)
+    assert complete_iou(a, other).item() == pytest.approx(expected, abs=1e-6)
+    torch.testing.assert_close(centred(corners(other)), other)
+
+
+def test_encoding_and_decoding_of_boxes() -> None:
+    defaults = default_boxes(128, 256)
+    boxes = defaults * torch.tensor([1.0, 1.0, 1.3, 0.7]) + torch.tensor([3.0, -2.0, 0.0, 0.0])
+    torch.testing.assert_close(decode(encode(boxes, defaults), defaults), boxes)
+    by_hand = encode(torch.tensor([[14.0, 10.0, 40.0, 20.0]]), torch.tensor([[10.0, 10.0, 20.0, 20.0]]))
+    torch.testing.assert_close(by_hand, torch.tensor([[2.0, 0.0, math.log(2.0) / 0.2, 0.0]]))
+
+
+def test_a_cell_that_answers_can_say_the_box() -> None:
+    network = yolo()
+    target = two_objects([[61.0, 45.0, 30.0, 20.0]], [2])
+    for scale, stride in enumerate((8, 16, 32)):
+        height, width = 128 // stride, 256 // stride
+        found = assign(target, network.anchors[scale], stride, height, width)
+        for anchor, line, column in zip(found.anchor, found.line, found.column, strict=True):
+            x, y = (61.0 / stride - column + 0.5) / 2.0, (45.0 / stride - line + 0.5) / 2.0
+            sides = torch.tensor([30.0, 20.0]) / network.anchors[scale][anchor]
+            w, h = (sides.sqrt() / 2.0).tolist()
+            shares = torch.tensor([float(x), float(y), w, h])
+            assert (shares > 0.0).all()
+            assert (shares < 1.0).all()
+            raw = [torch.full((1, 3, 128 // s, 256 // s, 16), -20.0) for s in (8, 16, 32)]
+            raw[scale][0, anchor, line, column, :4] = torch.logit(shares)
+            raw[scale][0, anchor, line, column, 4] = 20.0
+            raw[scale][0, anchor, line, column, 5 + 2] = 20.0
+            boxes, scores, classes = yolo_candidates(network.anchors, raw, 0.5)
+            torch.testing.assert_close(boxes, corners(target.boxes[0]), atol=1e-3, rtol=0.0)
+            assert scores.item() == pytest.approx(1.0, abs=1e-6)
+            assert classes.item() == 2
+            whole = network.decode(raw)[0]
+            torch.testing.assert_close(whole[whole[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
+    # centre 7.625, 5.625 in cells of 8: its own cell and the ones to the right and below, for both anchors of like size
+    fine = assign(target, network.anchors[0], 8, 16, 32)
+    cells = {(int(line), int(column)) for line, column in zip(fine.line, fine.column, strict=True)}
+    assert cells == {(5, 7), (5, 8), (6, 7)}
+    assert set(fine.anchor.tolist()) == {0, 1, 2}
+
+
+def test_anchors_of_unlike_size_do_not_answer() -> None:
+    network = yolo()
+    large = two_objects([[128.0, 64.0, 200.0, 110.0]], [1])
+    assert len(assign(large, network.anchors[0], 8, 16, 32).classes) == 0
+    assert len(assign(large, network.anchors[2], 32, 4, 8).classes) > 0
+
+
+def test_default_boxes_answer_by_overlap_and_the_best_one_always() -> None:
+    defaults = torch.tensor([[50.0, 50.0, 20.0, 20.0], [56.0, 50.0, 20.0, 20.0], [100.0, 50.0, 20.0, 20.0]])
+    # overlaps of the object: 1, 14/26 = 0.54, 0; the second object overlaps nothing by half
+    row, label = match(two_objects([[50.0, 50.0, 20.0, 20.0], [112.0, 50.0, 20.0, 20.0]], [3, 5]), defaults)
+    assert label.tolist() == [[4, 4, 6]]
+    assert row.tolist() == [[0, 0, 1]]
+    _, label = match(two_objects([[50.0, 50.0, 20.0, 20.0], [100.0, 50.0, 60.0, 60.0]], [3, IGNORED]), defaults)
+    assert label.tolist() == [[4, 4, NOT_ASKED]]
+    _, label = match(two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]), defaults)
+    assert label.tolist() == [[BACKGROUND] * 3]
+
+
+def test_the_hardest_negatives_are_three_for_each_positive() -> None:
+    loss = torch.tensor([[9.0, 1.0, 5.0, 4.0, 3.0, 2.0]])
+    label = torch.tensor([[2, BACKGROUND, BACKGROUND, NOT_ASKED, BACKGROUND, BACKGROUND]])
+    assert hardest(loss, label).tolist() == [[False, False, True, False, True, True]]
+
+
+def test_ignored_objects_ask_nothing_of_their_cells() -> None:
+    network = yolo()
+    outputs = [torch.zeros(1, 3, 128 // s, 256 // s, 16) for s in (8, 16, 32)]
+    nothing = YoloLoss(network)(outputs, two_objects([[0.0, 0.0, 0.0, 0.0]], [PADDING]))[1]["object"]
+    whole = YoloLoss(network)(outputs, two_objects([[128.0, 64.0, 256.0, 128.0]], [IGNORED]))[1]["object"]
+    half = YoloLoss(network)(outputs, two_objects([[64.0, 64.0, 128.0, 128.0]], [IGNORED]))[1]["object"]
+    assert whole == 0.0
+    assert half == pytest.approx(nothing / 2, rel=1e-6)
+
+
+def picture_and_targets() -> tuple[torch.Tensor, Targets]:
+    """Two coloured rectangles on two noisy grounds."""
+    draws = torch.Generator().manual_seed(3)
+    picture = 0.2 * torch.rand(2, 3, 128, 256, generator=draws)
+    for left, top, right, bottom, channel in ((20, 25, 60, 55, 0), (90, 65, 110, 115, 1)):
+        picture[:, channel, top:bottom, left:right] = 1.0
+    one = two_objects([[40.0, 40.0, 40.0, 30.0], [100.0, 90.0, 20.0, 50.0]], [0, 5])
+    return picture, Targets(one.boxes.repeat(2, 1, 1), one.classes.repeat(2, 1))
+
+
+@pytest.mark.parametrize("name", ["yolov5", "ssd"])
+def test_a_network_learns_a_picture_by_heart(name: str) -> None:
+    network = yolo() if name == "yolov5" else ssd()
+    loss_of = YoloLoss(network) if isinstance(network, YoloV5) else SsdLoss(default_boxes(128, 256))
+    for module in network.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.momentum = 0.2
+    picture, targets = picture_and_targets()
+    optimizer = torch.optim.AdamW(network.parameters(), 2e-3)
+    losses = []
+    for _ in range(60):
+        loss, parts = loss_of(network(picture), targets)
+        assert loss.item() == pytest.approx(sum(parts.values()), rel=1e-4)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < 0.35 * losses[0]
+    network.eval()
+    with torch.no_grad():
+        before = network(picture)
+        fold(network)
+        after = network(picture)
+        for first, second in zip(before, after, strict=True):
+            torch.testing.assert_close(first, second, atol=2e-3, rtol=1e-3)
+        found = (
+            yolo_candidates(network.anchors, after, 0.05)
+            if isinstance(network, YoloV5)
+            else ssd_candidates(after, default_boxes(128, 256), 0.05)
+        )
+    boxes, scores, classes = found
+    for box, number in zip(corners(targets.boxes[0]), (0, 5), strict=True):
+        own = classes == number
+        assert own.any()
+        best = boxes[own][scores[own].argmax()]
+        assert pairwise_iou(best[None], box[None]).item() > 0.6

@@ -1,0 +1,127 @@
+"""Recall against the thickness of fog and against darkness: the same scenes, seen in weather after weather."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.learned.average_precision import match
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.learned.image_network import ImageNetwork
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.weather import Weather
+from training.dataset import shows_enough
+from training.labels import Label, actor_labels
+from training.random_roads import random_place
+from training.random_scene import Spots, random_traffic, random_view
+from training.scoring import VEHICLES
+
+VISUAL_RANGES = (30_000.0, 1000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0, 35.0)
+ELEVATIONS = (40.0, 20.0, 10.0, 5.0, 2.0, 0.0, -3.0, -6.0, -9.0, -12.0, -18.0)
+FARTHEST, LOWEST = 40.0, 15.0
+"""Vehicles asked for: nearer than this [m], at least so high in the picture [px]."""
+LAMPS = {"headlights": "on", "no lamps": "off"}
+
+
+def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict[str, Any]:
+    """Recall of each network at its confidence: by visual range [m], and by the sun's elevation [degrees] with the
+    vehicles' lamps on and off."""
+    weathers: dict[tuple[str, float], Weather] = {
+        ("fog", value): Weather(visual_range=value, cloud_cover=0.5, sun_elevation=30.0) for value in VISUAL_RANGES
+    }
+    for title, lamps in LAMPS.items():
+        for value in ELEVATIONS:
+            setting: Any = lamps
+            weathers[title, value] = Weather(sun_elevation=value, headlights=setting)
+    found = {key: dict.fromkeys(networks, 0) for key in weathers}
+    asked = 0
+    for number in range(worlds):
+        rng = generator(seed, "training data", "sweeps", number)
+        with tempfile.TemporaryDirectory() as folder:
+            place = random_place(rng, Path(folder))
+        spots = Spots.of(place.roads)
+        view = random_view(rng, spots)
+        camera = Photographer(CameraSettings())
+        with World(place.roads) as world:
+            for index, house in enumerate(place.houses):
+                world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+            cast = random_traffic(rng, spots, view)
+            for spec, placement in cast:
+                world.add(spec, placement)
+            specs = {spec.name: spec for spec, _ in cast}
+            boxes = None
+            for key, weather in weathers.items():
+                world.set_weather(weather)
+                reading = camera.take(world, view.pose, generator(seed, "sweeps", number))
+                if boxes is None:
+                    boxes = _vehicles(actor_labels(reading, world.view(), specs))
+                    asked += len(boxes)
+                if not len(boxes):
+                    break
+                for name, network in networks.items():
+                    seen = network.find(reading.rgb)
+                    rows = [row for row, what in enumerate(seen.classes) if what in VEHICLES]
+                    matches = match(seen.boxes[rows], seen.scores[rows], boxes, np.zeros(len(boxes), dtype=bool))
+                    found[key][name] += int(matches.found.sum())
+    return {
+        "vehicles": asked,
+        "curves": {
+            title: {
+                "at": [value for kind, value in weathers if kind == title],
+                **{
+                    name: [found[key][name] / max(asked, 1) for key in weathers if key[0] == title] for name in networks
+                },
+            }
+            for title in ("fog", *LAMPS)
+        },
+    }
+
+
+def _vehicles(labels: list[Label]) -> NDArray[np.float64]:
+    """(M, 4) boxes of the vehicles that are asked for."""
+    boxes = np.array([label.box for label in labels], dtype=float).reshape(-1, 4)
+    height = boxes[:, 3] - boxes[:, 1]
+    seen, whole, distance = (
+        np.array([getattr(label, key) for label in labels], dtype=float) for key in ("seen", "whole", "distance")
+    )
+    named = np.array([IMAGE_CLASSES[label.number] in VEHICLES for label in labels], dtype=bool)
+    asked: NDArray[np.float64] = boxes[
+        shows_enough(height, seen, whole) & named & (distance < FARTHEST) & (height >= LOWEST)
+    ]
+    return asked
+
+
+def plot_sweeps(curves: Mapping[str, Any], path: Path) -> None:
+    """The curves as a picture."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (fog, dark) = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True)
+    names = [name for name in curves["curves"]["fog"] if name != "at"]
+    for colour, name in zip(("tab:blue", "tab:orange", "tab:green"), names, strict=False):
+        data = curves["curves"]["fog"]
+        fog.plot(data["at"], data[name], "o-", color=colour, label=name)
+        for title, line in (("headlights", "-"), ("no lamps", "--")):
+            data = curves["curves"][title]
+            dark.plot(data["at"], data[name], f"o{line}", color=colour, label=f"{name}, {title}")
+    fog.set_xscale("log")
+    fog.set_xlabel("visual range [m]")
+    fog.set_ylabel(f"recall, vehicles within {FARTHEST:.0f} m (n = {curves['vehicles']})")
+    dark.set_xlabel("elevation of the sun [degrees]")
+    for axes in (fog, dark):
+        axes.grid(alpha=0.3)
+        axes.set_ylim(0.0, 1.02)
+        axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    pyplot.close(figure)
