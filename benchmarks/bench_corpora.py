@@ -114,9 +114,7 @@ def roads(maps: Path) -> None:
             started = time.perf_counter()
             network.locate(px, py)
             seconds.append(time.perf_counter() - started)
-        print(
-            f"lane lookup of {POINTS:,} points {what}: {min(seconds):.3f} s (aim: below 0.2); the best of {len(seconds)}"
-        )
+        print(f"lane lookup of {POINTS:,} points {what}: {min(seconds):.3f} s (aim: below 0.2), best of {len(seconds)}")
 
 
 def _along_lanes(network: RoadNetwork) -> Iterator[tuple[Road, int, np.ndarray]]:
