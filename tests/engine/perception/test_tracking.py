@@ -1,0 +1,228 @@
+"""Association, the life of tracks, velocities, and whether the filters know how wrong they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.stats import chi2
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
+from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
+
+DT = 0.1
+
+
+def seen(time: float, *places: tuple[float, ...], deviation: float = 0.1, names: tuple[str, ...] = ()) -> Detections:
+    """Cars at x, y and, where given, a yaw."""
+    number = len(places)
+    boxes = np.array([(x, y, 0.75, 4.6, 1.8, 1.5, *(yaw or (0.0,))) for x, y, *yaw in places]).reshape(number, 7)
+    return Detections(
+        time,
+        boxes,
+        np.full(number, 0.8),
+        names or ("car",) * number,
+        np.full((number, 2), np.nan),
+        np.tile(deviation**2 * np.eye(2), (number, 1, 1)),
+    )
+
+
+def tracker(kind: str = "cv", **settings: Any) -> Tracker:
+    return Tracker(TrackerSettings(kind=kind, **settings))
+
+
+def test_an_object_is_reported_after_n_of_m() -> None:
+    """2 of 3: seen, missed, seen is enough; seen once in three times is not."""
+    track = tracker(confirm=(2, 3))
+    assert len(track.update(seen(0.0, (0, 0)))) == 0
+    assert len(track.update(seen(0.1))) == 0
+    assert len(track.update(seen(0.2, (0, 0)))) == 1
+    track = tracker(confirm=(2, 3))
+    reported = [len(track.update(seen(t * DT, *([(0, 0)] if t % 3 == 0 else [])))) for t in range(12)]
+    assert reported == [0] * 12
+
+
+def test_one_of_one_reports_at_once() -> None:
+    assert len(tracker(confirm=(1, 1)).update(seen(0.0, (0, 0)))) == 1
+
+
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_an_object_out_of_sight_coasts_and_is_forgotten(kind: str) -> None:
+    """10 m/s eastwards, last seen at 2.0 s: half a second later it is 5 m on, its score has sunk, then it is gone."""
+    track = tracker(kind, coast=0.5)
+    for tick in range(21):
+        found = track.update(seen(tick * DT, (tick * 1.0, 0.0)))
+    assert found.scores.tolist() == [0.8]
+    scores, places, spread = [], [], []
+    for tick in range(21, 26):
+        found = track.update(seen(tick * DT))
+        scores.append(float(found.scores[0]))
+        places.append(float(found.boxes[0, 0]))
+        spread.append(float(found.covariance[0, 0, 0]))
+    np.testing.assert_allclose(places, [21, 22, 23, 24, 25], atol=0.3)
+    np.testing.assert_allclose(scores, 0.8 * np.array([0.8, 0.6, 0.4, 0.2, 0.0]), atol=1e-6)
+    assert spread == sorted(spread)
+    assert len(track.update(seen(2.6))) == 0
+
+
+def test_numbers_stay_with_objects_that_pass_each_other() -> None:
+    """Two cars pass 3 m apart in opposite directions; their order in the list changes at every tick."""
+    track = tracker()
+    side_of: dict[int, float] = {}
+    for tick in range(60):
+        east, west = (-15.0 + tick * 0.5, 0.0), (15.0 - tick * 0.5, 3.0)
+        found = track.update(seen(tick * DT, *((east, west) if tick % 2 else (west, east))))
+        if tick > 2:
+            sides = dict(zip(found.tracks, found.boxes[:, 1].tolist(), strict=True))
+            side_of = side_of or sides
+            assert sides == {number: pytest.approx(side, abs=0.5) for number, side in side_of.items()}
+    assert len(side_of) == 2
+
+
+def test_the_sum_of_distances_decides_not_the_nearest_pair() -> None:
+    """Tracks at 0 and 2.4, boxes at 2.2 and 4.0: greedy pairing would take (2.4, 2.2) and leave (0, 4.0) apart."""
+    track = tracker(confirm=(1, 1))
+    track.update(seen(0.0, (0.0, 0.0), (2.4, 0.0), deviation=1.0))
+    found = track.update(seen(DT, (4.0, 0.0), (2.2, 0.0), deviation=1.0))
+    assert sorted(found.tracks) == [1, 2]
+    assert dict(zip(found.tracks, (found.boxes[:, 0] > 2.3).tolist(), strict=True)) == {1: False, 2: True}
+
+
+def test_a_box_beyond_the_gate_begins_a_track() -> None:
+    """0.5 m off is within the gate of a standing object known to 0.1 m; 10 m off is a new object."""
+    track = tracker(confirm=(1, 1))
+    for tick in range(20):
+        track.update(seen(tick * DT, (0.0, 0.0)))
+    assert track.update(seen(2.0, (0.3, 0.0))).tracks == (1,)
+    assert track.update(seen(2.1, (10.0, 0.0))).tracks == (1, 2)
+
+
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_velocities_come_from_motion(kind: str) -> None:
+    """A circle of 20 m at 8 m/s, noise 0.1 m, boxes whose front is now here, now there."""
+    rng = np.random.default_rng(4)
+    track, errors, headings = tracker(kind), [], []
+    for tick in range(100):
+        angle = 0.4 * tick * DT
+        place = 20.0 * math.cos(angle) + rng.normal(0, 0.1), 20.0 * math.sin(angle) + rng.normal(0, 0.1)
+        yaw = angle + math.pi / 2 + math.pi * int(rng.integers(2)) + rng.normal(0, 0.03)
+        found = track.update(seen(tick * DT, (*place, yaw)))
+        if tick > 20:
+            true = 8.0 * np.array([-math.sin(angle), math.cos(angle)])
+            errors.append(float(np.linalg.norm(found.velocity[0] - true)))
+            off = float(found.boxes[0, 6]) - angle - math.pi / 2
+            headings.append(abs(math.remainder(off, 2 * math.pi)))
+    assert np.mean(errors) < {"cv": 1.2, "ctrv": 0.8}[kind]
+    assert max(headings) < 0.25
+
+
+def test_the_turn_model_knows_curves_better() -> None:
+    """The same circle, seen at 2 Hz, where constant velocity cuts the curve."""
+    means = {}
+    for kind in ("cv", "ctrv"):
+        track, errors = tracker(kind), []
+        for tick in range(60):
+            angle = 0.4 * tick * 0.5
+            found = track.update(
+                seen(tick * 0.5, (20 * math.cos(angle), 20 * math.sin(angle), angle + math.pi / 2), deviation=0.3)
+            )
+            if tick > 10:
+                place = np.array([20 * math.cos(angle), 20 * math.sin(angle)])
+                errors.append(float(np.linalg.norm(found.boxes[0, :2] - place)))
+        means[kind] = np.mean(errors)
+    assert means["ctrv"] < 0.7 * means["cv"]
+
+
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_the_filter_is_consistent(kind: str) -> None:
+    """NEES of the position over 60 simulated drives with the model's own noise, from the second second on.
+
+    Two degrees of freedom: the mean over 60 runs lies within the two-sided 99 % bounds of chi-square(120)/60
+    (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2); averaged over the instants too, well within them.
+    """
+    runs, ticks, deviation = 60, 40, 0.2
+    nees = np.zeros(ticks)
+    for run in range(runs):
+        rng = np.random.default_rng(1000 + run)
+        x, y, heading, speed, turn = 0.0, 0.0, rng.uniform(-3, 3), rng.uniform(5, 12), rng.normal(0, 0.1)
+        vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+        track = tracker(kind, confirm=(1, 1), gate=0.999999)
+        for tick in range(ticks):
+            measured = (x + rng.normal(0, deviation), y + rng.normal(0, deviation), heading + rng.normal(0, 0.1))
+            found = track.update(seen(tick * DT, measured, deviation=deviation))
+            off = found.boxes[0, :2] - (x, y)
+            nees[tick] += off @ np.linalg.solve(found.covariance[0], off) / runs
+            for _ in range(10):
+                small = DT / 10
+                if kind == "cv":
+                    vx, vy = (v + rng.normal(0, math.sqrt(ACCELERATION_DENSITY * small)) for v in (vx, vy))
+                    heading = math.atan2(vy, vx)
+                else:
+                    speed += rng.normal(0, math.sqrt(ACCELERATION_DENSITY * small))
+                    turn += rng.normal(0, math.sqrt(TURN_DENSITY * small))
+                    heading += turn * small
+                    vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+                x, y = x + vx * small, y + vy * small
+    low, high = chi2.ppf([0.005, 0.995], 2 * runs) / runs
+    settled = nees[20:]
+    assert np.mean((settled > low) & (settled < high)) > 0.9
+    assert low < settled.mean() < high
+
+
+def test_the_class_of_most_trust_wins() -> None:
+    track = tracker()
+    words = ("car", "truck", "car", "car", "truck", "car")
+    for tick, word in zip(count(), words, strict=False):
+        found = track.update(seen(tick * DT, (0.0, 0.0), names=(word,)))
+    assert found.classes == ("car",)
+
+
+def test_a_mirrored_scene_has_mirrored_tracks() -> None:
+    rng = np.random.default_rng(2)
+    path = [(tick * 0.7, 3.0 + 0.02 * tick**1.5 + rng.normal(0, 0.05), 0.1) for tick in range(30)]
+    one, other = tracker("ctrv"), tracker("ctrv")
+    for tick, (x, y, yaw) in enumerate(path):
+        left = one.update(seen(tick * DT, (x, y, yaw)))
+        right = other.update(seen(tick * DT, (x, -y, -yaw)))
+    np.testing.assert_allclose(left.boxes * (1, -1, 1, 1, 1, 1, -1), right.boxes, atol=1e-9)
+    np.testing.assert_allclose(left.velocity * (1, -1), right.velocity, atol=1e-9)
+
+
+def test_detections_without_covariance_are_tracked_too() -> None:
+    track = tracker()
+    for tick in range(5):
+        found = seen(tick * DT, (tick * 1.0, 0.0))
+        found = Detections(
+            found.time, found.boxes, found.scores, found.classes, found.velocity, found.covariance * np.nan
+        )
+        tracked = track.update(found)
+    assert np.isfinite(tracked.covariance).all()
+    assert float(tracked.velocity[0, 0]) == pytest.approx(10.0, abs=1.0)
+
+
+def test_time_does_not_run_backwards() -> None:
+    track = tracker()
+    track.update(seen(1.0, (0, 0)))
+    with pytest.raises(ValueError, match=r"0\.5 s after those of 1\.0 s"):
+        track.update(seen(0.5, (0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"kind": "ukf"}, "'none', 'cv' or 'ctrv'"),
+        ({"confirm": [3, 2]}, "3 of 2 detections can never be"),
+        ({"confirm": [0, 2]}, "greater than 0"),
+        ({"gate": 1.0}, "less than 1"),
+        ({"coast": -1}, "greater than or equal to 0"),
+    ],
+)
+def test_wrong_settings_are_told(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        TrackerSettings.model_validate(wrong)
