@@ -198,10 +198,7 @@ def test_detections_without_covariance_are_tracked_too() -> None:
     track = tracker()
     for tick in range(5):
         found = seen(tick * DT, (tick * 1.0, 0.0))
-        found = Detections(
-            found.time, found.boxes, found.scores, found.classes, found.velocity, found.covariance * np.nan
-        )
-        tracked = track.update(found)
+        tracked = track.update(replace(found, covariance=np.full((1, 2, 2), np.nan)))
     assert np.isfinite(tracked.covariance).all()
     assert float(tracked.velocity[0, 0]) == pytest.approx(10.0, abs=1.0)
 
