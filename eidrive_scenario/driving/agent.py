@@ -81,7 +81,8 @@ class Agent:
         detections = self._detections
         self._listen(inbox, now)
         if fresh is not None and not self.own_perception:
-            self._reports[self.name] = Report(self.name, detections, now)
+        state = self._state(ego)
+            self._take(Report(self.name, detections, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
         plan = None
         if self.planner is not None:
@@ -94,7 +95,7 @@ class Agent:
             fused=fused,
             plan=plan,
             control=self._control(ego, plan),
-            outbox=self._speak(ego, detections, now),
+            outbox=self._speak(state, detections, now),
             estimate=ego if self.settings.localization != "oracle" else None,
         )
 
@@ -114,15 +115,20 @@ class Agent:
                     continue
             elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
                 continue
-            held = self._reports.get(sender)
-            if held is None or message.detections.time >= held.detections.time:
-                detections = message.detections if sender == self.name else self._without_own_body(message.detections)
-                self._reports[sender] = Report(sender, detections, received.arrived)
+            detections = message.detections if sender == self.name else self._without_own_body(message.detections)
+            self._take(Report(sender, detections, received.arrived, message.state, complete=message.objects is None))
         oldest = now - self.settings.report_timeout - TIME_TOLERANCE
         for sender in [sender for sender, held in self._reports.items() if held.detections.time < oldest]:
             del self._reports[sender]
 
     def _without_own_body(self, detections: Detections) -> Detections:
+    def _take(self, report: Report) -> None:
+        """Fusion hears every report; a late one does not replace a newer one."""
+        self.fusion.hear(report)
+        held = self._reports.get(report.station)
+        if held is None or report.detections.time >= held.detections.time:
+            self._reports[report.station] = report
+
         """A report of others without the box that is this station itself: the vehicle must not brake for itself.
 
         Judged against where this station was when the report was measured, so that delay does not matter.
@@ -149,7 +155,11 @@ class Agent:
             return None
         return self.controller.parked() if plan is None else self.controller.control(ego, plan)
 
-    def _speak(self, ego: EgoState, detections: Detections, now: float) -> tuple[Message, ...]:
+    def _state(self, ego: EgoState) -> StationState:
+        x, y, z = ego.position.tolist()
+        return StationState(ego.time, x, y, z, ego.yaw, ego.speed, self.perception.pose_covariance)
+
+    def _speak(self, state: StationState, detections: Detections, now: float) -> tuple[Message, ...]:
         """The message of this tick, if it is time for one; also where nothing is in sight, as that is news too."""
         rate = self.settings.message_rate
         if rate is not None:
@@ -157,8 +167,6 @@ class Agent:
             if period <= self._periods:
                 return ()
             self._periods = period
-        x, y, z = ego.position.tolist()
-        state = StationState(ego.time, x, y, z, ego.yaw, ego.speed)
         size = cpm_size(len(detections), self._sensors)
         message = Message(self.name, self._number, now, state, detections, size)
         self._number += 1

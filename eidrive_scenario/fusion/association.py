@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
@@ -26,3 +28,23 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
         rows, columns = linear_sum_assignment(np.where(inside, distance, OUTSIDE))
     return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
+
+
+def matched(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
+    """Of the possible pairs (row, column) those chosen: as many as possible, then the least sum of costs.
+
+    Each row and column is used at most once. Where two choices are equally good, the order of the numbers decides.
+    """
+    if len(set(rows)) == len(rows) and len(set(columns)) == len(columns):
+        return list(zip(rows, columns, strict=True))
+    row_of = {row: place for place, row in enumerate(sorted(set(rows)))}
+    column_of = {column: place for place, column in enumerate(sorted(set(columns)))}
+    matrix = np.full((len(row_of), len(column_of)), OUTSIDE)
+    for row, column, cost in zip(rows, columns, costs, strict=True):
+        matrix[row_of[row], column_of[column]] = cost
+    chosen = {
+        (row, column) for row, column in zip(*(side.tolist() for side in linear_sum_assignment(matrix)), strict=True)
+    }
+    return [
+        (row, column) for row, column in zip(rows, columns, strict=True) if (row_of[row], column_of[column]) in chosen
+    ]

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, GnssReading, ImuReading, LidarReading, Readings
@@ -153,18 +152,6 @@ class Localizer:
             acceleration=float(self._imu.acceleration[0]) - acceleration_bias if self._imu is not None else 0.0,
         )
         return _moved(readings, self._ego)
-
-    def blurred(self, detections: Detections) -> Detections:
-        """Detections of now with the uncertainty of the own place and heading in their covariances."""
-        if not len(detections) or self._ego is None:
-            return detections
-        spread = self.estimate.covariance[PLANE]
-        offset = detections.boxes[:, :2] - self._ego.position[:2]
-        lever = np.zeros((len(detections), 2, 3))
-        lever[:, 0, 0] = lever[:, 1, 1] = 1.0
-        lever[:, 0, 2], lever[:, 1, 2] = -offset[:, 1], offset[:, 0]
-        added = lever @ spread @ np.swapaxes(lever, 1, 2)
-        return replace(detections, covariance=detections.covariance + added)
 
     def _first(self, truth: EgoState) -> Estimate:
         seed, *key = self._key

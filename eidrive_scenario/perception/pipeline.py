@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.perception.localization import Localizer
+from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.tracking import Tracker
 from eidrive_scenario.sensing.readings import Readings, SignalReading
+
+Array = NDArray[np.float64]
 
 TIME_TOLERANCE = 1e-9
 
@@ -37,6 +42,14 @@ class Perception:
         self._latency = latency
         self._computing: deque[tuple[float, Detections]] = deque()
 
+    @property
+    def pose_covariance(self) -> Array | None:
+        """(3, 3) of the own x, y and yaw as the station estimates them; None where it knows them exactly.
+
+        The covariances of its objects do not contain it: it is common to all of them, and tracking does not lessen it.
+        """
+        return None if self._localizer is None else self._localizer.estimate.covariance[PLANE]
+
     def locate(self, readings: Readings) -> Readings:
         """The readings as the station can know them, if it has to find out by itself where it is."""
         return readings if self._localizer is None else self._localizer.located(readings)
@@ -50,8 +63,6 @@ class Perception:
         now = readings.time
         if _has_all(readings, self.detector.needs):
             found = self.detector.detect(readings)
-            if self._localizer is not None:
-                found = self._localizer.blurred(found)
             if self._latency <= 0.0 and not self._computing:
                 return found if self._tracker is None else self._tracker.update(found)
             self._computing.append((now + self._latency, found))

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eidrive_scenario.detections import Detections
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
@@ -13,7 +16,11 @@ LineOfSight = Literal["los", "nlosv", "nlos"]
 
 @dataclass(frozen=True)
 class StationState:
-    """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s] of its own clock."""
+    """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s] of its own clock.
+
+    pose_covariance (3, 3) of x, y and yaw; it is not part of the covariances of the objects that the sender reports.
+    None: the sender knows its place exactly
+    """
 
     time: float
     x: float
@@ -21,6 +28,7 @@ class StationState:
     z: float
     yaw: float
     speed: float
+    pose_covariance: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,128 @@
+"""Late fusion by covariance intersection: every report brought to the same instant, errors of unknown correlation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat
+
+from eidrive_scenario.detections import CLASSES, Detections
+from eidrive_scenario.fusion.grouping import grouped
+from eidrive_scenario.fusion.headings import joined_heading
+from eidrive_scenario.fusion.intersection import intersect
+from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.fusion.pairs import Gate
+from eidrive_scenario.fusion.report_memory import ReportMemory
+from eidrive_scenario.fusion.tracks import Table, predicted_to
+from eidrive_scenario.settings import Settings
+
+Array = NDArray[np.float64]
+
+TIME_TOLERANCE = 1e-9
+
+
+class CovarianceIntersectionSettings(Settings):
+    """The property `fusion_settings` of this method.
+
+    gate           probability that two estimates of one object are within the gate
+    gate_distance  centres of one object are nearer than this where a report does not say how exact it is [m]
+    max_age        an object that its station has not seen for so long is forgotten, and a message that is late by more
+                   comes too late [s]
+    existence      an object is reported from this probability on that there is one
+    """
+
+    gate: float = Field(default=0.99, gt=0.0, lt=1.0)
+    gate_distance: PositiveFloat = 4.0
+    max_age: PositiveFloat = 1.0
+    existence: float = Field(default=0.5, ge=0.0, le=1.0)
+
+
+class CovarianceIntersectionFusion(FusionMethod):
+    """Keeps tracks of every station's objects, brings all to the present, and joins those of one object.
+
+    Within a station, reports follow each other in the order of measurement, however they arrive (see ReportMemory).
+    Between stations, nobody knows how errors depend on each other: the same model of motion, the same map, the same
+    look of an object from a like direction. Covariance intersection is right for any dependence, and so does not count
+    twice what it hears twice. Stations are taken in the order of their names; each object takes one track of a station
+    at most, as a station reports different objects.
+    """
+
+    settings_type: ClassVar[type[Settings] | None] = CovarianceIntersectionSettings
+
+    def __init__(self, settings: CovarianceIntersectionSettings | None = None) -> None:
+        self.settings = settings or CovarianceIntersectionSettings()
+        self._gate = Gate.of(self.settings.gate, self.settings.gate_distance)
+        self._memory = ReportMemory(self.settings.max_age, self._gate)
+
+    def hear(self, report: Report) -> None:
+        self._memory.hear(report)
+
+    def fuse(self, reports: Sequence[Report], now: float) -> Detections:
+        tracks = self._memory.tracks()
+        names = self._memory.stations
+        rank = {name: place for place, name in enumerate(sorted({report.station for report in reports}))}
+        station = np.array([rank.get(name, -1) for name in names], dtype=np.int64)[tracks["station"]]
+        rows = np.flatnonzero((station >= 0) & (now - tracks["seen"] <= self.settings.max_age + TIME_TOLERANCE))
+        if not len(rows):
+            return Detections(now)
+        rows = rows[np.argsort(station[rows], kind="stable")]
+        present = predicted_to(tracks[rows], np.full(len(rows), now))
+        present["station"] = station[rows]
+        objects = grouped(present, self._gate)
+        return _joined(present, objects, now, self.settings.existence)
+
+
+def _joined(tracks: Table, objects: list[list[int]], now: float, least: float) -> Detections:
+    """One box per object that is likely enough."""
+    rows = np.array([row for members in objects for row in members], dtype=np.intp)
+    starts = np.cumsum([0, *(len(members) for members in objects[:-1])])
+    members = tracks[rows]
+    existence = 1.0 - np.multiply.reduceat(1.0 - members["existence"], starts)
+    mean, covariance = _intersected(tracks, objects)
+    known = np.logical_or.reduceat(members["moving"], starts)
+    velocity = np.where(known[:, None], mean[:, 1], np.nan)
+    weights = np.maximum(members["score"], 1e-6)
+    shares = weights / np.repeat(np.add.reduceat(weights, starts), [len(group) for group in objects])
+    body = np.add.reduceat(shares[:, None] * members["body"], starts, axis=0)
+    boxes = np.empty((len(objects), 7))
+    boxes[:, :2], boxes[:, 2:6] = mean[:, 0], body
+    boxes[:, 6] = joined_heading(members["heading"][:, 0], weights, starts, velocity)
+    votes = members["votes"] / np.maximum(members["votes"].sum(axis=1, keepdims=True), 1e-12)
+    words = np.argmax(np.add.reduceat(weights[:, None] * votes, starts, axis=0), axis=1)
+    fused = Detections(
+        now,
+        boxes,
+        1.0 - np.multiply.reduceat(1.0 - members["score"], starts),
+        tuple(CLASSES[word] for word in words.tolist()),
+        velocity,
+        covariance,
+    )
+    likely = np.flatnonzero(existence >= least)
+    return fused if len(likely) == len(fused) else fused.subset(likely.tolist())
+
+
+def _intersected(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]:
+    """Positions and velocities (G, 2, 2) of the objects, and the covariances of their positions (G, 2, 2).
+
+    Position and velocity are intersected each for itself, as their units do not compare. Members are joined in pairs,
+    then those pairs, and so on: any order is consistent.
+    """
+    mean = tracks["mean"].reshape(-1, 2, 2)
+    covariance = np.empty((len(tracks), 2, 2, 2))
+    covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
+    covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
+    groups = objects
+    while any(len(members) > 1 for members in groups):
+        first = [row for members in groups for row in members[: len(members) // 2 * 2 : 2]]
+        second = [row for members in groups for row in members[1::2]]
+        joined, spread, _ = intersect(mean[first], covariance[first], mean[second], covariance[second])
+        fresh = iter(range(len(mean), len(mean) + len(first)))
+        groups = [
+            [next(fresh) for _ in range(len(members) // 2)] + members[len(members) // 2 * 2 :] for members in groups
+        ]
+        mean, covariance = np.concatenate([mean, joined]), np.concatenate([covariance, spread])
+    final = [members[0] for members in groups]
+    return mean[final], covariance[final, 0]

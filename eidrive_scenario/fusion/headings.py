@@ -1,0 +1,82 @@
+"""Headings: filtered over time, joined on the circle, front and back told apart."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.motion_models import HEADING_DEVIATION, TURN_DENSITY, UNKNOWN_TURN
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT = 2.0
+"""A turn rate counts as known from so many of its standard deviations on; below, the object is taken to go straight."""
+FORGETTING = 0.8
+"""Of the votes for one end as the front, from report to report."""
+
+
+def first_heading(yaw: Array) -> tuple[Array, Array]:
+    """Headings (N, 2), yaw and its rate, seen for the first time, and their covariances (N, 3): of yaw, both, rate."""
+    covariance = np.tile([HEADING_DEVIATION**2, 0.0, UNKNOWN_TURN**2], (len(yaw), 1))
+    return np.stack([yaw, np.zeros(len(yaw))], axis=1), covariance
+
+
+def predicted_heading(heading: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
+    """The same `step` (N,) seconds later: constant rate, white noise on it."""
+    noise = TURN_DENSITY * np.abs(step)
+    later = np.empty_like(covariance)
+    own, both, rate = covariance[:, 0], covariance[:, 1], covariance[:, 2]
+    later[:, 0] = own + step * (2.0 * both + step * (rate + noise / 3.0))
+    later[:, 1] = both + step * (rate + 0.5 * noise)
+    later[:, 2] = rate + noise
+    moved = heading.copy()
+    moved[:, 0] += step * heading[:, 1]
+    return moved, later
+
+
+def known_turn(heading: Array, covariance: Array) -> Array:
+    """(N,) turn rates [rad/s], 0 where too little is known of them."""
+    rate = heading[:, 1]
+    return np.where(rate * rate > SIGNIFICANT**2 * covariance[:, 2], rate, 0.0)
+
+
+def updated_heading(heading: Array, covariance: Array, facing: Array, yaw: Array) -> tuple[Array, Array, Array]:
+    """Heading, covariance and `facing` (N,) after a box was measured with this yaw (N,).
+
+    A box tells its axis; which end is the front is a vote of the reports, and may change.
+    """
+    off = wrap_angle(yaw - heading[:, 0])
+    against = np.abs(off) > math.pi / 2.0
+    off = np.where(against, off - np.copysign(math.pi, off), off)
+    spread = covariance[:, 0] + HEADING_DEVIATION**2
+    gain, rate_gain = covariance[:, 0] / spread, covariance[:, 1] / spread
+    corrected = heading + np.stack([gain * off, rate_gain * off], axis=1)
+    left = 1.0 - gain
+    after = np.stack(
+        [left * covariance[:, 0], left * covariance[:, 1], covariance[:, 2] - rate_gain * covariance[:, 1]], axis=1
+    )
+    votes = FORGETTING * facing + np.where(against, -1.0, 1.0)
+    corrected[:, 0] = wrap_angle(np.where(votes < 0.0, corrected[:, 0] + math.pi, corrected[:, 0]))
+    return corrected, after, np.abs(votes)
+
+
+def joined_heading(yaw: Array, weights: Array, starts: NDArray[np.intp], velocity: Array) -> Array:
+    """(G,) one heading for each group of consecutive headings (K,) that begins at `starts` (G,), in (-pi, pi].
+
+    The axis is the weighted mean on the circle of doubled angles, so that it does not matter which end a report took
+    for the front. The front is where the greater weight says it is; where both ends have the same, where the object
+    drives to, `velocity` (G, 2), NaN where unknown.
+    """
+    doubled = np.stack([weights * np.cos(2.0 * yaw), weights * np.sin(2.0 * yaw)], axis=1)
+    sums = np.add.reduceat(doubled, starts, axis=0)
+    axis = 0.5 * np.arctan2(sums[:, 1], sums[:, 0])
+    counts = np.diff(np.append(starts, len(yaw)))
+    votes = np.add.reduceat(weights * np.sign(np.cos(yaw - np.repeat(axis, counts))), starts)
+    total = np.add.reduceat(weights, starts)
+    ahead = velocity[:, 0] * np.cos(axis) + velocity[:, 1] * np.sin(axis)
+    split = (np.abs(votes) < 1e-9 * total) & np.isfinite(ahead)
+    front = np.where(split, ahead, votes)
+    return np.where(counts > 1, wrap_angle(np.where(front < 0.0, axis + math.pi, axis)), yaw[starts])

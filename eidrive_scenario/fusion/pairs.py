@@ -1,0 +1,122 @@
+"""Pairs of estimates that may be of one object."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from eidrive_scenario.fusion.association import matched
+
+Array = NDArray[np.float64]
+Table = NDArray[np.void]
+Integers = NDArray[np.intp]
+
+LEFT_OVER = float(chi2.isf(1e-6, 2))
+"""One true pair in a hundred lies beyond a gate of 99 %, which would make two objects of one many times a second. What
+finds no partner within the gate is paired up to this squared Mahalanobis distance."""
+CERTAIN = -1e3
+"""Cost of a pair whose station says that both are the same object: less than any other."""
+
+
+class Gate(NamedTuple):
+    """When two positions may be of one object.
+
+    chi_square  squared Mahalanobis distance at most
+    distance    where one of the two does not say how exact it is: between the centres at most [m]
+    """
+
+    chi_square: float
+    distance: float
+
+    @classmethod
+    def of(cls, probability: float, distance: float) -> Gate:
+        """The gate that holds an estimate of the same object with this probability; in the plane, chi-square of 2."""
+        return cls(float(chi2.ppf(probability, 2)), distance)
+
+
+class Pairs(NamedTuple):
+    """Rows of the first and of the second table, what it costs to take both for one object, and whether that is within
+    the gate, or only for want of another partner."""
+
+    first: list[int]
+    second: list[int]
+    cost: list[float]
+    inside: list[bool]
+
+
+def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool) -> Pairs:
+    """Pairs of tracks that may be one object: of the same station, or the second of a later one than the first.
+
+    They may by the gate, by the station's own number, or because the centre of one lies within half a width of the
+    other: two bodies cannot be in one place, however sure their reporters are that they stand apart. The cost is the
+    negative log-likelihood of the offset, but for constants.
+    """
+    own, other = _spread(first), _spread(second)
+    dx = first["mean"][:, 0, None] - second["mean"][None, :, 0]
+    dy = first["mean"][:, 1, None] - second["mean"][None, :, 1]
+    reach = math.sqrt(max(gate.chi_square, LEFT_OVER))
+    limit = _reach(first, own, reach, gate)[:, None] + _reach(second, other, reach, gate)[None, :]
+    near = dx * dx + dy * dy <= limit * limit
+    numbered = None
+    if same_station:
+        stations = first["station"][:, None] == second["station"][None, :]
+        near &= stations
+        numbered = stations & (first["number"][:, None] == second["number"][None, :]) & (second["number"] >= 0)
+        near |= numbered
+    else:
+        near &= first["station"][:, None] < second["station"][None, :]
+    rows, columns = np.nonzero(near)
+    if not len(rows):
+        return Pairs([], [], [], [])
+    x, y, spread = dx[rows, columns], dy[rows, columns], own[rows] + other[columns]
+    xx, xy, yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
+    determinant = xx * yy - xy * xy
+    mahalanobis = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
+    square = x * x + y * y
+    vague = first["vague"][rows] | second["vague"][columns]
+    inside = np.where(vague, square < gate.distance**2, mahalanobis <= gate.chi_square)
+    narrower = np.minimum(first["body"][rows, 2], second["body"][columns, 2])
+    inside |= square < 0.25 * narrower * narrower
+    cost = mahalanobis + np.log(determinant)
+    if numbered is not None:
+        certain = numbered[rows, columns]
+        inside |= certain
+        cost[certain] = CERTAIN
+    fits = inside | (~vague & (mahalanobis <= LEFT_OVER))
+    return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
+
+
+def matched_pairs(pairs: Pairs) -> list[tuple[int, int]]:
+    """Those chosen: first within the gate, then among the rows that are left over."""
+    if all(pairs.inside):
+        return matched(pairs.first, pairs.second, pairs.cost)
+    chosen = (
+        matched(*zip(*(pair[:3] for pair in zip(*pairs, strict=True) if pair[3]), strict=True))
+        if any(pairs.inside)
+        else []
+    )
+    rows, columns = {row for row, _ in chosen}, {column for _, column in chosen}
+    rest = [
+        (row, column, cost)
+        for row, column, cost in zip(pairs.first, pairs.second, pairs.cost, strict=True)
+        if row not in rows and column not in columns
+    ]
+    return chosen + matched(*zip(*rest, strict=True)) if rest else chosen
+
+
+def _spread(tracks: Table) -> Array:
+    """(N, 2, 2) covariance of the position."""
+    spread: Array = tracks["covariance"][:, :2, :2] + tracks["pose"]
+    return spread
+
+
+def _reach(tracks: Table, spread: Array, reach: float, gate: Gate) -> Array:
+    """(N,) the farthest that any of the rules can take this side of a pair [m]."""
+    statistical = reach * np.sqrt(spread[:, 0, 0] + spread[:, 1, 1])
+    return np.where(
+        tracks["vague"], np.maximum(statistical, gate.distance), np.maximum(statistical, tracks["body"][:, 2])
+    )

@@ -1,0 +1,45 @@
+"""Where an object will be: constant velocity, or a turn of constant rate, each track by a step of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY
+
+Array = NDArray[np.float64]
+
+
+def predicted(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+    """States (N, 4) x y vx vy and covariances (N, 4, 4), each `step` (N,) [s] later, turning by `turn` (N,) [rad/s].
+
+    White noise acceleration, and the coordinated turn of a known rate (Bar-Shalom, Li and Kirubarajan, Estimation with
+    applications to tracking and navigation, 2001, sections 6.3.2 and 11.7.1). A step may be negative, where a clock is
+    fast; then uncertainty grows as much.
+    """
+    forward = np.zeros(covariance.shape)
+    forward[:, 0, 0] = forward[:, 1, 1] = forward[:, 2, 2] = forward[:, 3, 3] = 1.0
+    forward[:, 0, 2] = forward[:, 1, 3] = step
+    if turn.any():
+        angle = turn * step
+        cos, sin = np.cos(angle), np.sin(angle)
+        chord = step * np.sinc(angle / np.pi)
+        aside = 0.5 * angle * step * np.sinc(0.5 * angle / np.pi) ** 2
+        forward[:, 0, 2] = forward[:, 1, 3] = chord
+        forward[:, 0, 3], forward[:, 1, 2] = -aside, aside
+        forward[:, 2, 2] = forward[:, 3, 3] = cos
+        forward[:, 2, 3], forward[:, 3, 2] = -sin, sin
+    later = forward @ covariance @ np.swapaxes(forward, 1, 2)
+    length = np.abs(step)
+    noise = ACCELERATION_DENSITY * length
+    later[:, 2, 2] += noise
+    later[:, 3, 3] += noise
+    cross = 0.5 * noise * step
+    later[:, 0, 2] += cross
+    later[:, 1, 3] += cross
+    later[:, 2, 0] += cross
+    later[:, 3, 1] += cross
+    own = noise * length * length / 3.0
+    later[:, 0, 0] += own
+    later[:, 1, 1] += own
+    return (forward @ mean[:, :, None])[:, :, 0], later

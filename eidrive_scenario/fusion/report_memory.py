@@ -1,0 +1,101 @@
+"""Reports in the order in which they were measured, however late they arrive: roll back, and filter again."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.fusion.pairs import Gate
+from eidrive_scenario.fusion.tracks import TRACK, Table, advanced
+
+
+class _Entry(NamedTuple):
+    """A report of one station, and a table that holds the station's tracks just after it."""
+
+    report: Report
+    tracks: Table
+
+
+@dataclass
+class _History:
+    """What is remembered of one station; nothing before `begin` [s], and that not any more."""
+
+    entries: list[_Entry] = field(default_factory=list)
+    new: list[Report] = field(default_factory=list)
+    begin: float = -math.inf
+
+
+class ReportMemory:
+    """The tracks of every station as its reports make them, and the reports of the last `span` seconds.
+
+    A report older than another of its station rolls the station's tracks back to the last report before it, and takes
+    in anew what came after: the result is that of reports which arrive in the order of their measurement. This is the
+    exact treatment of out-of-sequence measurements, paid for with memory (Bar-Shalom, Update with out-of-sequence
+    measurements in tracking: exact solution, IEEE Transactions on Aerospace and Electronic Systems 38, 2002). One that
+    is older than all that is remembered comes too late. Of two of one instant the one that arrives last counts.
+    """
+
+    def __init__(self, span: float, gate: Gate) -> None:
+        self.span = span
+        self.stations: list[str] = []
+        """In the order in which they were first heard; rows of `tracks` name them by their place here."""
+        self._gate = gate
+        self._tracks: Table = np.zeros(0, TRACK)
+        self._histories: list[_History] = []
+
+    def hear(self, report: Report) -> None:
+        """Remember a report; it enters the tracks when they are next asked for."""
+        if report.station not in self.stations:
+            self.stations.append(report.station)
+            self._histories.append(_History())
+        self._histories[self.stations.index(report.station)].new.append(report)
+
+    def tracks(self) -> Table:
+        """What all reports so far say, a row for each object of each station, as of its station's newest report."""
+        due = {
+            station: reports
+            for station, history in enumerate(self._histories)
+            if history.new and (reports := self._due(station, history))
+        }
+        while due:
+            self._advance(list(due), [reports[0] for reports in due.values()])
+            due = {station: reports[1:] for station, reports in due.items() if len(reports) > 1}
+        return self._tracks
+
+    def _due(self, station: int, history: _History) -> Sequence[Report]:
+        """The reports that have yet to enter the tracks of a station, in order; what came after them is rolled back."""
+        reports = [entry.report for entry in history.entries]
+        kept = len(reports)
+        for report in history.new:
+            time = report.detections.time
+            if not history.begin < time < math.inf:
+                continue
+            place = bisect_left(reports, time, key=lambda held: held.detections.time)
+            again = place < len(reports) and reports[place].detections.time == time
+            reports[place : place + again] = [report]
+            kept = min(kept, place)
+        history.new.clear()
+        if kept < len(history.entries):
+            before = history.entries[kept - 1].tracks if kept else self._tracks[:0]
+            others = self._tracks[self._tracks["station"] != station]
+            self._tracks = np.concatenate([others, before[before["station"] == station]])
+            del history.entries[kept:]
+        return reports[kept:]
+
+    def _advance(self, stations: list[int], reports: list[Report]) -> None:
+        self._tracks = advanced(self._tracks, stations, reports, self._gate, self.span)
+        for station, report in zip(stations, reports, strict=True):
+            history = self._histories[station]
+            history.entries.append(_Entry(report, self._tracks))
+            while (
+                len(history.entries) > 1
+                and history.entries[1].report.detections.time < report.detections.time - self.span
+            ):
+                del history.entries[0]
+                history.begin = history.entries[0].report.detections.time

@@ -1,0 +1,196 @@
+"""What one station has said of each object so far: a table of estimates, a row per station and object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.detections import CLASSES
+from eidrive_scenario.fusion.headings import first_heading, known_turn, predicted_heading, updated_heading
+from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.fusion.pairs import Gate, likely_pairs, matched_pairs
+from eidrive_scenario.fusion.prediction import predicted
+from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
+from eidrive_scenario.perception.tracking import LEAST_DEVIATION, UNKNOWN_DEVIATION
+
+Array = NDArray[np.float64]
+Table = NDArray[np.void]
+
+TRACK = np.dtype(
+    [
+        ("station", "i8"),
+        ("number", "i8"),  # the station's own for the object, -1 where it has none
+        ("time", "f8"),  # of the estimate [s]
+        ("seen", "f8"),  # when the station last saw the object [s]
+        ("mean", "f8", (4,)),  # x y vx vy [m, m/s]
+        ("covariance", "f8", (4, 4)),
+        ("pose", "f8", (2, 2)),  # of x y, from where the station may really have been [m²]
+        ("vague", "?"),  # the station does not say how exact its positions are
+        ("moving", "?"),  # the velocity is known
+        ("body", "f8", (4,)),  # z l w h [m]
+        ("weight", "f8"),  # of the body: the sum of scores
+        ("heading", "f8", (2,)),  # yaw and its rate [rad, rad/s]
+        ("heading_covariance", "f8", (3,)),  # of yaw, both, rate
+        ("facing", "f8"),  # how sure the front is the front
+        ("score", "f8"),
+        ("existence", "f8"),  # probability that there is such an object
+        ("votes", "f8", (len(CLASSES),)),
+    ]
+)
+
+DETECTION = 0.9
+"""Probability that a station which saw an object before sees it again."""
+LEAST_EXISTENCE = 0.05
+"""Below this an object is given up."""
+MOST_WEIGHT = 10.0
+"""So many sure reports of the size count at most, so that it can still change."""
+_ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
+_MISC = _ROW_OF_CLASS["misc"]
+
+
+def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
+    """The objects of reports, a row each in their order, as if nothing had been known of them before.
+
+    A box that is not finite, or has no size, is left out.
+    """
+    lists = [report.detections for report in reports]
+    boxes = np.concatenate([found.boxes for found in lists])
+    counts = [len(found) for found in lists]
+    table = np.zeros(len(boxes), TRACK)
+    table["station"] = np.repeat(stations, counts)
+    table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
+    table["number"] = [number for found in lists for number in (found.tracks or (-1,) * len(found))]
+    table["mean"][:, :2] = boxes[:, :2]
+    table["body"] = boxes[:, 2:6]
+    scores = np.clip(np.concatenate([found.scores for found in lists]), 0.0, 1.0)
+    table["score"] = table["weight"] = table["existence"] = scores
+    velocity = np.concatenate([found.velocity for found in lists])
+    moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
+    table["moving"] = moving
+    table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
+    covariance = table["covariance"]
+    table["vague"], covariance[:, :2, :2] = _position_noise(np.concatenate([found.covariance for found in lists]))
+    covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
+    table["heading"], table["heading_covariance"] = first_heading(boxes[:, 6])
+    table["facing"] = 1.0
+    names = [_ROW_OF_CLASS.get(name, _MISC) for found in lists for name in found.classes]
+    table["votes"][np.arange(len(table)), names] = scores
+    start = 0
+    for report, count in zip(reports, counts, strict=True):
+        if count and report.state is not None and report.state.pose_covariance is not None:
+            rows = table[start : start + count]
+            rows["pose"] = pose_part(rows["mean"][:, :2], report.state.x, report.state.y, report.state.pose_covariance)
+        start += count
+    usable = np.isfinite(boxes).all(axis=1) & (boxes[:, 3:6] > 0.0).all(axis=1) & np.isfinite(scores)
+    return table if usable.all() else table[usable]
+
+
+def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
+    """(N, 2, 2) what the covariance (3, 3) of a station's x, y, yaw at (x, y) adds to points (N, 2) that it measured.
+
+    J P Jᵀ with J = [I | R'(ψ) p] for p in the station's frame, here by the points in the world: R'(ψ) p is the arm from
+    the station to the point, turned by a right angle.
+    """
+    jacobian = np.zeros((len(points), 2, 3))
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+    jacobian[:, 0, 2], jacobian[:, 1, 2] = y - points[:, 1], points[:, 0] - x
+    return np.asarray(jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
+
+
+def predicted_to(tracks: Table, time: Array) -> Table:
+    """The tracks at other times (N,) [s]."""
+    later = tracks.copy()
+    step = time - tracks["time"]
+    turn = known_turn(tracks["heading"], tracks["heading_covariance"])
+    later["mean"], later["covariance"] = predicted(tracks["mean"], tracks["covariance"], step, turn)
+    later["heading"], later["heading_covariance"] = predicted_heading(
+        tracks["heading"], tracks["heading_covariance"], step
+    )
+    later["time"] = time
+    return later
+
+
+def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: Gate, max_age: float) -> Table:
+    """The tracks after one report of each of these stations, none of which is older than what is known of it.
+
+    What a station has not seen for `max_age` seconds it does not know any more. Tracks of other stations stay as they
+    are. A report with velocities replaces what was known: its sender has seen the object over time, and to filter it
+    again would count its past twice. Positions alone go through a Kalman filter.
+    """
+    born = first_seen(stations, reports)
+    time_of = {station: report.detections.time for station, report in zip(stations, reports, strict=True)}
+    times = np.array([time_of.get(station, np.nan) for station in tracks["station"].tolist()])
+    concerned = np.isfinite(times)
+    recent = concerned & (times - tracks["seen"] <= max_age)
+    old = predicted_to(tracks[recent], times[recent])
+    pairs = matched_pairs(likely_pairs(old, born, gate, same_station=True))
+    rows = np.array([row for row, _ in pairs], dtype=np.intp)
+    columns = np.array([column for _, column in pairs], dtype=np.intp)
+    missed = np.ones(len(old), dtype=bool)
+    missed[rows] = False
+    fresh = np.ones(len(born), dtype=bool)
+    fresh[columns] = False
+    old[rows] = _updated(old[rows], born[columns])
+    if missed.any():
+        tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
+        silent = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
+        _miss(old, missed, tracked, silent)
+        old = old[old["existence"] >= LEAST_EXISTENCE]
+    parts = [part for part in (tracks[~concerned], old, born[fresh]) if len(part)]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else tracks[:0]
+
+
+def _updated(old: Table, new: Table) -> Table:
+    """Tracks, predicted to the time of a report, with the boxes `new` of that report."""
+    after = new.copy()
+    still = ~new["moving"]
+    if still.any():
+        mean, covariance = _filtered(old[still], new[still])
+        after["mean"][still], after["covariance"][still] = mean, covariance
+        after["moving"][still] = True
+    after["heading"], after["heading_covariance"], after["facing"] = updated_heading(
+        old["heading"], old["heading_covariance"], old["facing"], new["heading"][:, 0]
+    )
+    weight = np.minimum(old["weight"], MOST_WEIGHT)
+    total = weight + new["weight"]
+    share = np.divide(new["weight"], total, out=np.zeros(len(total)), where=total > 0.0)
+    after["body"] = old["body"] + share[:, None] * (new["body"] - old["body"])
+    after["weight"] = total
+    after["existence"] = 1.0 - (1.0 - old["existence"]) * (1.0 - new["existence"])
+    after["votes"] = old["votes"] + new["votes"]
+    return after
+
+
+def _filtered(old: Table, new: Table) -> tuple[Array, Array]:
+    """Kalman's update by the positions of `new`, in Joseph's form."""
+    covariance, noise = old["covariance"], new["covariance"][:, :2, :2]
+    gain = covariance[:, :, :2] @ np.linalg.inv(covariance[:, :2, :2] + noise)
+    innovation = new["mean"][:, :2] - old["mean"][:, :2]
+    rest = np.broadcast_to(np.eye(4), covariance.shape).copy()
+    rest[:, :, :2] -= gain
+    after = rest @ covariance @ np.swapaxes(rest, 1, 2) + gain @ noise @ np.swapaxes(gain, 1, 2)
+    return old["mean"] + (gain @ innovation[:, :, None])[:, :, 0], after
+
+
+def _miss(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: set[int]) -> None:
+    """Objects that a report does not show: they may be gone. A station that tracks has judged that itself."""
+    for row in np.flatnonzero(missed).tolist():
+        station = int(tracks["station"][row])
+        if station in silent:
+            continue
+        before = min(float(tracks["existence"][row]), 0.999)
+        after = 0.0 if station in tracked else before * (1.0 - DETECTION) / (1.0 - before * DETECTION)
+        tracks["existence"][row] = after
+        tracks["score"][row] *= after / before if before > 0.0 else 0.0
+
+
+def _position_noise(covariance: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Which covariances (N, 2, 2) are unknown, and all of them with a value for those, and for those that are too small
+    to be true."""
+    vague: NDArray[np.bool_] = ~np.isfinite(covariance.sum(axis=(1, 2)))
+    noise = np.where(vague[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
+    thin = np.minimum(noise[:, 0, 0], noise[:, 1, 1]) < LEAST_DEVIATION**2
+    noise[thin] += LEAST_DEVIATION**2 * np.eye(2)
+    return vague, noise
