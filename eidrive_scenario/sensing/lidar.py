@@ -7,13 +7,16 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
 from eidrive_scenario.sensing.settings import LidarSettings
-from eidrive_scenario.sensing.truth import crossing, past_box
+from eidrive_scenario.sensing.truth import crossing
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
 
@@ -21,46 +24,89 @@ Array = NDArray[np.float64]
 class Lidar:
     """Rings of rays; each reading covers what the head has turned since the last one, at most one revolution.
 
-    All rays of a reading start from the pose at its time: the motion during a revolution does not bend the sweep.
-    The intensity of a return is exp(-attenuation · distance). Rays that meet the own body give no return; a mast is too
-    thin to take the ground around it from the head on its top.
+    All rays of a reading start from the pose at its time: the motion during a revolution does not bend the sweep. Rays
+    that meet the own body give no return. What is random is drawn by seed, station, name and tick.
     """
 
-    def __init__(self, settings: LidarSettings, spec: ActorSpec) -> None:
+    def __init__(self, settings: LidarSettings, spec: ActorSpec, name: str = "lidar", seed: int = 0) -> None:
         self.settings = settings
         self.mounting = mounting(settings, spec, "roof")
-        self._elevations = np.radians(np.linspace(settings.upper_fov, settings.lower_fov, settings.channels))
-        self._on_mast = spec.wheelbase <= 0.0
+        rings = settings.elevations or np.linspace(settings.upper_fov, settings.lower_fov, settings.channels)
+        self._elevations = np.radians(rings)
         self._columns_per_second = settings.points_per_second / settings.channels
         self._columns_per_turn = max(1, round(self._columns_per_second / settings.rotation))
         self._next: int | None = None
         """The first column that no reading has covered."""
+        self._key = (seed, "lidar", spec.name, name)
 
     def directions(self, time: float) -> Array:
         """(M, 3) unit vectors in the sensor frame of the rays since the last reading; moves the head on."""
-        end = round(time * self._columns_per_second) + 1
-        first = end - self._columns_per_turn if self._next is None else max(self._next, end - self._columns_per_turn)
-        self._next = end
-        azimuths = np.arange(first, end) * (2.0 * math.pi / self._columns_per_turn)
-        azimuth, elevation = (grid.ravel() for grid in np.meshgrid(azimuths, self._elevations, indexing="ij"))
-        flat = np.cos(elevation)
-        return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=1)
+        return self._rays(self._columns(time))[0]
 
     def read(self, scene: Scene, view: WorldView, row: int) -> LidarReading:
         """A sweep from the actor in this row."""
+        settings = self.settings
         pose = self.mounting.pose(view, row)
-        directions = self.directions(view.time)
+        directions, ring, azimuth = self._rays(self._columns(view.time))
+        ways = directions @ pose[:3, :3].T
         origin = np.broadcast_to(pose[:3, 3], directions.shape)
-        targets = origin + self.settings.range * directions @ pose[:3, :3].T
-        own = view.boxes[row][None]
-        if self._on_mast:
-            starts, clear = past_box(origin[None], targets[None], own)[0], np.ones(len(origin), dtype=bool)
-        else:
-            enter, leave = crossing(origin[None], targets[None], own)
-            starts, clear = origin, ~((enter < leave) & (leave > 0.0))[0]
-        hits = scene.cast(np.ascontiguousarray(starts[clear]), targets[clear])
-        met = np.asarray(hits.rows) != NOTHING
-        begin = np.linalg.norm(starts[clear][met] - pose[:3, 3], axis=1) / self.settings.range
-        distance = (begin + np.asarray(hits.fraction)[met] * (1.0 - begin)) * self.settings.range
-        points = directions[clear][met] * distance[:, None]
-        return LidarReading(points, np.exp(-self.settings.attenuation * distance), pose)
+        targets = origin + settings.range * ways
+        enter, leave = crossing(origin[None], targets[None], view.boxes[row][None])
+        clear = np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
+        hits = scene.cast(np.ascontiguousarray(origin[clear]), targets[clear])
+        rows = np.asarray(hits.rows)
+        met = rows != NOTHING
+        distance = np.where(met, np.asarray(hits.fraction) * settings.range, np.inf)
+        weather = scene.weather
+        facing = np.abs(np.einsum("mi,mi->m", np.asarray(hits.normal), ways[clear]))
+        seed, *key = self._key
+        draws = generator(seed, *key, view.tick)
+        back = returns(
+            distance,
+            reflectivity(rows, view.categories, weather.wetness) * facing,
+            weather if settings.weather else _CLEAR,
+            attenuation=settings.attenuation,
+            ten_percent_range=settings.ten_percent_range,
+            draws=draws,
+        )
+        kept = np.flatnonzero(back.found & self._not_dropped(back.intensity, draws))
+        length = back.distance[kept]
+        if settings.range_noise > 0.0:
+            length = np.maximum(length + settings.range_noise * draws.standard_normal(len(kept)), 0.0)
+        chosen = clear[kept]
+        return LidarReading(
+            directions[chosen] * length[:, None], back.intensity[kept], pose, ring[chosen], azimuth[chosen]
+        )
+
+    def _columns(self, time: float) -> NDArray[np.int64]:
+        """The numbers of the columns since the last reading."""
+        end = round(time * self._columns_per_second) + 1
+        first = end - self._columns_per_turn if self._next is None else max(self._next, end - self._columns_per_turn)
+        self._next = end
+        return np.arange(first, end)
+
+    def _rays(self, columns: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32], Array]:
+        """Directions (M, 3) in the sensor frame, rings (M,) and azimuths (M,) in (-pi, pi] of the rays of columns."""
+        turn = self._columns_per_turn
+        behind = (columns * 2 + turn) % (2 * turn) - turn
+        azimuths = np.where(behind == -turn, turn, behind) * (math.pi / turn)
+        if self.settings.field_of_view < 360.0:
+            azimuths = azimuths[np.abs(azimuths) <= math.radians(self.settings.field_of_view) / 2.0 + 1e-9]
+        azimuth = np.repeat(azimuths, len(self._elevations))
+        elevation = np.tile(self._elevations, len(azimuths))
+        flat = np.cos(elevation)
+        directions = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=1)
+        return directions, np.tile(np.arange(len(self._elevations), dtype=np.int32), len(azimuths)), azimuth
+
+    def _not_dropped(self, intensity: Array, draws: np.random.Generator) -> NDArray[np.bool_]:
+        settings = self.settings
+        lost = np.full(len(intensity), settings.dropoff)
+        if settings.dropoff_intensity > 0.0:
+            dark = settings.dropoff_dark * np.maximum(1.0 - intensity / settings.dropoff_intensity, 0.0)
+            lost = 1.0 - (1.0 - lost) * (1.0 - dark)
+        elif settings.dropoff == 0.0:
+            return np.ones(len(intensity), dtype=bool)
+        return np.asarray(draws.random(len(intensity)) >= lost)
+
+
+_CLEAR = Weather(visual_range=1e12)

@@ -60,11 +60,17 @@ class CameraReading:
 
 @dataclass(frozen=True)
 class LidarReading:
-    """A LiDAR sweep: points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world."""
+    """A LiDAR sweep.
+
+    points (N, 3) in the sensor frame [m], intensity (N,) in [0, 1]; pose (4, 4) sensor to world; ring (N,) number of
+    the channel, 0 the highest; azimuth (N,) of the head at the measurement, from the sensor's x axis to the left [rad]
+    """
 
     points: Array
     intensity: Array
     pose: Array
+    ring: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    azimuth: Array = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,26 @@ import math
 from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.sensing.camera import Camera
+from eidrive_scenario.sensing.inertial import Gnss, Imu
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.scene import Scene
-from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings, TruthSettings
+from eidrive_scenario.sensing.settings import (
+    CameraSettings,
+    GnssSettings,
+    ImuSettings,
+    LidarSettings,
+    SensorSettings,
+    TruthSettings,
+)
 from eidrive_scenario.sensing.truth import TruthSensor, read_truth
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 
-Sensor = TruthSensor | Camera | Lidar
+Sensor = TruthSensor | Camera | Lidar | Gnss | Imu
+
+_SINGLE = {TruthSensor: "truth sensor", Gnss: "GNSS receiver", Imu: "inertial unit"}
+"""Of these a station has at most one."""
 
 
 class Rig:
@@ -22,7 +33,7 @@ class Rig:
 
     `seed` is that of the noise of all sensors.
 
-    Raises ValueError if there is more than one truth sensor.
+    Raises ValueError if there is more than one truth sensor, GNSS receiver or inertial unit.
     """
 
     def __init__(self, spec: ActorSpec, sensors: Mapping[str, SensorSettings], *, seed: int = 0) -> None:
@@ -31,8 +42,9 @@ class Rig:
             name: _sensor(settings, spec, name, seed) for name, settings in sensors.items()
         }
         self._periods: dict[str, int] = {}
-        if sum(isinstance(sensor, TruthSensor) for sensor in self._sensors.values()) > 1:
-            raise ValueError(f"station {spec.name!r} has more than one truth sensor")
+        for kind, name in _SINGLE.items():
+            if sum(isinstance(sensor, kind) for sensor in self._sensors.values()) > 1:
+                raise ValueError(f"station {spec.name!r} has more than one {name}")
 
     def read(self, scene: Scene, view: WorldView) -> Readings:
         """Own motion, and the sensors that are due. Raises KeyError if the actor is not in the world."""
@@ -71,6 +83,8 @@ def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Re
             truth=truths.get(index),
             cameras={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Camera)},
             lidars={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Lidar)},
+            gnss=next((s.read(view, rows[index]) for s in due[index].values() if isinstance(s, Gnss)), None),
+            imu=next((s.read(view, rows[index]) for s in due[index].values() if isinstance(s, Imu)), None),
         )
         for index, rig in enumerate(rigs)
     }
@@ -99,5 +113,9 @@ def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> 
         case CameraSettings():
             return Camera(settings, spec, name, seed)
         case LidarSettings():
-            return Lidar(settings, spec)
+            return Lidar(settings, spec, name, seed)
+        case GnssSettings():
+            return Gnss(settings, spec, name, seed)
+        case ImuSettings():
+            return Imu(settings, spec, name, seed)
     raise TypeError(f"no sensor reads {type(settings).__name__}")

@@ -28,6 +28,10 @@ class RayHits(Protocol):
     def fraction(self) -> Array:
         """(M,) share of the way from origin to target, 1 where nothing was met."""
 
+    @property
+    def normal(self) -> Array:
+        """(M, 3) of the surfaces met, zero where nothing was."""
+
 
 class Scene(Protocol):
     """The part of the world that sensors see."""

@@ -135,10 +135,20 @@ class CameraSettings(SensorSettings):
 
 
 class LidarSettings(SensorSettings):
-    """A spinning LiDAR: rings spread evenly over the vertical field of view [degrees], range [m].
+    """A spinning LiDAR: rings spread evenly over the vertical field of view [degrees], or as `elevations` say.
 
-    rotation     revolutions per second [Hz]
-    attenuation  of the intensity with distance [1/m]
+    range          beyond it nothing is measured [m]
+    points_per_second  rays, of all channels
+    rotation       revolutions per second [Hz]
+    field_of_view  horizontal, about the mount's heading [degrees]
+    elevations     of the rings above the horizon, from the highest on [degrees]; None spreads them
+    attenuation    of the intensity with distance, besides that by the weather [1/m]
+    range_noise    standard deviation of a distance [m]
+    ten_percent_range  in clear air, as far a surface that returns a tenth of the light is measured [m]
+    dropoff        share of returns that are lost at random
+    dropoff_intensity, dropoff_dark   a return below this intensity is lost with a probability that rises to
+                   `dropoff_dark` where it is black
+    weather        whether fog, rain and snow weaken returns and give false ones
     """
 
     kind: Literal["lidar"] = "lidar"
@@ -148,15 +158,70 @@ class LidarSettings(SensorSettings):
     rotation: PositiveFloat = 20.0
     upper_fov: float = Field(default=10.0, ge=-90.0, le=90.0)
     lower_fov: float = Field(default=-30.0, ge=-90.0, le=90.0)
+    field_of_view: float = Field(default=360.0, gt=0.0, le=360.0)
+    elevations: tuple[Annotated[float, Field(ge=-90.0, le=90.0)], ...] | None = None
     attenuation: NonNegativeFloat = 0.004
+    range_noise: NonNegativeFloat = 0.02
+    ten_percent_range: PositiveFloat = 150.0
+    dropoff: float = Field(default=0.0, ge=0.0, lt=1.0)
+    dropoff_intensity: float = Field(default=0.0, ge=0.0, le=1.0)
+    dropoff_dark: float = Field(default=0.0, ge=0.0, le=1.0)
+    weather: bool = True
 
     @model_validator(mode="after")
     def _ordered(self) -> LidarSettings:
         if self.lower_fov > self.upper_fov:
             raise ValueError(f"lower_fov {self.lower_fov:g} lies above upper_fov {self.upper_fov:g}")
+        if self.elevations is not None and len(self.elevations) != self.channels:
+            raise ValueError(f"{self.channels} channels need as many elevations, found {len(self.elevations)}")
+        columns = self.points_per_second / self.channels / self.rotation
+        if columns < 1.0:
+            raise ValueError(
+                f"{self.points_per_second} points per second are less than one column in each of "
+                f"{self.rotation:g} revolutions of {self.channels} channels"
+            )
         return self
 
 
-AnySensorSettings = Annotated[TruthSettings | CameraSettings | LidarSettings, Field(discriminator="kind")]
+class GnssSettings(SensorSettings):
+    """A satellite receiver that tells where the station's reference point is. Standard deviations.
 
-KINDS = ("truth", "camera", "lidar")
+    position_noise, height_noise   white, per reading: each horizontal axis, and upwards [m]
+    bias           of each horizontal axis when the run begins [m]
+    bias_walk      how fast that wanders [m/√s]
+    oracle         exact readings
+    """
+
+    kind: Literal["gnss"] = "gnss"
+    rate: PositiveFloat | None = 10.0
+    position_noise: NonNegativeFloat = 0.3
+    height_noise: NonNegativeFloat = 0.6
+    bias: NonNegativeFloat = 0.0
+    bias_walk: NonNegativeFloat = 0.0
+    oracle: bool = False
+
+
+class ImuSettings(SensorSettings):
+    """An inertial unit at the station's reference point. Noise as densities, biases as standard deviations.
+
+    accelerometer_noise, gyroscope_noise   white [m/s²/√Hz], [rad/s/√Hz]
+    accelerometer_bias, gyroscope_bias     of each axis when the run begins [m/s²], [rad/s]
+    accelerometer_walk, gyroscope_walk     how fast these wander [m/s²/√s], [rad/s/√s]
+    oracle         exact readings
+    """
+
+    kind: Literal["imu"] = "imu"
+    accelerometer_noise: NonNegativeFloat = 0.02
+    gyroscope_noise: NonNegativeFloat = 0.002
+    accelerometer_bias: NonNegativeFloat = 0.0
+    gyroscope_bias: NonNegativeFloat = 0.005
+    accelerometer_walk: NonNegativeFloat = 0.0
+    gyroscope_walk: NonNegativeFloat = 1e-4
+    oracle: bool = False
+
+
+AnySensorSettings = Annotated[
+    TruthSettings | CameraSettings | LidarSettings | GnssSettings | ImuSettings, Field(discriminator="kind")
+]
+
+KINDS = ("truth", "camera", "lidar", "gnss", "imu")

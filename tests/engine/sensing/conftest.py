@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 class Hits:
     rows: NDArray[np.int64]
     fraction: Array
+    normal: Array
 
 
 @dataclass
@@ -39,18 +40,19 @@ class BoxScene:
         self.casts.append(len(origins))
         bodies = [(row, tuple(box)) for row, box in enumerate(self.view.boxes.tolist())]
         bodies += [(-1, wall) for wall in self.walls]
-        rows, fractions = [], []
+        rows, fractions, normals = [], [], []
         for origin, target in zip(origins.tolist(), targets.tolist(), strict=True):
-            nearest, row = 1.0, -2
+            nearest, row, normal = 1.0, -2, (0.0, 0.0, 0.0)
             for name, box in bodies:
                 share = meeting(origin, target, box)
                 if share is not None and share < nearest:
-                    nearest, row = share, name
+                    nearest, row, normal = share, name, face(origin, target, share, box)
             if self.ground and origin[2] > 0.0 > target[2] and origin[2] / (origin[2] - target[2]) < nearest:
-                nearest, row = origin[2] / (origin[2] - target[2]), -1
+                nearest, row, normal = origin[2] / (origin[2] - target[2]), -1, (0.0, 0.0, 1.0)
             rows.append(row)
             fractions.append(nearest)
-        return Hits(np.array(rows, dtype=np.int64), np.array(fractions))
+            normals.append(normal)
+        return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         self.pictures.append((pose, pinhole))
@@ -80,6 +82,17 @@ def meeting(origin: list[float], target: list[float], box: tuple[float, ...]) ->
         first, second = sorted(((-half - place) / step, (half - place) / step))
         enter, leave = max(enter, first), min(leave, second)
     return enter if enter < leave and not inside else None
+
+
+def face(origin: list[float], target: list[float], share: float, box: tuple[float, ...]) -> tuple[float, float, float]:
+    """The outward normal of the face of a box on which a ray ends."""
+    x, y, z, length, width, height, yaw = box
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    dx, dy, dz = (a + share * (b - a) - c for a, b, c in zip(origin, target, (x, y, z), strict=True))
+    local = ((cos * dx + sin * dy) / length, (cos * dy - sin * dx) / width, dz / height)
+    axis = max(range(3), key=lambda k: abs(local[k]))
+    sign = math.copysign(1.0, local[axis])
+    return ((cos * sign, sin * sign, 0.0), (-sin * sign, cos * sign, 0.0), (0.0, 0.0, sign))[axis]
 
 
 CAR = (4.892, 1.837, 1.49)

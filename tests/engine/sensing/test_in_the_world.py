@@ -65,7 +65,7 @@ def test_a_building_hides(world: World) -> None:
 
 
 def test_lidar_sees_the_truck_where_it_stands(world: World) -> None:
-    settings = LidarSettings(channels=16, points_per_second=16 * 360 * 20)
+    settings = LidarSettings(channels=16, points_per_second=16 * 360 * 20, range_noise=0.0)
     sweep = Rig(spec("Ego"), {"lidar": settings}).read(world, world.view()).lidars["lidar"]
     points = sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
     ahead = points[(np.abs(points[:, 1]) < 1.4) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]

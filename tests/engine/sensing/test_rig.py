@@ -94,7 +94,7 @@ def test_pitch_turns_a_camera_down(boxes: Any) -> None:
     np.testing.assert_allclose(forward, [math.cos(math.pi / 6), 0, -0.5], atol=1e-12)
 
 
-LIDAR = LidarSettings(channels=8, points_per_second=8000, rotation=20.0, range=30.0)
+LIDAR = LidarSettings(channels=8, points_per_second=8000, rotation=20.0, range=30.0, range_noise=0.0)
 
 
 def test_a_sweep_is_one_revolution_in_a_step_of_one_revolution(boxes: Any) -> None:
@@ -125,7 +125,7 @@ def test_lidar_points_lie_on_ground_and_bodies(boxes: Any) -> None:
     assert np.all(on_ground | inside)
     distance = np.linalg.norm(sweep.points, axis=1)
     assert distance.max() <= 30.0
-    np.testing.assert_allclose(sweep.intensity, np.exp(-0.004 * distance))
+    assert np.all((sweep.intensity > 0.0) & (sweep.intensity < 0.5))
 
 
 def test_the_own_roof_hides_the_ground_near_by(boxes: Any) -> None:

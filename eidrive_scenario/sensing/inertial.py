@@ -1,0 +1,100 @@
+"""The satellite receiver and the inertial unit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import rotation_matrix
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.readings import GnssReading, ImuReading
+from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.view import WorldView
+
+Array = NDArray[np.float64]
+
+EXACT = 1e-3
+"""Standard deviation that an oracle's reading states, as filters need one above 0 [m]."""
+FIRST_INTERVAL = 0.05
+"""How long the first reading of a unit that is read each tick integrates [s]."""
+
+
+class Gnss:
+    """Position of the reference point: the truth, a bias that wanders, and white noise.
+
+    The covariance of a reading is that of the noise and of the bias at the start; that it has wandered off since, a
+    receiver does not know. Noise and wandering are drawn by seed, station, name and tick.
+    """
+
+    def __init__(self, settings: GnssSettings, spec: ActorSpec, name: str = "gnss", seed: int = 0) -> None:
+        self.settings = settings
+        self._key = (seed, "gnss", spec.name, name)
+        self._bias = _Wandering(self._key, 2, settings.bias, settings.bias_walk)
+        across = settings.position_noise**2 + settings.bias**2
+        self._covariance = np.diag([max(v, EXACT**2) for v in (across, across, settings.height_noise**2)])
+
+    def read(self, view: WorldView, row: int) -> GnssReading:
+        """Where the actor in this row seems to be."""
+        position = view.position[row]
+        if self.settings.oracle:
+            return GnssReading(position, np.eye(3) * EXACT**2)
+        seed, *key = self._key
+        draws = generator(seed, *key, view.tick)
+        settings = self.settings
+        deviation = (settings.position_noise, settings.position_noise, settings.height_noise)
+        measured = position + deviation * draws.standard_normal(3)
+        measured[:2] += self._bias.at(view.time, draws)
+        return GnssReading(measured, self._covariance)
+
+
+class Imu:
+    """Acceleration and turn rates in the body's frame: the truth, biases that wander, and white noise.
+
+    Noise of density n in readings of an interval T has the deviation n / √T (IEEE 952, annex C). It and the wandering
+    are drawn by seed, station, name and tick.
+    """
+
+    def __init__(self, settings: ImuSettings, spec: ActorSpec, name: str = "imu", seed: int = 0) -> None:
+        self.settings = settings
+        self._key = (seed, "imu", spec.name, name)
+        self._push = _Wandering((*self._key, "push"), 3, settings.accelerometer_bias, settings.accelerometer_walk)
+        self._turn = _Wandering((*self._key, "turn"), 3, settings.gyroscope_bias, settings.gyroscope_walk)
+        self._last: float | None = None
+
+    def read(self, view: WorldView, row: int) -> ImuReading:
+        """What the unit on the actor in this row measures."""
+        settings = self.settings
+        body = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+        acceleration = view.acceleration[row] @ body
+        rates = np.array([0.0, 0.0, float(view.yaw_rate[row])]) @ body
+        interval = view.time - self._last if self._last is not None else 1.0 / (settings.rate or 1.0 / FIRST_INTERVAL)
+        self._last = view.time
+        if settings.oracle:
+            return ImuReading(acceleration, rates)
+        seed, *key = self._key
+        draws = generator(seed, *key, view.tick)
+        white = draws.standard_normal((2, 3)) / math.sqrt(max(interval, 1e-6))
+        return ImuReading(
+            acceleration + settings.accelerometer_noise * white[0] + self._push.at(view.time, draws),
+            rates + settings.gyroscope_noise * white[1] + self._turn.at(view.time, draws),
+        )
+
+
+class _Wandering:
+    """A bias (N,) that begins with a deviation and then goes at random: its variance grows by walk² per second."""
+
+    def __init__(self, key: tuple[int | str, ...], axes: int, start: float, walk: float) -> None:
+        seed, *rest = key
+        self._value = start * generator(int(seed), *rest, "bias").standard_normal(axes)
+        self._walk = walk
+        self._time: float | None = None
+
+    def at(self, time: float, draws: np.random.Generator) -> Array:
+        passed = max(time - self._time, 0.0) if self._time is not None else 0.0
+        self._time = time
+        if self._walk > 0.0:
+            self._value = self._value + self._walk * math.sqrt(passed) * draws.standard_normal(len(self._value))
+        return self._value

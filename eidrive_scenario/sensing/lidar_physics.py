@@ -1,0 +1,122 @@
+"""How much of a LiDAR's light comes back: from surfaces, through weather, and from the weather itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.weather import Weather
+
+Array = NDArray[np.float64]
+
+WAVELENGTH = 0.905
+"""[µm]"""
+REFLECTIVITY: Mapping[str, float] = {
+    "car": 0.45,
+    "truck": 0.50,
+    "bus": 0.50,
+    "van": 0.50,
+    "motorbike": 0.25,
+    "bicycle": 0.20,
+    "pedestrian": 0.35,
+    "misc": 0.40,
+}
+"""Share of light that a body sends back in all directions, by class: values for car paint, metal, clothes and plastic
+between those that Muckenhuber et al. measured (Automotive lidar modelling approach based on material properties and
+lidar capabilities, Sensors 20, 2020)."""
+GROUND, WET_GROUND = 0.17, 0.06
+"""Of asphalt, buildings and what else stands there, and of asphalt under water."""
+PULSE_LENGTH = 0.75
+"""Half the way that light goes during a pulse of 5 ns [m]: from so deep a layer of air light comes back at once."""
+BACKSCATTER = 0.046
+"""Of fog: its coefficient is this over the visibility [1/(m sr)] (Rasshofer, Spies, Spies: Influences of weather
+phenomena on automotive laser radar systems, Advances in Radio Science 9, 2011)."""
+CONTRAST = math.log(20.0)
+"""Optical thickness along the meteorological visibility, which that source uses: 5 % contrast."""
+OVERLAP = (0.9, 10.0)
+"""Between these distances the beam comes into the view of a receiver beside it [m]. A sensor whose views coincide at
+once (Hahner et al., Fog simulation on real LiDAR point clouds, ICCV 2021, have 1 m) would see nothing but fog of 50 m;
+tested ones measure up to 25 m in it (Bijelic, Gruber, Ritter: A benchmark for lidar sensors in fog, IV 2018)."""
+UNEVEN = {"rain": 0.15, "snow": 0.15, "none": 4.0}
+"""Shape of the gamma distribution by which the air's return varies from ray to ray: about the number of drops in the
+volume of a pulse where these are few (0.2 litres with less than a thousand drops per m³)."""
+
+
+class Returns(NamedTuple):
+    """What the receiver takes from each ray: whether anything (M,), how far [m], and its intensity in [0, 1]."""
+
+    found: NDArray[np.bool_]
+    distance: Array
+    intensity: Array
+
+
+def extinction(weather: Weather) -> float:
+    """Of light of 905 nm [1/m]: fog by Kruse with Kim's exponent (ITU-R P.1814, section 4.2), drops as for visible
+    light."""
+    kilometres = weather.visual_range / 1000.0
+    if kilometres > 50.0:
+        power = 1.6
+    elif kilometres > 6.0:
+        power = 1.3
+    else:
+        power = 0.585 * kilometres ** (1.0 / 3.0)
+    return float(weather.fog_extinction * (WAVELENGTH / 0.55) ** -power + weather.precipitation_extinction)
+
+
+def reflectivity(rows: NDArray[np.int64], categories: Sequence[str], wetness: float) -> Array:
+    """(M,) of what rays met: rows of actors, negative for the rest."""
+    ground = GROUND + min(2.0 * wetness, 1.0) * (WET_GROUND - GROUND)
+    table = np.array([*(REFLECTIVITY.get(category, REFLECTIVITY["misc"]) for category in categories), ground])
+    return table[np.where(rows < 0, len(categories), rows)]
+
+
+def returns(
+    distance: Array,
+    brightness: Array,
+    weather: Weather,
+    *,
+    attenuation: float,
+    ten_percent_range: float,
+    draws: np.random.Generator,
+) -> Returns:
+    """What comes back of rays that meet something at `distance` (M,), inf where nothing, of `brightness` (M,):
+    reflectivity times cosine of the angle to the normal.
+
+    The power from a surface falls with exp(-2 extinction · d) / d² (radar equation of an area larger than the beam);
+    the receiver needs as much as a tenth of the light gives at `ten_percent_range` in clear air. Air that scatters
+    more than the surface gives, and enough, is measured in its place.
+    """
+    fade = extinction(weather)
+    reach = np.maximum(distance, 1e-3)
+    through = np.exp(-2.0 * fade * np.where(np.isfinite(distance), distance, 0.0))
+    hard = np.where(np.isfinite(distance), brightness * through / (math.pi * reach * reach), 0.0)
+    least = 0.1 / (math.pi * ten_percent_range**2)
+    found = hard >= least
+    where = np.where(np.isfinite(distance), distance, 0.0)
+    intensity = brightness * through * np.exp(-attenuation * where)
+    air = weather.extinction - weather.fog_extinction * (weather.visual_range > 10_000.0)
+    if air > 0.0:
+        ranges, soft = _air(round(fade, 9), round(BACKSCATTER * air / CONTRAST, 12))
+        shape = UNEVEN[weather.precipitation]
+        strength = draws.gamma(shape, 1.0 / shape, len(distance))
+        place = ranges[np.searchsorted(np.cumsum(soft) / soft.sum(), draws.random(len(distance)))]
+        peak = float(soft.max()) * strength
+        false = (peak > hard) & (peak >= least) & (place < distance)
+        found |= false
+        where = np.where(false, place, where)
+        intensity = np.where(false, np.minimum(peak * math.pi * place * place, 1.0), intensity)
+    return Returns(found, where, np.clip(intensity, 0.0, 1.0))
+
+
+@lru_cache(maxsize=32)
+def _air(fade: float, backscatter: float) -> tuple[Array, Array]:
+    """Distances [m], and the light that air sends back from there: backscatter · PULSE_LENGTH · exp(-2 fade r) / r²."""
+    ranges = np.linspace(OVERLAP[0], 20.0, 800)
+    entered = np.clip((ranges - OVERLAP[0]) / (OVERLAP[1] - OVERLAP[0]), 0.0, 1.0)
+    soft: Array = backscatter * PULSE_LENGTH * entered * np.exp(-2.0 * fade * ranges) / ranges**2
+    return ranges, soft
