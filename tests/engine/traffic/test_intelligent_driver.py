@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.traffic import IntelligentDriver
-from eidrive_scenario.traffic.idm import ballistic
+from eidrive_scenario.traffic.idm import Drivers, ballistic
 
 DRIVER = IntelligentDriver(time_gap=1.5, standstill_gap=2.0, acceleration=1.2, deceleration=2.0, exponent=4.0)
 
@@ -19,6 +19,21 @@ def test_on_a_free_road_it_speeds_up_to_the_desired_speed() -> None:
     assert response(0.0, 20.0) == pytest.approx(1.2)
     assert response(10.0, 20.0) == pytest.approx(1.2 * (1 - 0.5**4))
     assert response(20.0, 20.0) == pytest.approx(0.0)
+
+
+def test_a_car_that_is_only_too_fast_does_not_brake_to_its_limit() -> None:
+    """At twice the desired speed the model alone asks for 1.2·(2⁴ - 1) = 18 m/s²."""
+    assert response(22.0, 20.0) == pytest.approx(1.2 * (1 - 1.1**4))
+    assert response(40.0, 20.0) == pytest.approx(-2.0 * 2.0)
+
+
+def test_many_drivers_each_have_their_own_parameters() -> None:
+    other = IntelligentDriver(time_gap=0.8, standstill_gap=3.0, acceleration=2.0)
+    speed, desired, gap, approach = np.array([[8.0, 8.0], [15.0, 15.0], [20.0, 20.0], [1.0, 1.0]])
+    both = Drivers.of([DRIVER, other]).response(speed, desired, gap, approach)
+    assert both[0] == DRIVER.response(speed, desired, gap, approach)[0]
+    assert both[1] == other.response(speed, desired, gap, approach)[1]
+    assert both[0] != both[1]
 
 
 def test_a_standing_queue_stands_at_the_standstill_gap() -> None:

@@ -1,0 +1,226 @@
+"""Lane changes: MOBIL's two criteria by numbers, and cars that follow them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.geometry import overlap
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.traffic import Fleet, LaneChanger
+from eidrive_scenario.traffic.mobil import Prospect, incentive, safe
+from eidrive_scenario.world.actor import ActorSpec
+
+Street = Callable[..., RoadNetwork]
+Car = Callable[[str], ActorSpec]
+
+BUMPERS = 4.6
+"""Distance of two cars' reference points that touch [m]."""
+
+
+def prospect(**given: float) -> Prospect:
+    names = ("own", "own_after", "new_follower", "new_follower_after", "old_follower", "old_follower_after")
+    return Prospect(*(np.array([given.get(name, 0.0)]) for name in names))
+
+
+def test_the_incentive_is_the_own_gain_and_a_part_of_the_others() -> None:
+    """(0.4 + 1.0) + 0.5·(-0.6 - 0.2 + 0.1 + 0.3) - 0.1 = 1.1, and 0.3 more towards the slow side."""
+    case = prospect(
+        own=-1.0,
+        own_after=0.4,
+        new_follower=0.2,
+        new_follower_after=-0.6,
+        old_follower=-0.3,
+        old_follower_after=0.1,
+    )
+    assert incentive(LaneChanger(politeness=0.5, threshold=0.1), case, True) == pytest.approx(1.1)
+    biased = LaneChanger(politeness=0.5, threshold=0.1, bias=0.3)
+    assert incentive(biased, case, True) == pytest.approx(1.4)
+    assert incentive(biased, case, False) == pytest.approx(0.8)
+
+
+def test_nobody_may_have_to_brake_harder_than_is_safe() -> None:
+    changer = LaneChanger(safe_deceleration=4.0)
+    assert safe(changer, prospect(new_follower_after=-4.0)).tolist() == [True]
+    assert safe(changer, prospect(new_follower_after=-4.1)).tolist() == [False]
+    assert safe(changer, prospect(own_after=-4.1)).tolist() == [False]
+
+
+def lane_after_one_step(fleet: Fleet, name: str = "me") -> int:
+    """The lane in which a car is after every driver has thought once."""
+    fleet.step(None, 0.5)
+    return fleet.lanes.keys[int(fleet.places([name])[0][0])].lane
+
+
+def queue(
+    roads: RoadNetwork, car: Car, changer: LaneChanger, *, leader_gap: float, follower_gap: float | None = None
+) -> Fleet:
+    """A car at 20 m/s in the right lane of two that wants 25 m/s, a leader at 10 m/s, a follower in the other lane."""
+    fleet = Fleet(roads, changer=changer)
+    fleet.add(car("me"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
+    fleet.add(car("leader"), roads.location("1", -2, 400.0 + BUMPERS + leader_gap), speed=10.0, desired_speed=10.0)
+    if follower_gap is not None:
+        behind = roads.location("1", -1, 400.0 - BUMPERS - follower_gap)
+        fleet.add(car("follower"), behind, speed=20.0, desired_speed=25.0)
+    return fleet
+
+
+def test_a_car_overtakes_a_slow_leader(street: Street, car: Car) -> None:
+    """Gap 100 m: wanted 2 + 20 + 20·10/(2·√1.5) = 103.65 m, so a = 1 - 0.8⁴ - 1.0365² = -0.484; free it is +0.590."""
+    assert lane_after_one_step(queue(street(), car, LaneChanger(), leader_gap=100.0)) == -1
+
+
+def test_a_gain_below_the_threshold_is_not_worth_it(street: Street, car: Car) -> None:
+    """The gain is (103.65 / gap)²: 1.074 at 100 m."""
+    assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.07), leader_gap=100.0)) == -1
+    assert lane_after_one_step(queue(street(), car, LaneChanger(threshold=1.08), leader_gap=100.0)) == -2
+
+
+def test_a_follower_too_near_in_the_other_lane_forbids_it(street: Street, car: Car) -> None:
+    """It would brake by (22 / gap)² - 0.590: 4.0 m/s² at 10.27 m."""
+    egoistic = LaneChanger(politeness=0.0)
+    assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.4)) == -1
+    assert lane_after_one_step(queue(street(), car, egoistic, leader_gap=100.0, follower_gap=10.1)) == -2
+
+
+def test_a_polite_driver_does_not_push_in(street: Street, car: Car) -> None:
+    """At 20 m the follower loses (22/20)² = 1.21; the gain is worth it while 1.074 - 1.21·p > 0.1, for p < 0.805."""
+    for politeness, lane in ((0.80, -1), (0.81, -2)):
+        polite = LaneChanger(politeness=politeness)
+        fleet = queue(street(), car, polite, leader_gap=100.0, follower_gap=20.0)
+        assert lane_after_one_step(fleet) == lane
+
+
+def test_a_polite_leader_makes_way(street: Street, car: Car) -> None:
+    """It loses nothing, and its follower gains 1.074 by its change: p·1.074 > 0.1 for p > 0.093."""
+    for politeness, lane in ((0.09, -2), (0.10, -1)):
+        roads = street()
+        fleet = Fleet(roads, changer=LaneChanger(politeness=politeness))
+        fleet.add(car("me"), roads.location("1", -2, 504.6), speed=10.0, desired_speed=10.0)
+        fleet.add(car("follower"), roads.location("1", -2, 400.0), speed=20.0, desired_speed=25.0)
+        assert lane_after_one_step(fleet) == lane
+
+
+def test_the_marking_may_forbid_it(street: Street, car: Car) -> None:
+    for mark, lane in (("none", -2), ("decrease", -2), ("increase", -1)):
+        assert lane_after_one_step(queue(street(mark=mark), car, LaneChanger(), leader_gap=100.0)) == lane
+
+
+def test_nobody_changes_into_oncoming_traffic(street: Street, car: Car) -> None:
+    roads = street(1, 1)
+    fleet = Fleet(roads)
+    fleet.add(car("me"), roads.location("1", -1, 400.0), speed=20.0, desired_speed=25.0)
+    fleet.add(car("leader"), roads.location("1", -1, 450.0), speed=10.0, desired_speed=10.0)
+    assert lane_after_one_step(fleet) == -1
+
+
+def test_a_free_car_returns_to_the_slow_side_only_with_a_bias(street: Street, car: Car) -> None:
+    # In left-hand traffic lane -1 of a one-way road drives against s, and its left neighbour is lane -2.
+    for rule, bias, lane, after in (
+        ("RHT", 0.0, -1, -1),
+        ("RHT", 0.3, -1, -2),
+        ("LHT", 0.3, -1, -2),
+        ("LHT", 0.3, -2, -2),
+    ):
+        roads = street(rule=rule)
+        fleet = Fleet(roads, changer=LaneChanger(bias=bias))
+        fleet.add(car("me"), roads.location("1", lane, 500.0), speed=20.0, desired_speed=20.0)
+        assert lane_after_one_step(fleet) == after
+
+
+def test_of_two_that_want_the_same_gap_one_changes(street: Street, car: Car) -> None:
+    roads = street(right=3)
+    fleet = Fleet(roads)
+    for lane in (-1, -3):
+        fleet.add(car(f"me{lane}"), roads.location("1", lane, 400.0), speed=20.0, desired_speed=25.0)
+        fleet.add(car(f"leader{lane}"), roads.location("1", lane, 450.0), speed=10.0, desired_speed=10.0)
+    fleet.step(None, 0.5)
+    rows = fleet.places(["me-1", "me-3"])[0]
+    assert sorted(fleet.lanes.keys[int(row)].lane for row in rows) in ([-2, -1], [-3, -2])
+
+
+def test_the_way_sideways_is_smooth_and_takes_as_long_as_stated(street: Street, car: Car) -> None:
+    """3.5 m along a quintic over v·4 s: steepest 1.875·3.5/80 at its middle."""
+    fleet = queue(street(), car, LaneChanger(politeness=0.0), leader_gap=100.0)
+    path = [(place.x, place.y, place.yaw) for _ in range(160) if (place := fleet.step(None, 0.05)["me"])]
+    x, y, yaw = np.array(path).T
+    moving = (y > -5.25 + 1e-6) & (y < -1.75 - 1e-6)
+    assert y[[0, -1]] == pytest.approx([-5.25, -1.75])
+    assert np.ptp(x[moving]) == pytest.approx(80.0, abs=2.5)
+    assert np.all(np.diff(y) > -1e-9)
+    assert np.max(np.abs(yaw)) == pytest.approx(math.atan(1.875 * 3.5 / 80.0), rel=0.02)
+    assert np.arctan2(np.diff(y), np.diff(x)) == pytest.approx(0.5 * (yaw[1:] + yaw[:-1]), abs=2e-3)
+
+
+def test_dense_traffic_on_three_lanes_changes_lanes_and_never_touches(street: Street, car: Car) -> None:
+    roads = street(right=3, length=3000.0)
+    rng = np.random.default_rng(3)
+    fleet = Fleet(roads, seed=2)
+    for k in range(45):
+        place = roads.location("1", -1 - k % 3, 20.0 + 14.0 * k)
+        fleet.add(car(f"car{k}"), place, speed=12.0, desired_speed=float(rng.uniform(9.0, 25.0)))
+    lanes = {name: {0} for name in fleet.names}
+    for tick in range(1200):
+        fleet.step(None, 0.05)
+        for name, row in zip(fleet.names, fleet.places(fleet.names)[0].tolist(), strict=True):
+            lanes[name].add(fleet.lanes.keys[row].lane)
+        if tick % 4 == 0:
+            boxes = fleet.boxes
+            near = np.triu(np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < 6.0, 1)
+            assert not [(i, j) for i, j in zip(*np.nonzero(near), strict=True) if overlap(boxes[i], boxes[j])]
+    assert sum(len(found) > 2 for found in lanes.values()) > 10
+
+
+def ending_lane() -> RoadNetwork:
+    """Two lanes, of which the right one tapers off to nothing from s = 250 to 300 m, with a road beyond."""
+
+    def road(number: str, x: float, lanes: str, link: str) -> str:
+        return (
+            f'<road id="{number}" length="300" junction="-1"><link>{link}</link><planView>'
+            f'<geometry s="0" x="{x}" y="0" hdg="0" length="300"><line/></geometry></planView>'
+            f'<lanes><laneSection s="0"><center><lane id="0"/></center><right>{lanes}</right></laneSection></lanes>'
+            "</road>"
+        )
+
+    on = '<lane id="-1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+    taper = (
+        '<lane id="-2" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+        '<width sOffset="250" a="3.5" b="-0.07" c="0" d="0"/></lane>'
+    )
+    first = road(
+        "1",
+        0.0,
+        on.format('<successor id="-1"/>') + taper,
+        '<successor elementType="road" elementId="2" contactPoint="start"/>',
+    )
+    second = road(
+        "2",
+        300.0,
+        on.format('<predecessor id="-1"/>'),
+        '<predecessor elementType="road" elementId="1" contactPoint="end"/>',
+    )
+    return RoadNetwork.parse(f"<OpenDRIVE>{first}{second}</OpenDRIVE>")
+
+
+def test_cars_leave_a_lane_that_ends(car: Car) -> None:
+    """It is too narrow, below 2.2 m, from s = 250 + 1.3/0.07 = 268.6 m on; the next place looked at is 270 m."""
+    roads = ending_lane()
+    fleet = Fleet(roads)
+    assert fleet.lanes.ends_at[np.isfinite(fleet.lanes.ends_at)] == pytest.approx([270.0])
+    for k in range(6):
+        fleet.add(car(f"right{k}"), roads.location("1", -2, 20.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
+        fleet.add(car(f"left{k}"), roads.location("1", -1, 10.0 + 25.0 * k), speed=13.0, desired_speed=14.0)
+    arrived: set[str] = set()
+    for _ in range(1600):
+        placements = fleet.step(None, 0.05)
+        arrived |= {name for name, place in placements.items() if place.x > 310.0}
+        for name, place in placements.items():
+            if place.y < -4.2:
+                assert place.x < 270.0, name
+        boxes = fleet.boxes
+        near = np.triu(np.hypot(*(boxes[:, None, :2] - boxes[None, :, :2]).transpose(2, 0, 1)) < 6.0, 1)
+        assert not [(i, j) for i, j in zip(*np.nonzero(near), strict=True) if overlap(boxes[i], boxes[j])]
+    assert len(arrived) == 12

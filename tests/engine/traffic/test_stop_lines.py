@@ -1,0 +1,121 @@
+"""Traffic lights: cars wait at stop lines while they must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.traffic import Fleet
+from eidrive_scenario.world.actor import ActorSpec
+
+Street = Callable[..., RoadNetwork]
+Car = Callable[[str], ActorSpec]
+
+FRONT = 1.4 + 0.5 * 4.6
+"""From the reference point to the front bumper [m]."""
+
+
+def light(s: float = 200.0, orientation: str = "+", validity: str = "", dynamic: str = "yes") -> str:
+    return (
+        f'<signals><signal id="7" s="{s}" t="-9" dynamic="{dynamic}" orientation="{orientation}" type="1000001" '
+        f'zOffset="3" name="light">{validity}</signal></signals>'
+    )
+
+
+class Lights:
+    """The state of all lights, and who was asked for."""
+
+    def __init__(self, red: bool = True) -> None:
+        self.red = red
+        self.asked: set[str] = set()
+
+    def __call__(self, signal: str) -> bool:
+        self.asked.add(signal)
+        return self.red
+
+
+def approaching(roads: RoadNetwork, car: Car, lights: Lights, *, lane: int = -1, at: float = 60.0) -> Fleet:
+    fleet = Fleet(roads, must_stop=lights)
+    fleet.add(car("me"), roads.location("1", lane, at), speed=14.0, desired_speed=14.0)
+    return fleet
+
+
+def test_a_car_waits_at_a_red_light_and_goes_on_when_it_turns(street: Street, car: Car) -> None:
+    """It stands where its gap to the line is the standstill gap of 2 m, after 1 m of air."""
+    lights = Lights()
+    fleet = approaching(street(right=1, extra=light()), car, lights)
+    for _ in range(800):
+        place = fleet.step(None, 0.05)["me"]
+    assert lights.asked == {"7"}
+    assert place.speed == pytest.approx(0.0, abs=0.05)
+    assert 200.0 - (place.x + FRONT) - 1.0 == pytest.approx(2.0, abs=0.3)
+    lights.red = False
+    for _ in range(300):
+        place = fleet.step(None, 0.05)["me"]
+    assert place.x > 250.0
+
+
+def test_the_car_behind_waits_behind(street: Street, car: Car) -> None:
+    roads = street(right=1, extra=light())
+    fleet = approaching(roads, car, Lights())
+    fleet.add(car("next"), roads.location("1", -1, 30.0), speed=14.0, desired_speed=14.0)
+    for _ in range(800):
+        places = fleet.step(None, 0.05)
+    assert places["me"].x - places["next"].x - 4.6 == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("orientation", "validity", "lane", "stops"),
+    [
+        ("+", "", -1, True),
+        ("-", "", -1, False),
+        ("none", "", -1, True),
+        ("-", "", 1, True),
+        ("+", "", 1, False),
+        ("+", '<validity fromLane="-2" toLane="-2"/>', -1, False),
+        ("+", '<validity fromLane="-2" toLane="-1"/>', -1, True),
+    ],
+)
+def test_a_light_is_for_the_lanes_that_the_map_says(
+    street: Street, car: Car, orientation: str, validity: str, lane: int, stops: bool
+) -> None:
+    roads = street(1, 2, extra=light(500.0, orientation, validity), mark="none")
+    fleet = approaching(roads, car, Lights(), lane=lane, at=460.0 - 60.0 if lane < 0 else 600.0)
+    for _ in range(700):
+        place = fleet.step(None, 0.05)["me"]
+    assert (place.speed < 0.05) is stops
+
+
+def test_a_sign_is_no_light(street: Street, car: Car) -> None:
+    lights = Lights()
+    fleet = approaching(street(right=1, extra=light(dynamic="no")), car, lights)
+    for _ in range(300):
+        place = fleet.step(None, 0.05)["me"]
+    assert not lights.asked
+    assert place.x > 240.0
+
+
+@pytest.mark.parametrize(("distance", "stops"), [(25.5, True), (23.5, False)])
+def test_who_would_have_to_brake_too_hard_passes(street: Street, car: Car, distance: float, stops: bool) -> None:
+    """From 14 m/s, 4 m/s² take 24.5 m."""
+    fleet = approaching(street(right=1, extra=light()), car, Lights(), at=200.0 - FRONT - distance)
+    for _ in range(300):
+        place = fleet.step(None, 0.05)["me"]
+    assert (place.x < 200.0 - FRONT) is stops
+
+
+def test_a_light_on_a_connecting_road_holds_cars_before_the_junction(library_roads: RoadNetwork, car: Car) -> None:
+    lights = Lights()
+    fleet = Fleet(library_roads, must_stop=lights)
+    start = library_roads.location("3", 1, 70.0)
+    fleet.add(car("me"), start, speed=8.0)
+    for _ in range(600):
+        place = fleet.step(None, 0.05)["me"]
+    assert lights.asked == {"10", "20", "30", "40"}
+    assert place.speed < 0.05
+    lights.red = False
+    for _ in range(900):
+        fleet.step(None, 0.05)
+    assert "me" not in fleet

@@ -1,0 +1,128 @@
+"""Areas of traffic: ranges of roads from cursor to cursor, and polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.traffic import Cursor, Sites, Stretch, polygon, road_range, stretches_cover
+from eidrive_scenario.traffic.lanes import TrafficLanes
+from eidrive_scenario.traffic.sites import Ground
+
+Street = Callable[..., RoadNetwork]
+
+
+def three_in_a_row(turned: bool = False) -> RoadNetwork:
+    """Roads a, b, c of 100 m each one behind the other; with `turned` the middle one runs the other way."""
+    lane = '<lane id="-1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+    left = '<lane id="1" type="driving"><link>{}</link><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+
+    def road(number: str, x: float, before: tuple[str, str] | None, after: tuple[str, str] | None) -> str:
+        link, lanes = "", ""
+        flipped = turned and number == "b"
+        ends = [("predecessor", before), ("successor", after)]
+        for name, end in ends:
+            if end is not None:
+                link += f'<{name} elementType="road" elementId="{end[0]}" contactPoint="{end[1]}"/>'
+        same = -1 if turned else 1
+        links = "".join(f'<{name} id="{{}}"/>' for name, end in ends if end is not None)
+        lanes = (
+            f"<left>{left.format(links.replace('{}', str(same)))}</left><center><lane id='0'/></center>"
+            f"<right>{lane.format(links.replace('{}', str(-same)))}</right>"
+        )
+        start, hdg = (x + 100.0, np.pi) if flipped else (x, 0.0)
+        return (
+            f'<road id="{number}" length="100" junction="-1"><link>{link}</link><planView><geometry s="0" x="{start}" '
+            f'y="0" hdg="{hdg!r}" length="100"><line/></geometry></planView><lanes><laneSection s="0">{lanes}'
+            "</laneSection></lanes></road>"
+        )
+
+    if turned:
+        roads = [
+            road("a", 0.0, None, ("b", "end")),
+            road("b", 100.0, ("c", "start"), ("a", "end")),
+            road("c", 200.0, ("b", "start"), None),
+        ]
+    else:
+        roads = [
+            road("a", 0.0, None, ("b", "start")),
+            road("b", 100.0, ("a", "end"), ("c", "start")),
+            road("c", 200.0, ("b", "end"), None),
+        ]
+    return RoadNetwork.parse(f"<OpenDRIVE>{''.join(roads)}</OpenDRIVE>")
+
+
+def test_a_range_on_one_road(street: Street) -> None:
+    roads = street()
+    assert road_range(roads, [Cursor("1", 100.0, (-1,)), Cursor("1", 300.0)]) == [Stretch("1", 100.0, 300.0, (-1,))]
+    assert road_range(roads, [Cursor("1", 300.0), Cursor("1", 100.0)]) == [Stretch("1", 100.0, 300.0)]
+
+
+def test_missing_s_is_the_start_of_the_first_and_the_end_of_the_last_road(street: Street) -> None:
+    assert road_range(street(), [Cursor("1"), Cursor("1")]) == [Stretch("1", 0.0, 1000.0)]
+
+
+def test_lanes_count_up_to_the_next_cursor(street: Street) -> None:
+    cursors = [Cursor("1", 100.0, (-1,)), Cursor("1", 200.0, (-2,)), Cursor("1", 300.0)]
+    assert road_range(street(), cursors) == [Stretch("1", 100.0, 200.0, (-1,)), Stretch("1", 200.0, 300.0, (-2,))]
+
+
+def test_the_length_cuts_it_off(street: Street) -> None:
+    roads = street()
+    assert road_range(roads, [Cursor("1", 100.0), Cursor("1", 300.0)], 50.0) == [Stretch("1", 100.0, 150.0)]
+    backwards = [Cursor("1", 300.0), Cursor("1", 100.0)]
+    assert road_range(roads, backwards, 50.0) == [Stretch("1", 250.0, 300.0)]
+
+
+def test_a_range_over_several_roads_follows_their_links() -> None:
+    cursors = [Cursor("a", 60.0), Cursor("c", 30.0)]
+    assert road_range(three_in_a_row(), cursors) == [
+        Stretch("a", 60.0, 100.0),
+        Stretch("b", 0.0, 100.0),
+        Stretch("c", 0.0, 30.0),
+    ]
+    assert road_range(three_in_a_row(), cursors, 90.0) == [Stretch("a", 60.0, 100.0), Stretch("b", 0.0, 50.0)]
+    assert road_range(three_in_a_row(turned=True), cursors, 90.0) == [
+        Stretch("a", 60.0, 100.0),
+        Stretch("b", 50.0, 100.0),
+    ]
+    backwards = [Cursor("c", 30.0), Cursor("a", 60.0)]
+    assert road_range(three_in_a_row(), backwards) == [
+        Stretch("c", 0.0, 30.0),
+        Stretch("b", 0.0, 100.0),
+        Stretch("a", 60.0, 100.0),
+    ]
+
+
+def test_roads_must_exist_and_be_linked(street: Street) -> None:
+    with pytest.raises(InputError, match="there is no road '2'"):
+        road_range(street(), [Cursor("1"), Cursor("2")])
+    apart = RoadNetwork.parse(
+        "<OpenDRIVE>"
+        + "".join(
+            f'<road id="{n}" length="10" junction="-1"><planView><geometry s="0" x="0" y="{n}00" hdg="0" length="10">'
+            '<line/></geometry></planView><lanes><laneSection s="0"><center><lane id="0"/></center><right>'
+            '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>'
+            for n in (1, 2)
+        )
+        + "</OpenDRIVE>"
+    )
+    with pytest.raises(InputError, match="no roads lead from road '1' to road '2'"):
+        road_range(apart, [Cursor("1"), Cursor("2")])
+
+
+def test_places_in_a_stretch_and_in_a_polygon(street: Street) -> None:
+    lanes = TrafficLanes(street(1, 1))
+    sites = Ground(lanes).driving
+    inside = sites.some(stretches_cover(lanes, [Stretch("1", 100.0, 200.0, (-1,))])(sites))
+    assert len(inside) == 20
+    assert inside.x.min() >= 100.0
+    assert inside.x.max() <= 200.0
+    assert np.all(inside.y < 0.0)
+    within: Sites = sites.some(polygon([(100.0, -10.0), (200.0, -10.0), (200.0, 10.0), (100.0, 10.0)])(sites))
+    assert len(within) == 40
+    assert sorted({round(float(y), 2) for y in within.y}) == [-1.75, 1.75]
