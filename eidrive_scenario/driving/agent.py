@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
@@ -14,13 +14,14 @@ from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.detector import Detector, Installation
-from eidrive_scenario.perception.localization import Localizer
+from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.v2x.message import Message, Received, StationState
 from eidrive_scenario.v2x.size import cpm_size
@@ -80,8 +81,8 @@ class Agent:
             self._detections = fresh
         detections = self._detections
         self._listen(inbox, now)
-        if fresh is not None and not self.own_perception:
         state = self._state(ego)
+        if fresh is not None and not self.own_perception:
             self._take(Report(self.name, detections, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
         plan = None
@@ -121,7 +122,6 @@ class Agent:
         for sender in [sender for sender, held in self._reports.items() if held.detections.time < oldest]:
             del self._reports[sender]
 
-    def _without_own_body(self, detections: Detections) -> Detections:
     def _take(self, report: Report) -> None:
         """Fusion hears every report; a late one does not replace a newer one."""
         self.fusion.hear(report)
@@ -129,6 +129,7 @@ class Agent:
         if held is None or report.detections.time >= held.detections.time:
             self._reports[report.station] = report
 
+    def _without_own_body(self, detections: Detections) -> Detections:
         """A report of others without the box that is this station itself: the vehicle must not brake for itself.
 
         Judged against where this station was when the report was measured, so that delay does not matter.
@@ -220,7 +221,7 @@ def build_agent(
         perception=Perception(
             detector,
             tracker=_tracker(settings, detector),
-            localizer=Localizer(spec.name, seed) if settings.localization == "ekf" else None,
+            localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
             latency=settings.detector_latency,
         ),
         fusion=registry("fusion").load(settings.fusion)(),
@@ -239,3 +240,9 @@ def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:
     if settings.tracker is None:
         return None if detector.gives_velocity else Tracker(TrackerSettings())
     return None if settings.tracker.kind == "none" else Tracker(settings.tracker)
+
+
+def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:
+    """A filter that knows the data sheet of the station's inertial unit."""
+    units = [sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings)]
+    return Localizer(name, seed, noise=motion_noise(units[0]))

@@ -13,7 +13,7 @@ from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
 from eidrive_scenario.sensing.settings import LidarSettings
-from eidrive_scenario.sensing.truth import crossing
+from eidrive_scenario.sensing.truth import crossing, past_box
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
@@ -25,7 +25,8 @@ class Lidar:
     """Rings of rays; each reading covers what the head has turned since the last one, at most one revolution.
 
     All rays of a reading start from the pose at its time: the motion during a revolution does not bend the sweep. Rays
-    that meet the own body give no return. What is random is drawn by seed, station, name and tick.
+    that meet the own body give no return; a mast is too thin to hide the ground around it from the head on its top.
+    What is random is drawn by seed, station, name and tick.
     """
 
     def __init__(self, settings: LidarSettings, spec: ActorSpec, name: str = "lidar", seed: int = 0) -> None:
@@ -33,6 +34,7 @@ class Lidar:
         self.mounting = mounting(settings, spec, "roof")
         rings = settings.elevations or np.linspace(settings.upper_fov, settings.lower_fov, settings.channels)
         self._elevations = np.radians(rings)
+        self._on_mast = spec.wheelbase <= 0.0
         self._columns_per_second = settings.points_per_second / settings.channels
         self._columns_per_turn = max(1, round(self._columns_per_second / settings.rotation))
         self._next: int | None = None
@@ -51,12 +53,17 @@ class Lidar:
         ways = directions @ pose[:3, :3].T
         origin = np.broadcast_to(pose[:3, 3], directions.shape)
         targets = origin + settings.range * ways
-        enter, leave = crossing(origin[None], targets[None], view.boxes[row][None])
-        clear = np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
-        hits = scene.cast(np.ascontiguousarray(origin[clear]), targets[clear])
+        own = view.boxes[row][None]
+        if self._on_mast:
+            starts, clear = past_box(origin[None], targets[None], own)[0], np.arange(len(origin))
+        else:
+            enter, leave = crossing(origin[None], targets[None], own)
+            starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
+        hits = scene.cast(np.ascontiguousarray(starts[clear]), targets[clear])
         rows = np.asarray(hits.rows)
         met = rows != NOTHING
-        distance = np.where(met, np.asarray(hits.fraction) * settings.range, np.inf)
+        begin = np.linalg.norm(starts[clear] - pose[:3, 3], axis=1) if self._on_mast else 0.0
+        distance = np.where(met, begin + np.asarray(hits.fraction) * (settings.range - begin), np.inf)
         weather = scene.weather
         facing = np.abs(np.einsum("mi,mi->m", np.asarray(hits.normal), ways[clear]))
         seed, *key = self._key

@@ -1,0 +1,243 @@
+"""The filter on GNSS and IMU: closed forms, consistency on simulated drives, and what follows for the readings."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.localization import (
+    Estimate,
+    InertialFilter,
+    Localizer,
+    MotionNoise,
+    StartNoise,
+    motion_noise,
+)
+from eidrive_scenario.sensing.readings import (
+    CameraReading,
+    EgoState,
+    GnssReading,
+    ImuReading,
+    LidarReading,
+    Readings,
+    TruthReading,
+)
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+
+DT = 0.05
+CAR = ActorSpec(
+    "Ego",
+    "car",
+    "car",
+    (4.892, 1.837, 1.49),
+    (1.4, 0.0, 0.745),
+    wheelbase=2.85,
+    max_steering=0.6,
+    mass=1900.0,
+    max_acceleration=5.0,
+    max_deceleration=9.0,
+)
+
+
+def imu(acceleration: float = 0.0, turn: float = 0.0) -> ImuReading:
+    return ImuReading(np.array([acceleration, 0.0, 0.0]), np.array([0.0, 0.0, turn]))
+
+
+def ego(x: float, y: float, yaw: float, speed: float, time: float = 0.0) -> EgoState:
+    return EgoState(time, np.array([x, y, 1.5]), yaw, 0.01, 0.02, speed, 0.0, 0.0)
+
+
+def still(*state: float) -> Estimate:
+    return Estimate(np.array(state), 1e-12 * np.eye(6))
+
+
+def test_prediction_follows_the_circle() -> None:
+    """10 m/s and 0.5 rad/s for pi seconds: a quarter of a circle of 20 m."""
+    filter_ = InertialFilter(still(0, 0, 0, 10, 0, 0), MotionNoise())
+    for _ in range(1000):
+        filter_.predict(imu(turn=0.5), math.pi / 1000)
+    np.testing.assert_allclose(filter_.estimate.state[:4], [20, 20, math.pi / 2, 10], atol=1e-4)
+
+
+def test_known_biases_are_taken_off() -> None:
+    """An accelerometer that says 1.1 with a bias of 0.1, a gyroscope that says its bias: 2 s from rest, straight."""
+    filter_ = InertialFilter(still(0, 0, 0, 0, 0.02, 0.1), MotionNoise())
+    for _ in range(40):
+        filter_.predict(imu(1.1, 0.02), DT)
+    np.testing.assert_allclose(filter_.estimate.state, [2.0, 0, 0, 2.0, 0.02, 0.1], atol=1e-9)
+
+
+def test_uncertainty_grows_by_the_stated_noise() -> None:
+    """Standing with white gyroscope noise n for 4 s: heading variance n² T; with acceleration noise, speed n² T."""
+    noise = MotionNoise(acceleration=0.05, turn_rate=0.003, turn_walk=0.0, slip=0.0, drift=0.0)
+    filter_ = InertialFilter(still(0, 0, 0, 0, 0, 0), noise)
+    for _ in range(80):
+        filter_.predict(imu(), DT)
+    covariance = filter_.estimate.covariance
+    assert covariance[2, 2] == pytest.approx(0.003**2 * 4.0, rel=1e-3)
+    assert covariance[3, 3] == pytest.approx(0.05**2 * 4.0, rel=1e-3)
+    assert covariance[0, 0] == pytest.approx(0.05**2 * 4.0**3 / 3.0, rel=0.03)
+
+
+def test_prediction_spreads_as_differences_say() -> None:
+    """Noise-free, the covariance is that of the numerical Jacobian."""
+    noise = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    middle = np.array([3.0, -2.0, 0.7, 9.0, 0.01, 0.05])
+    before = np.diag([0.3, 0.2, 0.01, 0.4, 1e-4, 1e-3])
+
+    def moved(state: np.ndarray) -> np.ndarray:
+        filter_ = InertialFilter(Estimate(state, before), noise)
+        filter_.predict(imu(1.2, 0.3), 0.2)
+        return filter_.estimate.state
+
+    jacobian = np.stack([(moved(middle + n) - moved(middle - n)) / 2e-5 for n in 1e-5 * np.eye(6)], axis=1)
+    filter_ = InertialFilter(Estimate(middle, before), noise)
+    filter_.predict(imu(1.2, 0.3), 0.2)
+    np.testing.assert_allclose(filter_.estimate.covariance, jacobian @ before @ jacobian.T, atol=1e-6)
+
+
+def test_a_fix_is_weighed_by_its_covariance() -> None:
+    """Prior variance 1, fix variance 3: a quarter of the way."""
+    filter_ = InertialFilter(Estimate(np.zeros(6), np.eye(6)), MotionNoise())
+    filter_.correct(GnssReading(np.array([4.0, -8.0, 99.0]), 3.0 * np.eye(3)))
+    np.testing.assert_allclose(filter_.estimate.state[:2], [1.0, -2.0])
+    np.testing.assert_allclose(np.diag(filter_.estimate.covariance)[:2], [0.75, 0.75])
+
+
+def test_it_knows_how_wrong_it_is_where_its_model_holds() -> None:
+    """Fifty drives with exactly the noise that the filter assumes: NEES of x, y, yaw, speed and bias, 5 degrees.
+
+    At each instant the mean over the runs lies within the 99 % bounds of chi-square(250)/50 nearly always, and its mean
+    over time does (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2).
+    """
+    runs, ticks = 50, 300
+    noise, start = MotionNoise(slip=0.0, drift=0.05), StartNoise()
+    nees = np.zeros(ticks)
+    for run in range(runs):
+        rng = np.random.default_rng(500 + run)
+        truth = np.array([0.0, 0.0, rng.uniform(-3, 3), 8.0])
+        bias = rng.normal(0.0, noise.turn_bias)
+        deviations = np.array([start.position, start.position, start.yaw, start.speed, noise.turn_bias, 1e-9])
+        first = np.array([*truth, bias, 0.0]) + deviations * rng.standard_normal(6)
+        first[4:] = 0.0
+        filter_ = InertialFilter(Estimate(first, np.diag(deviations**2)), noise)
+        for tick in range(ticks):
+            push, turn = math.sin(0.03 * tick), 0.4 * math.sin(0.02 * tick + run)
+            middle, mean = truth[2] + 0.5 * turn * DT, truth[3] + 0.5 * push * DT
+            aside = noise.drift * math.sqrt(DT) * rng.standard_normal()
+            cos, sin, way = math.cos(middle), math.sin(middle), mean * DT
+            truth += np.array([way * cos - aside * sin, way * sin + aside * cos, turn * DT, push * DT + aside * turn])
+            bias += noise.turn_walk * math.sqrt(DT) * rng.standard_normal()
+            white = rng.standard_normal(2) / math.sqrt(DT)
+            filter_.predict(imu(push + noise.acceleration * white[0], turn + bias + noise.turn_rate * white[1]), DT)
+            if tick % 2 == 0:
+                fix = np.array([*(truth[:2] + 0.3 * rng.standard_normal(2)), 0.0])
+                filter_.correct(GnssReading(fix, 0.09 * np.eye(3)))
+            state, covariance = filter_.estimate
+            off = state[:5] - np.array([*truth, bias])
+            off[2] = wrap_angle(float(off[2]))
+            nees[tick] += off @ np.linalg.solve(covariance[:5, :5], off) / runs
+    low, high = chi2.ppf([0.005, 0.995], 5 * runs) / runs
+    assert np.mean((nees > low) & (nees < high)) > 0.9
+    assert low < nees.mean() < high
+
+
+def test_it_knows_how_wrong_it_is_in_the_world() -> None:
+    """Twelve drives of 20 s of the single-track model with its slipping tyres, through the simulated sensors.
+
+    NEES of x, y, yaw and speed, 4 degrees: the mean over runs and time, after 2 s, lies between 3 and 5.5 (the tyres'
+    slip is no white noise, so the bounds are wider than those of chi-square), and the position is better than a fix.
+    """
+    nees, errors = [], []
+    for seed in range(12):
+        sway = 0.01 * (seed % 10)
+        unit = ImuSettings(accelerometer_bias=0.05)
+        with World(None, dt=DT) as world:
+            world.add(CAR, Placement(0, 0, speed=10.0), driven=True)
+            rig = Rig(CAR, {"gnss": GnssSettings(), "imu": unit}, seed=seed)
+            localizer = Localizer("Ego", seed, noise=motion_noise(unit))
+            for tick in range(400):
+                readings = rig.read(world, world.view())
+                localizer.located(readings)
+                state, covariance = localizer.estimate
+                true = readings.ego
+                off = np.array(
+                    [*(state[:2] - true.position[:2]), wrap_angle(float(state[2]) - true.yaw), state[3] - true.speed]
+                )
+                if tick >= 40:
+                    nees.append(off @ np.linalg.solve(covariance[:4, :4], off))
+                    errors.append(float(np.hypot(off[0], off[1])))
+                world.step({}, {"Ego": Control(0.12, 0.0, sway * math.sin(0.03 * tick))})
+    assert 3.0 < np.mean(nees) < 5.5
+    assert np.sqrt(np.mean(np.square(errors))) < 0.6 * 0.3 * math.sqrt(2)
+
+
+def test_the_start_is_drawn_by_seed_and_station() -> None:
+    truth = Readings(0.0, ego(5.0, 6.0, 1.0, 3.0))
+    starts = {
+        (seed, name): Localizer(name, seed).located(truth).ego.position.tolist()
+        for seed in (1, 2)
+        for name in ("Ego", "Other")
+    }
+    assert len({tuple(place) for place in starts.values()}) == 4
+    again = Localizer("Ego", 1).located(truth).ego.position.tolist()
+    assert again == starts[1, "Ego"]
+    draws = np.array([Localizer("Ego", seed).located(truth).ego.position[:2] - (5.0, 6.0) for seed in range(300)])
+    np.testing.assert_allclose(draws.std(axis=0), [0.5, 0.5], rtol=0.12)
+
+
+def test_readings_move_with_the_estimate() -> None:
+    """Sensors and objects keep their place relative to the station, height and levelling stay true."""
+    localizer = Localizer("Ego", 3)
+    pose = np.eye(4)
+    pose[:3, 3] = 6.0, 6.0, 2.0
+    box = np.array([[15.0, 6.0, 0.7, 4.6, 1.8, 1.5, 1.0]])
+    truth = Readings(
+        0.0,
+        ego(5.0, 6.0, 0.0, 3.0),
+        TruthReading(("A",), ("car",), box, np.array([[2.0, 0.0]]), np.ones(1)),
+        {
+            "front": CameraReading(
+                np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2), np.float32), np.zeros((2, 2), np.int32), np.eye(3), pose
+            )
+        },
+        {"roof": LidarReading(np.ones((1, 3)), np.ones(1), pose)},
+    )
+    found = localizer.located(truth)
+    shift, turn = found.ego.position - truth.ego.position, found.ego.yaw
+    assert np.linalg.norm(shift) > 0.01
+    assert abs(turn) > 1e-4
+    assert shift[2] == 0.0
+    assert (found.ego.pitch, found.ego.roll) == (0.01, 0.02)
+    cos, sin = math.cos(turn), math.sin(turn)
+    for reading in (found.cameras["front"], found.lidars["roof"]):
+        np.testing.assert_allclose(reading.pose[:3, 3] - found.ego.position, [cos, sin, 0.5], atol=1e-12)
+        assert reading.pose[0, 0] == pytest.approx(cos)
+    assert found.truth is not None
+    np.testing.assert_allclose(found.truth.boxes[0, :2] - found.ego.position[:2], [10 * cos, 10 * sin], atol=1e-12)
+    assert found.truth.boxes[0, 6] == pytest.approx(1.0 + turn)
+    np.testing.assert_allclose(found.truth.velocity, [[2 * cos, 2 * sin]])
+
+
+def test_between_fixes_it_goes_by_the_inertial_unit() -> None:
+    """A fix each second, readings of the unit each tick: the estimate moves in every tick, at 10 m/s."""
+    localizer = Localizer("Ego", 1, start=StartNoise(0.01, 1e-4, 0.01))
+    xs = []
+    for tick in range(40):
+        time = tick * DT
+        fix = GnssReading(np.array([10.0 * time, 0.0, 0.0]), 0.01 * np.eye(3)) if tick % 20 == 0 else None
+        found = localizer.located(Readings(time, ego(10.0 * time, 0.0, 0.0, 10.0, time), gnss=fix, imu=imu()))
+        xs.append(float(found.ego.position[0]))
+    np.testing.assert_allclose(np.diff(xs), 0.5, atol=0.05)
+
+
+def test_without_a_reading_there_is_no_estimate() -> None:
+    with pytest.raises(ValueError, match="before the first reading"):
+        Localizer("Ego", 1).estimate  # noqa: B018
