@@ -36,6 +36,7 @@ from eidrive_scenario.storyboard.progress import Progress, Watch
 from eidrive_scenario.storyboard.random_way import any_branch, random_route
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.storyboard.stand_in import StandIn
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 from eidrive_scenario.storyboard.transition import Transition as ValueTransition
@@ -98,6 +99,7 @@ __all__ = [
     "Settings",
     "SimulationError",
     "Stage",
+    "StandIn",
     "State",
     "StateChange",
     "Steering",

@@ -9,7 +9,7 @@ from typing import Any
 
 from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
 
-GROUPS = ("actions", "conditions", "criteria", "detectors", "channels", "fusion", "planners")
+GROUPS = ("actions", "conditions", "criteria", "detectors", "channels", "fusion", "planners", "controllers")
 
 
 class Registry:

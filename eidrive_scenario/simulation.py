@@ -48,6 +48,8 @@ class RunSettings:
     cooperate       the senders whom driven stations hear; () is nobody
     parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
     dt              step [s]
+    controllers     who stands in for controllers of other tools, by the controller's name; without an entry its entity
+                    keeps lane and speed
     time_limit      [s] of simulated time, for files that do not end by themselves
     weather         preset or file; it wins over all that the file says of weather and road
     user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
@@ -59,6 +61,7 @@ class RunSettings:
     parameters: Mapping[str, str | Assignment] = field(default_factory=dict)
     dt: float = 0.05
     time_limit: float = 120.0
+    controllers: Mapping[str, str] = field(default_factory=dict)
     weather: str | Path | None = None
     user_values: Mapping[str, str] = field(default_factory=dict)
 
@@ -151,7 +154,9 @@ class Simulation:
         with together:
             check_commands(scenario)
         with together:
-            self.storyboard = Storyboard(scenario, self.roads, dt=self.settings.dt, seed=seed)
+            self.storyboard = Storyboard(
+                scenario, self.roads, dt=self.settings.dt, seed=seed, controllers=self.settings.controllers
+            )
         with together:
             self.stations = Stations(
                 scenario,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.stand_in import stand_ins
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind
 from eidrive_scenario.world.view import WorldView
@@ -37,6 +39,7 @@ class Storyboard:
         seed: int = 0,
         actions: Registry | None = None,
         conditions: Registry | None = None,
+        controllers: Mapping[str, str] | None = None,
     ) -> None:
         self.scenario = scenario
         self.dt = dt
@@ -47,6 +50,7 @@ class Storyboard:
             actor.trailer = declared_trailer(scenario.entities[name])
         self._external = ExternalObjects(scenario, roads)
         self.stage.warnings += self._external.warnings
+        self._stand_ins = stand_ins(self.stage.actors, self.stage, controllers or {}, registry("controllers"))
         self.ended: str | None = None
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 
@@ -84,6 +88,9 @@ class Storyboard:
         commands = self.stage.commands
         self._bring_trailers()
         self._refresh(commands)
+        for stand_in in self._stand_ins:
+            if stand_in.actor.present and not stand_in.actor.driven:
+                stand_in.step()
         drawn = {back.name for _, back in pairs(self.stage.actors)}
         for name, actor in self.stage.actors.items():
             if not actor.present or name in drawn:

@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from reference_player import KinematicWorld
+from kinematic_world import KinematicWorld
 from street_scene import CAR, GROUP, OURS, STREET, TRIGGER, at
 from whole_run import run as run
 
@@ -32,6 +32,8 @@ SCENARIO = """<OpenSCENARIO>
     <Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private></Actions></Init>
     {story}</Storyboard></OpenSCENARIO>"""
 
+CRUISE = """<ObjectController><Controller name="cruise" controllerType="movement"><Properties>{properties}</Properties>
+  </Controller></ObjectController>"""
 STORY = """<Story name="story"><Act name="act">{groups}</Act></Story>"""
 
 
@@ -60,7 +62,8 @@ class Played:
 def scene(tmp_path: Path) -> Callable[..., Played]:
     """Plays actions: `play(seconds, (actor, action, condition), …, ego=(lane, s, speed), other=…)`.
 
-    Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it.
+    Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it. `cruise`
+    gives it one of another tool, with these properties, for which an adaptive cruise control stands in.
     """
     (tmp_path / "street.xodr").write_text(STREET)
 
@@ -71,6 +74,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         other: tuple[int, float, float] = (-1, 150.0, 10.0),
         dt: float = 0.1,
         driven: bool = False,
+        cruise: str | None = None,
         everywhere: str = "",
         edge: str = "none",
     ) -> Played:
@@ -78,14 +82,17 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         for number, (actor, action, *condition) in enumerate(steps):
             trigger = TRIGGER.format(edge=edge, condition=condition[0]) if condition else ""
             groups += GROUP.format(number=number, actor=actor, action=action, trigger=trigger)
-        cars = CAR.format(name="Ego", controller=OURS if driven else "") + CAR.format(name="Other", controller="")
+        controller = OURS if driven else "" if cruise is None else CRUISE.format(properties=cruise)
+        cars = CAR.format(name="Ego", controller=controller) + CAR.format(name="Other", controller="")
         story = STORY.format(groups=groups) if groups else ""
         text = SCENARIO.format(cars=cars, ego=at(*ego), other=at(*other), story=story, everywhere=everywhere)
         path = tmp_path / "scene.xosc"
         path.write_text(text)
         scenario = load_scenario(path)
         assert scenario.road_file is not None
-        storyboard = Storyboard(scenario, RoadNetwork.load(scenario.road_file), dt=dt)
+        storyboard = Storyboard(
+            scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": "adaptive_cruise"}
+        )
         world, played = KinematicWorld(scenario, dt), Played(dt)
         first = storyboard.initial()
         world.add(first.additions)

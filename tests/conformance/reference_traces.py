@@ -37,6 +37,12 @@ ENDINGS = {"endTransition", "stopTransition"}
 is overridden and what is around a stopped action, where the standard stops it, and stops actions that are done at
 once, where the standard ends them. State and time are compared all the same."""
 
+LINE = "line of the reference table"
+"""Name of the property by which a test hands on its line of the table, from whatever worker it ran on."""
+
+STAND_INS = {"ACCController": "adaptive_cruise", "ALKSController": "adaptive_cruise"}
+"""Controllers of esmini that the reference was recorded with, and who plays their part here."""
+
 FOLDERS = {
     "esmini": "esmini/xosc",
     "ALKS": "alks/concrete_scenarios",
@@ -105,7 +111,8 @@ class Deviation:
 
 def play(path: Path, *, limit: float) -> Run:
     """Play a scenario file at steps of 0.01 s to its end or to the time limit [s]."""
-    simulation = Simulation(load_scenario(path), settings=RunSettings(dt=0.01, time_limit=limit))
+    settings = RunSettings(dt=0.01, time_limit=limit, controllers=STAND_INS)
+    simulation = Simulation(load_scenario(path), settings=settings)
     run, end = Run(), None
     started = time.process_time()
     with simulation:

@@ -47,7 +47,10 @@ class VisibilityAction(ActionBehaviour):
 
 
 class LightStateAction(ActionBehaviour):
-    """Switches a light of the vehicle; done when the transition time is over. It flashes until it is switched again."""
+    """Switches a light of the vehicle; done when the transition time is over.
+
+    A flashing light never comes to rest: the action goes on until a younger one switches the same light.
+    """
 
     domains = Domain.LIGHTING
     action: model.LightStateAction
@@ -77,7 +80,8 @@ class LightStateAction(ActionBehaviour):
     def update(self) -> Status:
         """Wait for the transition's end."""
         self._left -= self.stage.dt
-        return Status.SUCCESS if self._left < 1e-6 else Status.RUNNING
+        over = self._left < 1e-6 and self._mode != model.LightMode.FLASHING.value
+        return Status.SUCCESS if over else Status.RUNNING
 
     @property
     def _light(self) -> str:

@@ -41,22 +41,25 @@ class SpeedAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Lay the transition from the present speed."""
+        self._transition = self._laid(self._present(), self._target())
+
+    def _laid(self, start: float, target: float) -> ValueTransition:
         _, faster, slower = self.actor.limits()
-        start, target = self._present(), self._target()
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            self._transition = ValueTransition.by_rate(shape, start, target, value)
+            transition = ValueTransition.by_rate(shape, start, target, value)
         elif self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE:
-            self._transition = ValueTransition(shape, start, target, duration_over(start, target, value))
+            transition = ValueTransition(shape, start, target, duration_over(start, target, value))
         else:
-            self._transition = ValueTransition(shape, start, target, value)
-        self._transition.limit_rate(faster if target > start else slower)
+            transition = ValueTransition(shape, start, target, value)
+        transition.limit_rate(faster if target > start else slower)
+        return transition
 
     def update(self) -> Status:
         """The speed at the end of the step."""
         transition = self._transition
         if self._relative is not None:
-            transition.target = self._target()
+            self._aim_anew(self._target())
         if self.actor.driven:
             return self._ask_driver()
         if transition.done and transition.extent > 0.0:
@@ -66,6 +69,13 @@ class SpeedAction(ActionBehaviour):
         self.actor.motion.speed = speed
         reached = transition.done and abs(speed - transition.target) < TINY
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
+
+    def _aim_anew(self, target: float) -> None:
+        """The target has moved: a rate is kept by taking longer or shorter, a time or distance by another slope."""
+        transition = self._transition
+        transition.target = target
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE and not transition.done:
+            transition.extent = self._laid(transition.start, target).extent
 
     def _ask_driver(self) -> Status:
         """The speed of the transition becomes the goal, with its slope; done when the vehicle itself is as fast."""

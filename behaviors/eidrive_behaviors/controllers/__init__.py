@@ -1,0 +1,1 @@
+"""Stand-ins for controllers of other tools, one per module."""

@@ -1,0 +1,117 @@
+"""Adaptive cruise control: a set speed, and a time gap to who is ahead in the lane."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.api import Actor, Stage, StandIn, box_of, distance, model
+
+CLOSEST = 3.0
+"""Gap to a standing vehicle [m]."""
+STOP = 1.0
+"""With less gap than this it stands at once [m]."""
+LOOKOUT = 50.0
+"""So far it looks at least [m]."""
+SHARE = 0.7
+"""Of the vehicle's largest acceleration that a free road is driven with."""
+GAIN = 2.5
+"""Acceleration for a gap that is wide open [m/s²]."""
+OVERRULED = 1e-3
+"""A speed that differs by more than this was set by somebody else [m/s]."""
+
+
+class AdaptiveCruise(StandIn):
+    """Keeps the set speed on a free road, and 3 m and a time gap behind who is ahead in its lane.
+
+    The law is that of esmini's ACC and ALKS controllers, so that scenarios which rely on them can be played: with the
+    gap g, the wanted gap w = 3 m + `timeGap` · max(v, v_lead) and f = min(1, g / w - 1) the acceleration is
+    2.5 f - f (v - v_set) - (1 - f) (v - min(v_set, v_lead)), within the vehicle's Performance and up to the set speed.
+    That is the speed which it is started with or which SpeedActions give; with the property `mode=override` it is
+    `setSpeed` [m/s], and SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
+    """
+
+    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
+        super().__init__(controller, stage, actor)
+        self.time_gap = float(self.properties.get("timeGap", 1.5))
+        self.aside = float(self.properties.get("lateralDist", 5.0))
+        self._alone = self.properties.get("mode") == "override"
+        self._given = self.properties.get("setSpeed")
+
+    def begin(self) -> None:
+        """Drive on with the speed of now."""
+        self._last = self.actor.motion.speed
+        self._set = self._last
+        if self._given is not None and self._alone:
+            self._set = float(self._given)
+
+    def speed(self) -> float:
+        """By the law."""
+        now = self.actor.motion.speed
+        if not self._alone and abs(now - self._last) > OVERRULED:
+            self._set = self._last = now
+        ahead = self._ahead()
+        self._last = self._free() if ahead is None else self._behind(*ahead)
+        return self._last
+
+    def _free(self) -> float:
+        _, faster, slower = self.actor.limits()
+        now, dt = self._last, self.stage.dt
+        acceleration = min(max((self._set - now) * SHARE * faster, -slower), SHARE * faster)
+        then = now + acceleration * dt
+        return self._set if abs(then - self._set) > abs(now - self._set) else then
+
+    def _behind(self, gap: float, lead: float) -> float:
+        if gap < STOP:
+            return 0.0
+        _, faster, slower = self.actor.limits()
+        now = self._last
+        wanted = CLOSEST + self.time_gap * abs(max(now, lead))
+        open_by = min(1.0, gap / wanted - 1.0)
+        acceleration = GAIN * open_by - open_by * (now - self._set) - (1.0 - open_by) * (now - min(self._set, lead))
+        then = now + min(max(acceleration, -slower), faster) * self.stage.dt
+        return max(0.0, min(then, max(now, self._set)))
+
+    def _ahead(self) -> tuple[float, float] | None:
+        """Gap to [m] and speed of [m/s] the nearest one in the way."""
+        found = [
+            (gap, self.stage.speed(name))
+            for name, other in self.stage.actors.items()
+            if other is not self.actor and other.present and (gap := self._gap(name)) is not None
+        ]
+        return min(found, default=None)
+
+    def _gap(self, name: str) -> float | None:
+        stage, me = self.stage, self.actor.name
+        here, there, roads = stage.location(me), stage.location(name), stage.roads
+        if roads is not None and here is not None and there is not None:
+            apart = roads.distance(here, there)
+            reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / self.actor.limits()[2])
+            if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.aside:
+                same = here.lane == there.lane if here.road == there.road else self._beside(apart[1]) is False
+                gap = apart[0] - self._overhang(name)
+                if same and gap > 0.0:
+                    return gap
+        return self._close(name)
+
+    def _beside(self, across: float) -> bool:
+        """True for a place that is further aside than half a lane."""
+        here, roads = self.stage.location(self.actor.name), self.stage.roads
+        return here is None or roads is None or abs(across) > 0.5 * roads.lane_width(here.road, here.lane, here.s)
+
+    def _close(self, name: str) -> float | None:
+        """The gap to who is right before the bumper in whatever lane, more to the right than to the left."""
+        me = self.actor.name
+        along, aside = (
+            distance(self.stage, me, name, frame="entity", kind=kind, freespace=True)
+            for kind in ("longitudinal", "lateral")
+        )
+        faster_by = max(0.0, self._last - self.stage.speed(name))
+        length = box_of(self.stage, name)[3]
+        return along if 0.0 < along < 1.0 + length + 0.5 * faster_by and -0.5 < aside < 0.2 else None
+
+    def _overhang(self, name: str) -> float:
+        """From reference point to reference point, less the gap between the two [m]."""
+        mine, theirs = self.actor.entity.bounding_box, self.stage.actors[name].entity.bounding_box
+        turn = math.cos(self.stage.pose(self.actor.name).h - self.stage.pose(name).h)
+        rear = 0.5 * theirs.dimensions.length - math.copysign(theirs.center.x, turn)
+        return 0.5 * mine.dimensions.length + mine.center.x + rear

@@ -1,0 +1,64 @@
+"""The seam of stand-ins: who drives a scripted actor in place of a controller of another tool."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.errors import RegistryError
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.registry import Registry
+from eidrive_scenario.storyboard.actor import Actor
+
+if TYPE_CHECKING:
+    from eidrive_scenario.storyboard.stage import Stage
+
+
+class StandIn(ABC):
+    """Plays the longitudinal part of a Controller that names no module of ours, where the caller asks for it.
+
+    It decides while the controller is active in the longitudinal domain; speed actions of that time set the speed that
+    it aims at.
+    """
+
+    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
+        properties = controller.properties.property if controller.properties is not None else ()
+        self.properties: Mapping[str, str] = {entry.name: entry.value for entry in properties}
+        self.stage = stage
+        self.actor = actor
+        self._active = False
+
+    def step(self) -> None:
+        """Set the actor's speed for the step that begins now, if it is for the controller to decide."""
+        if not self.actor.longitudinal:
+            self._active = False
+            return
+        if not self._active:
+            self._active = True
+            self.begin()
+        self.actor.motion.speed = self.speed()
+
+    @abstractmethod
+    def begin(self) -> None:
+        """The controller has just been activated."""
+
+    @abstractmethod
+    def speed(self) -> float:
+        """The speed of the step that begins now [m/s]."""
+
+
+def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, str], known: Registry) -> list[StandIn]:
+    """One per actor whose controller's name is `wanted`; the values name stand-ins.
+
+    Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
+    """
+    found = []
+    for actor in actors.values():
+        for controller in actor.controllers:
+            if controller.name in wanted:
+                made = known.load(wanted[controller.name])(controller, stage, actor)
+                if not isinstance(made, StandIn):
+                    raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
+                found.append(made)
+    return found

@@ -1,0 +1,111 @@
+"""Every scenario that third parties wrote loads and plays to its stop trigger, its end or the time limit."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+CORPORA = os.environ.get("EIDRIVE_CORPORA", "")
+pytestmark = pytest.mark.skipif(not CORPORA, reason="EIDRIVE_CORPORA does not say where the third-party scenarios are")
+
+ENDS = {"stop trigger", "storyboard complete", "time limit"}
+BROKEN = {
+    "esmini/xosc/car_walk.xosc": "its catalogs are those of another repository, at an absolute path",
+}
+"""Scenarios that nobody can play as they are, and why."""
+SMALLEST = {"esmini": 65, "alks": 15, "asam-1.2.0": 13, "asam-1.3.1": 14, "scenario_runner": 16}
+"""So many scenarios each corpus has at least."""
+
+
+def scenarios() -> list[str]:
+    """Files with a storyboard; the others are catalogs and distributions."""
+    found = []
+    for path in sorted(Path(CORPORA).rglob("*.xosc")) if CORPORA else ():
+        root = etree.parse(path, etree.XMLParser(recover=True)).getroot()
+        if root is not None and root.find("Storyboard") is not None:
+            found.append(path.relative_to(CORPORA).as_posix())
+    return found or ["none"]
+
+
+class Watch:
+    """Who was seen in a run, and whether everybody was somewhere."""
+
+    def __init__(self) -> None:
+        self.seen: set[str] = set()
+        self.frames = 0
+
+    def observe(self, frame: Frame) -> None:
+        self.frames += 1
+        self.seen.update(frame.view.names)
+        assert np.isfinite(frame.view.position).all()
+        assert np.isfinite(frame.view.speed).all()
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EIDRIVE_MAPS", str(Path(CORPORA) / "carla_towns"))
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
+@pytest.mark.filterwarnings("default")
+def test_a_scenario_loads_and_plays_to_an_end(name: str) -> None:
+    scenario, watch = load_scenario(Path(CORPORA) / name), Watch()
+    settings = RunSettings(dt=0.05, time_limit=60.0)
+    result = Simulation(scenario, settings=settings, observers=[watch]).run()
+    assert result.end in ENDS
+    assert watch.frames > 1
+    placed = {private.entity_ref for private in scenario.storyboard.init.actions.private if _placed(private)}
+    assert placed & set(scenario.entities) <= watch.seen
+
+
+def _placed(private: object) -> bool:
+    actions = getattr(private, "private_action", ())
+    return any(action.teleport_action is not None for action in actions)
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_scenario_says_what_is_wrong_with_it(name: str) -> None:
+    with pytest.raises(ScenarioError):
+        load_scenario(Path(CORPORA) / name)
+
+
+def test_no_scenario_is_left_out() -> None:
+    names = scenarios()
+    for corpus, least in SMALLEST.items():
+        assert sum(name.startswith(f"{corpus}/") for name in names) >= least
+    assert set(BROKEN) <= set(names)
+
+
+@pytest.mark.parametrize(
+    ("name", "entity", "lane"),
+    [
+        ("LaneChangeSimple", "hero", ("48", 4)),
+        ("Slalom", "hero", ("24", 1)),
+        ("CyclistCrossing", "hero", ("9", 1)),
+        ("LaneOffsetActionExample", "hero", ("4", -1)),
+    ],
+)
+def test_scenarios_for_carla_start_on_their_lanes_in_its_direction(name: str, entity: str, lane: tuple) -> None:
+    """Their world positions have CARLA's axes: seen with y to the left they lie outside of the town."""
+    scenario = load_scenario(Path(CORPORA) / "scenario_runner" / f"{name}.xosc")
+    with Simulation(scenario, settings=RunSettings(dt=0.05)) as simulation:
+        simulation.tick()
+        stage = simulation.storyboard.stage
+        here = stage.location(entity)
+        assert here is not None
+        assert (here.road, here.lane) == lane
+        assert abs(here.offset) < 0.6
+        assert abs(stage.actors[entity].motion.heading) < 0.05
