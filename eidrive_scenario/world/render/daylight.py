@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.weather import Weather
+from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,10 @@ NIGHT_GLOW = 0.02
 GROUND_ALBEDO = 0.12
 THICKENING = 50.0
 """Clouds that give this much rain let half as much light through as others [mm/h]."""
+CLEAR_AIR = EXTINCTION_AT_RANGE / 20_000.0
+"""Extinction that the formulas for clear and cloudy days have in them [1/m]."""
+WHITENING = 300.0
+"""Length of the way on which light in thick air is scattered again and again [m]."""
 FOG_HEIGHT = 120.0
 """Of the layer of thick air that light from above passes [m]."""
 
@@ -72,7 +76,7 @@ def daylight(weather: Weather) -> Daylight:
     clear = min(clear_sky * (1.0 - cover), total)
     clouds = max(total - direct * height - clear, 0.0) if height > 0.0 else max(total - clear, 0.0)
     if height > 0.0:
-        thick = max(weather.extinction - 3.912 / 20_000.0, 0.0)
+        thick = max(weather.extinction - CLEAR_AIR, 0.0)
         left = math.exp(-thick * FOG_HEIGHT / max(height, 0.05))
         clouds += 0.5 * direct * height * (1.0 - left)
         direct *= left
@@ -89,6 +93,9 @@ def daylight(weather: Weather) -> Daylight:
     ground = sky + sun * max(height, 0.0)
     lamps = weather.street_lighting * np.array([1.0, 0.86, 0.62])
     air = (sky + 0.5 * sun * max(height, 0.0) + 0.25 * lamps) / math.pi
+    # Light that drops have scattered many times has lost the sky's blue.
+    white = math.exp(-WHITENING * max(weather.extinction - CLEAR_AIR, 0.0))
+    air = white * air + (1.0 - white) * float(air @ LUMA) * np.array([0.985, 1.0, 1.03])
     return Daylight(sun, towards, sky, clear_light, cloud_light, ground, air)
 
 

@@ -47,8 +47,10 @@ _BY_MATERIAL = {
     "paint": "paint", "white": "paint", "red": "paint", "yellow": "paint", "cargo": "paint",
     "glass": "glass", "window": "window", "window_lit": "window",
     "chrome": "metal", "rim": "metal", "steel": "metal",
-    "headlight": "lens", "indicator": "lens", "blue_light": "lens", "red_light": "lens", "taillight": "reflector",
-    "plate": "sheeting",
+    "headlight": "lens", "indicator_left": "lens", "indicator_right": "lens", "marker_light": "lens",
+    "reversing_light": "lens", "blue_light": "lens", "red_light": "lens", "taillight": "reflector",
+    "plate": "sheeting", "sign_red": "sheeting", "sign_white": "sheeting", "sign_yellow": "sheeting",
+    "sign_blue": "sheeting", "leaves": "soil", "needles": "soil",
 }  # fmt: skip
 
 _NUMBERS = {name: number for number, name in enumerate(FINISHES)}

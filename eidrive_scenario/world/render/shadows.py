@@ -87,7 +87,7 @@ def shadow_map(casters: Sequence[Instance], towards: Array, pose: Array, pinhole
     places = (corners @ axes.T - low) * scale
     cover = rasterise(places[..., 0], places[..., 1], level - base, width, height)
     return ShadowMap(
-        cover.nearness,
+        np.where(cover.triangle >= 0, cover.nearness, np.float32(-np.inf)),
         width,
         height,
         axes.astype(np.float32),

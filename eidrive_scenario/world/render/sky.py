@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.world.render.daylight import FOG_HEIGHT, LUMA, daylight
-from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
+from eidrive_scenario.world.render.daylight import CLEAR_AIR, FOG_HEIGHT, LUMA, daylight
+from eidrive_scenario.world.weather import Weather
 
 Floats = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def dome(weather: Weather) -> Floats:
     above = above + (1.0 - weather.cloud_cover) * np.maximum(lit_from_above - above, 0.0)
     mixed = whole + (above * colour_clouds * relief[..., None] - whole) * share[..., None]
     # Thick air before the sky: as far as the layer reaches in that direction.
-    fog = max(weather.extinction - EXTINCTION_AT_RANGE / 20_000.0, 0.0)
+    fog = max(weather.extinction - CLEAR_AIR, 0.0)
     through = np.exp(-fog * FOG_HEIGHT / np.maximum(z, 0.004))[..., None]
     picture: Floats = (mixed * through + light.air * (1.0 - through)).astype(np.float32)
     picture.flags.writeable = False

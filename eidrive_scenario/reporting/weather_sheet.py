@@ -1,0 +1,139 @@
+"""A contact sheet: one street in every weather of the library, as a car's camera and a roadside unit's camera see it.
+
+`python -m eidrive_scenario.reporting.weather_sheet --out reports/weather.png`
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.library import library_path, names
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.reporting.street_view import look_at
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.weather import Weather, load_weather
+
+Array = NDArray[np.float64]
+
+ROAD = "coop_1.xodr"
+CAMERA = CameraSettings(width=640, height=360, fov=80.0, supersampling=2)
+SPEED = (8.0, 0.0, 0.0)
+"""Of the car that carries the camera [m/s]: rain comes towards it."""
+_BODIES: dict[str, tuple[str, str, tuple[float, float, float], float, float]] = {
+    "car": ("car", "car", (4.89, 1.84, 1.49), 2.85, 0.33),
+    "firetruck": ("firetruck", "truck", (8.47, 2.89, 3.83), 4.6, 0.5),
+    "bus": ("bus", "bus", (10.3, 2.8, 3.2), 5.6, 0.48),
+    "van": ("van", "van", (5.6, 2.0, 2.5), 3.4, 0.35),
+    "truck": ("truck", "truck", (8.0, 2.5, 3.5), 4.5, 0.5),
+    "motorbike": ("motorbike", "motorbike", (2.2, 0.8, 1.6), 1.5, 0.32),
+    "bicycle": ("bicycle", "bicycle", (1.8, 0.6, 1.7), 1.1, 0.34),
+    "pedestrian": ("pedestrian", "pedestrian", (0.5, 0.5, 1.75), 0.0, 0.3),
+}
+"""Shape, class, length, width and height, wheelbase, radius of the wheels."""
+_STREET: tuple[tuple[str, str, float, float, float], ...] = (
+    ("Ego", "car", 0.0, 0.0, 0.0),
+    ("Leader", "car", 21.0, -0.1, 0.0),
+    ("Van", "van", 39.0, 0.0, 0.0),
+    ("Far", "car", 95.0, 0.0, 0.0),
+    ("Oncoming", "car", 47.0, 3.6, math.pi),
+    ("Rider", "motorbike", 15.5, 3.4, math.pi),
+    ("Bus", "bus", 70.0, 3.4, math.pi),
+    ("Fire engine", "firetruck", 25.4, 8.0, -math.pi / 2),
+    ("Behind it", "car", 29.5, 21.0, -math.pi / 2),
+    ("Lorry", "truck", 33.0, -24.0, math.pi / 2),
+    ("Cyclist", "bicycle", 13.5, -3.1, 0.1),
+    ("Walker", "pedestrian", 13.2, -6.0, 1.3),
+    ("Another", "pedestrian", 12.6, 5.2, -1.4),
+    ("Third", "pedestrian", 36.5, -4.6, 2.0),
+)
+_VIEWS = (
+    ("car", look_at((1.9, -0.2, 1.35), (22.0, 0.1, 1.15)), "Ego"),
+    ("roadside unit, 6 m", look_at((42.5, -7.5, 6.0), (21.0, 2.0, 0.0)), ""),
+)
+
+
+def street() -> World:
+    """The crossing of scenario 1 with some traffic on it. Close it after use."""
+    world = World(RoadNetwork.load(library_path() / "roads" / ROAD))
+    for name, body, x, y, yaw in _STREET:
+        shape, category, size, wheelbase, wheel = _BODIES[body]
+        offset = (wheelbase / 2.0, 0.0, size[2] / 2.0)
+        spec = ActorSpec(name, shape, category, size, offset, wheelbase=wheelbase, wheel_radius=wheel)
+        world.add(spec, Placement(x, y, 0.0, yaw))
+    return world
+
+
+def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> NDArray[np.uint8]:
+    """A picture (H, W, 3): a row for each weather, a column for each view, captions above."""
+    photographer = Photographer(camera)
+    rows = []
+    with street() as world:
+        for weather in weathers:
+            world.set_weather(weather)
+            row = []
+            for number, (view, pose, own) in enumerate(_VIEWS):
+                reading = photographer.take(
+                    world,
+                    pose,
+                    generator(1, "weather sheet", number),
+                    ignore=(own,) if own else (),
+                    velocity=SPEED if own else (0.0, 0.0, 0.0),
+                    lens=generator(1, "weather sheet", "lens") if own else None,
+                )
+                about = "" if row else _in_words(weather)
+                row.append(_captioned(reading.rgb, f"{weather.name.replace('_', ' ')}: {view}", about))
+            rows.append(np.hstack(row))
+    return np.vstack(rows)
+
+
+def _in_words(weather: Weather) -> str:
+    parts = [f"sun {weather.sun_elevation:.0f} deg", f"clouds {weather.cloud_cover:.0%}"]
+    parts.append(f"visual range {weather.visual_range:g} m")
+    if weather.precipitation != "none":
+        parts.append(f"{weather.precipitation} {weather.precipitation_intensity:g} mm/h")
+    if weather.wetness > 0.0:
+        parts.append(f"wetness {weather.wetness:g}, grip {weather.friction_scale:.2f}")
+    return ", ".join(parts)
+
+
+def _captioned(picture: NDArray[np.uint8], title: str, about: str) -> NDArray[np.uint8]:
+    bar = np.full((30, picture.shape[1], 3), 245, dtype=np.uint8)
+    cv2.putText(bar, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (20, 20, 20), 1, cv2.LINE_AA)
+    wide = cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)[0][0]
+    cv2.putText(
+        bar, about, (picture.shape[1] - wide - 8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (90, 90, 90), 1, cv2.LINE_AA
+    )
+    framed = np.vstack([bar, picture])
+    framed[:, -2:] = 245
+    return framed
+
+
+def write(
+    out: Annotated[Path, typer.Option(help="The PNG file to write.")] = Path("reports/weather.png"),
+    weather: Annotated[
+        list[str] | None, typer.Option(help="Preset or file; repeatable.", show_default="all presets")
+    ] = None,
+) -> None:
+    """Draw the contact sheet."""
+    chosen = weather or sorted(names("weather"), key=("sunny", "foggy_morning", "storm", "midnight").index)
+    sheet = contact_sheet([load_weather(name, origin="--weather") for name in chosen])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(out), cv2.cvtColor(sheet, cv2.COLOR_RGB2BGR)):
+        raise SettingError(Problem(f"cannot write {out}", "give the path of a PNG file", "--out"))
+    typer.echo(f"wrote {out}")
+
+
+if __name__ == "__main__":
+    typer.run(write)

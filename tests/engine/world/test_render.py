@@ -1,0 +1,235 @@
+"""The renderer: coverage, depth, sun, shadows, fog, night, wet roads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.daylight import LUMA, daylight
+from eidrive_scenario.world.render.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
+from eidrive_scenario.world.render.rasterise import rasterise
+from eidrive_scenario.world.render.sky import SIZE, dome, horizon
+from eidrive_scenario.world.weather import Weather, load_weather
+
+CarFactory = Callable[..., ActorSpec]
+
+PINHOLE = Pinhole.of_fov(160, 120, math.radians(80))
+
+
+def looking(yaw: float, z: float = 1.5, x: float = 0.0, y: float = 0.0, pitch: float = 0.0) -> np.ndarray:
+    """A camera that looks along a heading, downwards by `pitch`."""
+    forward = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)])
+    right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(forward, right), forward, (x, y, z)
+    return pose
+
+
+def brightness(light: np.ndarray) -> np.ndarray:
+    found: np.ndarray = light @ LUMA.astype(np.float32)
+    return found
+
+
+def inside(corners: np.ndarray, x: float, y: float) -> bool:
+    a, b, c = corners
+    signs = [(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for p, q in ((a, b), (b, c), (c, a))]
+    return all(s > 0 for s in signs) or all(s < 0 for s in signs)
+
+
+def test_pixels_whose_centres_lie_inside_are_covered() -> None:
+    rng = np.random.default_rng(1)
+    corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
+    nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[:, None], 3, axis=1)
+    cover = rasterise(corners[..., 0], corners[..., 1], nearness, 20, 16)
+    for pixel in range(20 * 16):
+        x, y = pixel % 20 + 0.5, pixel // 20 + 0.5
+        holders = [k for k in range(40) if inside(corners[k], x, y)]
+        nearest = max(holders, key=lambda k: nearness[k, 0], default=-1)
+        assert cover.triangle[pixel] == nearest
+
+
+def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
+    """A fan of triangles around a point, with corners on pixel centres too: each centre inside belongs to one."""
+    ring = np.array([(2.5, 2.5), (17.5, 3.5), (18.2, 14.5), (9.5, 17.5), (1.5, 12.5)])
+    hub = np.array([9.5, 9.5])
+    triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
+    counts = np.zeros(400, dtype=int)
+    for one in triangles:
+        counts += rasterise(one[None, :, 0], one[None, :, 1], np.ones((1, 3)), 20, 20).triangle >= 0
+    assert counts.max() == 1
+    together = rasterise(triangles[..., 0], triangles[..., 1], np.ones((5, 3)), 20, 20).triangle >= 0
+    assert counts.sum() == together.sum()
+    grid = together.reshape(20, 20)
+    for line in grid:
+        covered = np.flatnonzero(line)
+        assert len(covered) == 0 or np.all(np.diff(covered) == 1)
+
+
+def test_nearness_is_that_of_the_plane() -> None:
+    corners = np.array([[[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]])
+    nearness = np.array([[0.1, 0.5, 0.3]])
+    cover = rasterise(corners[..., 0], corners[..., 1], nearness, 20, 20)
+    hit = np.flatnonzero(cover.triangle == 0)
+    x, y = hit % 20 + 0.5, hit // 20 + 0.5
+    np.testing.assert_allclose(cover.nearness[hit], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)
+
+
+def test_clear_noon_and_dusk_have_the_light_of_the_tables() -> None:
+    """Sun at 90 degrees: 127.5 klx exp(-0.21) = 103.3 klx across its rays and 16.3 klx of sky."""
+    noon = daylight(Weather(sun_elevation=90.0, cloud_cover=0.0, visual_range=1e9))
+    assert float(noon.sun @ LUMA) == pytest.approx(103_350, rel=1e-3)
+    assert float(noon.sky @ LUMA) == pytest.approx(16_300, rel=1e-3)
+    dusk = daylight(Weather(sun_elevation=-6.0, cloud_cover=0.0))
+    assert float(dusk.sky @ LUMA) == pytest.approx(3.42, rel=1e-2)
+    assert not dusk.sun.any()
+    overcast = daylight(Weather(sun_elevation=60.0, cloud_cover=1.0, visual_range=1e9))
+    total = 127_500 * math.exp(-0.21 / math.sin(math.pi / 3)) * math.sin(math.pi / 3)
+    total += 800 + 15_500 * math.sqrt(math.sin(math.pi / 3))
+    assert float(overcast.ground @ LUMA) == pytest.approx(0.25 * total, rel=1e-3)
+    assert not overcast.sun.any()
+
+
+def test_a_clear_sky_gives_the_ground_its_light() -> None:
+    """The dome's luminance times cosine, summed over its solid angle, is the sky's illuminance."""
+    weather = Weather(cloud_cover=0.0, visual_range=1e9)
+    axis = (np.arange(SIZE) - (SIZE - 1) / 2) / ((SIZE - 2) / 2)
+    square = axis[None, :] ** 2 + axis[:, None] ** 2
+    cosine = np.clip((1 - square) / (1 + square), 0.0, 1.0)
+    solid_angle = (2.0 / (1.0 + square)) ** 2 / ((SIZE - 2) / 2) ** 2
+    given = float((brightness(dome(weather)) * cosine * solid_angle)[square <= 1.0].sum())
+    assert given == pytest.approx(float(daylight(weather).clear @ LUMA), rel=0.02)
+
+
+def test_the_side_towards_the_sun_is_brighter(world: World) -> None:
+    """A house, from south and north, in the morning: what faces the sun gets it."""
+    world.add_building("house", (0.0, 0.0, 5.0), (10.0, 10.0, 10.0), colour=(0.7, 0.7, 0.7))
+    world.set_weather(Weather(sun_azimuth=180.0, sun_elevation=30.0, cloud_cover=0.0))
+    south = world.radiance(looking(math.pi / 2, 5.0, y=-25.0), PINHOLE).luminance[40:80, 60:100]
+    north = world.radiance(looking(-math.pi / 2, 5.0, y=25.0), PINHOLE).luminance[40:80, 60:100]
+    assert brightness(south).mean() > 4 * brightness(north).mean()
+
+
+@pytest.mark.parametrize(("azimuth", "side"), [(180.0, 1.0), (0.0, -1.0)])
+def test_the_shadow_of_a_house_falls_away_from_the_sun(world: World, azimuth: float, side: float) -> None:
+    """10 m high, the sun at 45 degrees: the shadow is 10 m long; 4 m from the wall it is dark and 14 m from it not."""
+    world.add_building("house", (0.0, 0.0, 5.0), (30.0, 10.0, 10.0))
+    world.set_weather(Weather(sun_azimuth=azimuth, sun_elevation=45.0, cloud_cover=0.0))
+    above = looking(math.pi / 2, 60.0, pitch=math.pi / 2 - 1e-6)
+
+    def ground(y: float) -> float:
+        row = round(PINHOLE.centre_y - PINHOLE.focal * y / 60.06)
+        light = world.radiance(above, PINHOLE).luminance
+        return float(brightness(light[row - 1 : row + 2, 70:90]).mean())
+
+    assert ground(side * 9.0) < 0.3 * ground(side * 19.0)
+    assert ground(-side * 9.0) > 0.8 * ground(side * 19.0)
+
+
+def test_vehicles_throw_shadows_and_dim_the_ground_below_them(world: World, car: CarFactory) -> None:
+    world.set_weather(Weather(sun_azimuth=180.0, sun_elevation=35.0, cloud_cover=0.0))
+    pose = looking(math.pi / 2, 12.0, y=-6.0, x=1.35, pitch=0.9)
+    before = brightness(world.radiance(pose, PINHOLE).luminance)
+    world.add(car("Ego"), Placement(0.0, 0.0))
+    seen = world.radiance(pose, PINHOLE)
+    after = brightness(seen.luminance)
+    shaded = (after < 0.5 * before) & (seen.segmentation < 0)
+    assert shaded.sum() > 30
+    # The shadow lies beyond the car (1.5 m / tan 35 degrees = 2.1 m), that is further up in the picture.
+    assert np.nonzero(shaded)[0].mean() < np.nonzero(seen.segmentation == 0)[0].mean()
+
+
+@pytest.mark.parametrize("visual_range", [40.0, 100.0, 300.0])
+def test_fog_is_koschmieder_s_law_on_distance(world: World, visual_range: float) -> None:
+    """L = L0 exp(-3.912 d / V) + La (1 - exp(-3.912 d / V)) along the ground, which mirrors nothing of the changed sky."""
+    light = {"cloud_cover": 1.0, "headlights": "off"}
+    clear = Weather(visual_range=1e9, **light)
+    fog = Weather(visual_range=visual_range, **light)
+    world.set_weather(clear)
+    bare = world.radiance(looking(0.0), PINHOLE)
+    world.set_weather(fog)
+    foggy = world.radiance(looking(0.0), PINHOLE)
+    rows, columns = np.indices(bare.depth.shape) + 0.5
+    slant = np.hypot(1.0, np.hypot(columns - PINHOLE.centre_x, rows - PINHOLE.centre_y) / PINHOLE.focal)
+    seen = np.isfinite(bare.depth) & (bare.depth * slant < 300.0)
+    through = np.exp(-3.912 / visual_range * bare.depth[seen] * slant[seen])[:, None]
+    expected = bare.luminance[seen] * through + horizon(fog) * (1.0 - through)
+    np.testing.assert_allclose(foggy.luminance[seen], expected, rtol=2e-3)
+
+
+def test_night_is_dark_and_lamps_make_it_lighter(world: World, car: CarFactory) -> None:
+    world.add(car("Ego"), Placement(0.0, 0.0))
+    ahead = looking(0.0, 1.3, x=4.0)
+    lower = np.s_[70:100, 60:100]
+
+    def road(weather: Weather) -> float:
+        world.set_weather(weather)
+        return float(brightness(world.radiance(ahead, PINHOLE).luminance[lower]).mean())
+
+    midnight = load_weather("midnight")
+    dark = road(midnight.model_copy(update={"headlights": "off", "street_lighting": 0.0}))
+    lit = road(midnight.model_copy(update={"street_lighting": 0.0}))
+    street = road(midnight.model_copy(update={"headlights": "on"}))
+    assert dark < 1e-3 * road(load_weather("sunny"))
+    assert lit > 50 * dark
+    assert street > lit
+
+
+def test_low_beam_has_its_cut_off() -> None:
+    """Brightest just under the cut-off, and above it at most what the regulation lets into oncoming eyes."""
+    straight = np.zeros(1)
+    below = float(intensity(straight, np.array([-0.022]), False)[0])
+    assert below == pytest.approx(LOW_BEAM, rel=0.05)
+    assert float(intensity(straight, np.array([0.01]), False)[0]) <= ABOVE_CUT_OFF
+    assert float(intensity(straight, np.array([0.0]), True)[0]) > 50_000
+
+
+def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFactory) -> None:
+    """Two lamps of the car's intensity at 1.8 degrees down, 20 m before a white wall: I / d² on it."""
+    spec = car("Ego")
+    world.add(spec, Placement(0.0, 0.0))
+    lamp_x, lamp_z = 3.6, 0.675
+    world.add_building("wall", (lamp_x + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), colour=(1.0, 1.0, 1.0))
+    world.set_weather(Weather(sun_elevation=-30.0, cloud_cover=0.0, visual_range=1e9))
+    height = 0.55  # above the plinth of the building, which is 0.5 m high, and above the cut-off
+    seen = world.radiance(looking(0.0, height, x=8.0), PINHOLE)
+    spot = brightness(seen.luminance)[58:62, 78:82].mean()
+    above = (height - lamp_z) / 20.03
+    expected = 2.0 * float(intensity(np.zeros(1), np.array([above]), False)[0]) / 20.03**2 / math.pi
+    assert spot == pytest.approx(expected, rel=0.3)
+
+
+def test_a_wet_road_mirrors_a_bright_wall(world: World) -> None:
+    """Seen at a low angle, the road before a white wall is lighter than when dry, and darker than when dry far from
+    anything: it takes the light of what stands there."""
+    world.add_building("wall", (30.0, 0.0, 10.0), (2.0, 200.0, 20.0), colour=(0.9, 0.1, 0.1))
+    overcast = Weather(cloud_cover=1.0, visual_range=1e9)
+    at = np.s_[66:72, 60:100]
+    world.set_weather(overcast)
+    dry = world.radiance(looking(0.0), PINHOLE).luminance[at].mean(axis=(0, 1))
+    world.set_weather(overcast.model_copy(update={"wetness": 1.0}))
+    wet = world.radiance(looking(0.0), PINHOLE).luminance[at].mean(axis=(0, 1))
+    assert wet[0] / wet[1] > 1.5 * dry[0] / dry[1]
+
+
+def test_the_far_end_of_depth(world: World) -> None:
+    seen = world.radiance(looking(0.0), Pinhole.of_fov(160, 120, math.radians(80), 0.1, 30.0))
+    finite = np.isfinite(seen.depth)
+    assert seen.depth[finite].max() <= 30.0
+    assert not finite[:60].any()
+    assert (seen.segmentation[~finite] == -1).all()
+
+
+def test_radiance_is_the_same_every_time(car: CarFactory) -> None:
+    def take() -> bytes:
+        with World() as world:
+            world.add(car("A"), Placement(8.0, 1.0, yaw=0.4))
+            world.set_weather(load_weather("storm"))
+            return world.radiance(looking(0.0), PINHOLE).luminance.tobytes()
+
+    assert take() == take()
