@@ -146,7 +146,7 @@ def test_vehicles_throw_shadows_and_dim_the_ground_below_them(world: World, car:
 
 @pytest.mark.parametrize("visual_range", [40.0, 100.0, 300.0])
 def test_fog_is_koschmieder_s_law_on_distance(world: World, visual_range: float) -> None:
-    """L = L0 exp(-3.912 d / V) + La (1 - exp(-3.912 d / V)) along the ground, which mirrors nothing of the changed sky."""
+    """L = L0 exp(-3.912 d / V) + La (1 - exp(-3.912 d / V)) along the ground, which mirrors nothing."""
     light = {"cloud_cover": 1.0, "headlights": "off"}
     clear = Weather(visual_range=1e9, **light)
     fog = Weather(visual_range=visual_range, **light)
