@@ -1,0 +1,151 @@
+"""Stations that talk to each other and fuse by covariance intersection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.agent import Agent, build_agent
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
+from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
+from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.profile import build_channel, load_profile
+from eidrive_scenario.world.actor import ActorSpec
+
+DT = 0.05
+CAR_SIZE = (4.9, 1.8, 1.5)
+Moving = tuple[float, float, float]
+"""x, y and the speed along x."""
+
+
+def spec(name: str) -> ActorSpec:
+    return ActorSpec(name, "car", "car", CAR_SIZE, (1.4, 0.0, 0.75), wheelbase=2.85, max_steering=0.6)
+
+
+def readings(time: float, at: tuple[float, float], cars: tuple[Moving, ...]) -> Readings:
+    boxes = np.array([(x + speed * time, y, 0.75, *CAR_SIZE, 0.0) for x, y, speed in cars]).reshape(-1, 7)
+    velocity = np.array([(speed, 0.0) for _, _, speed in cars]).reshape(-1, 2)
+    names = tuple(f"Car{row}" for row in range(len(cars)))
+    truth = TruthReading(names, ("car",) * len(cars), boxes, velocity, np.ones(len(cars)))
+    return Readings(time, EgoState(time, np.array([*at, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), truth)
+
+
+class Conversation:
+    """Stations on a channel, in the order of a run: deliver, act, send."""
+
+    def __init__(self, places: dict[str, tuple[float, float]], channel: str | None) -> None:
+        settings = AgentSettings(fusion="covariance_intersection")
+        self.places = places
+        self.agents: dict[str, Agent] = {
+            name: build_agent(settings, spec(name), None, seed=0, dt=DT) for name in places
+        }
+        self.channel: Channel | None = build_channel(load_profile(channel), 0) if channel is not None else None
+        self.tick = 0
+        self.sent: dict[str, Detections] = {}
+
+    def step(self, seen: dict[str, tuple[Moving, ...]]) -> dict[str, Detections]:
+        now = self.tick * DT
+        steps = {
+            name: agent.act(
+                readings(now, self.places[name], seen.get(name, ())),
+                self.channel.deliver(name, now) if self.channel is not None else (),
+                now,
+                None,
+            )
+            for name, agent in self.agents.items()
+        }
+        for name, step in steps.items():
+            for message in step.outbox:
+                self.sent[name] = message.detections
+                if self.channel is not None:
+                    self.channel.send(message, [other for other in self.agents if other != name], now)
+        self.tick += 1
+        return {name: step.fused for name, step in steps.items()}
+
+
+PLACES = {"A": (0.0, -20.0), "B": (0.0, 60.0)}
+CROSSING, HIDDEN = (10.0, 0.0, 8.0), (-30.0, 20.0, 14.0)
+
+
+def test_what_is_heard_again_from_others_was_never_theirs() -> None:
+    """A sees a car, B does not. B never says what it heard of A, so that no rumour comes back to A as news."""
+    talk = Conversation(PLACES, "{model: composed}")
+    for _ in range(20):
+        known = talk.step({"A": (CROSSING,)})
+    assert len(known["A"]) == len(known["B"]) == 1
+    assert len(talk.sent["B"]) == 0
+    alone = Conversation(PLACES, None)
+    for _ in range(20):
+        without = alone.step({"A": (CROSSING,)})
+    np.testing.assert_array_equal(known["A"].boxes, without["A"].boxes)
+    np.testing.assert_array_equal(known["A"].covariance, without["A"].covariance)
+
+
+def test_a_rumour_that_somebody_does_spread_makes_nobody_surer() -> None:
+    """B repeats what A said, as its own. Joining both as independent would halve the covariance, again and again."""
+    fusion = CovarianceIntersectionFusion()
+    box = np.array([[10.0, 0.0, 0.75, *CAR_SIZE, 0.0]])
+    known = Detections(0.0, box, np.ones(1), ("car",), np.array([[8.0, 0.0]]), np.array([np.eye(2) * 0.09]))
+    for station in "ABCDE":
+        fusion.hear(Report(station, known, 0.0))
+    fused = fusion.fuse([Report(station, known, 0.0) for station in "ABCDE"], 0.0)
+    np.testing.assert_allclose(fused.covariance, known.covariance, rtol=1e-9)
+    np.testing.assert_allclose(fused.boxes, known.boxes, atol=1e-9)
+
+
+def test_no_delay_and_no_loss_equal_shared_memory() -> None:
+    """Bit by bit what fusion makes of the own detections and those that B had a tick ago."""
+    talk = Conversation(PLACES, "{loss: {kind: bernoulli, probability: 0.0}, delay: {kind: constant, seconds: 0}}")
+    shared = CovarianceIntersectionFusion()
+    before: Detections | None = None
+    for tick in range(30):
+        seen = {"A": (CROSSING,), "B": (CROSSING, HIDDEN) if tick > 3 else (HIDDEN,)}
+        fused = talk.step(seen)["A"]
+        now = tick * DT
+        reports = [Report("B", before, now)] if before is not None else []
+        reports.append(Report("A", talk.sent["A"], now))
+        for report in reports:
+            shared.hear(report)
+        expected = shared.fuse(reports, now)
+        for name in ("boxes", "scores", "velocity", "covariance"):
+            np.testing.assert_array_equal(getattr(fused, name), getattr(expected, name))
+        before = talk.sent["B"]
+    assert len(fused) == 2
+
+
+def test_total_loss_equals_no_cooperation() -> None:
+    lossy = Conversation(PLACES, "{loss: {kind: bernoulli, probability: 1.0}}")
+    alone = Conversation(PLACES, None)
+    for tick in range(30):
+        seen = {"A": (CROSSING,) if tick % 3 else (), "B": (HIDDEN,)}
+        np.testing.assert_array_equal(lossy.step(seen)["A"].boxes, alone.step(seen)["A"].boxes)
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.1, 0.3, 0.6])
+def test_a_late_car_is_where_it_is_now(latency: float) -> None:
+    """B alone sees a car at 14 m/s; A knows it as soon as the first message is there, and at the right place."""
+    talk = Conversation(PLACES, f"{{delay: {{kind: constant, seconds: {latency}}}}}")
+    first = round(max(latency, DT) / DT)
+    for tick in range(30):
+        fused = talk.step({"B": (HIDDEN,)})["A"]
+        assert len(fused) == (tick >= first)
+        if len(fused):
+            assert fused.boxes[0, 0] == pytest.approx(HIDDEN[0] + HIDDEN[2] * tick * DT, abs=1e-6)
+
+
+def test_messages_that_overtake_each_other_and_get_lost_leave_one_car() -> None:
+    talk = Conversation(
+        PLACES, "{delay: {kind: uniform, minimum: 0.05, maximum: 0.5}, loss: {kind: bernoulli, probability: 0.3}}"
+    )
+    for tick in range(60):
+        fused = talk.step({"A": (CROSSING,), "B": (CROSSING, HIDDEN)})["A"]
+        assert len(fused) <= 2
+        if tick > 15:
+            np.testing.assert_allclose(
+                sorted(fused.boxes[:, 0].tolist()),
+                sorted(x + speed * tick * DT for x, _, speed in (CROSSING, HIDDEN)),
+                atol=1e-3,
+            )
