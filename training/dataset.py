@@ -21,7 +21,7 @@ class Dataset:
     pixels to these, camera (P, 4) width, height [px], fov [degrees], height above ground [m], weather (P,) name,
     visual_range [m], sun_elevation [degrees].
     Of objects (N,): picture, number of the class, box (N, 4) x1 y1 x2 y2 [px as stored], height [px of the camera],
-    seen and whole [px of the camera], distance [m], place (N, 7).
+    seen and whole [px of the camera], distance [m], place (N, 7), readable.
     """
 
     folder: Path
@@ -56,12 +56,13 @@ class Dataset:
 
     def to_find(self) -> NDArray[np.bool_]:
         """(N,) whether an object shows enough to be asked for; the others are ignored, found or not."""
-        return shows_enough(self.columns["height"], self.columns["seen"], self.columns["whole"])
+        enough = shows_enough(self.columns["height"], self.columns["seen"], self.columns["whole"])
+        return np.asarray(enough & self.columns["readable"], dtype=bool)
 
 
 def shows_enough(height: NDArray[Any], seen: NDArray[Any], whole: NDArray[Any]) -> NDArray[np.bool_]:
-    """(N,) whether an object is at least 8 pixels high, and 40 pixels and a fifth of its silhouette are in sight."""
-    enough: NDArray[np.bool_] = (height >= 8.0) & (seen >= 40) & (seen / np.maximum(whole, 1) >= 0.2)
+    """(N,) whether an object is at least 8 pixels high, and 30 pixels and a fifth of its silhouette are in sight."""
+    enough: NDArray[np.bool_] = (height >= 8.0) & (seen >= 30) & (seen / np.maximum(whole, 1) >= 0.2)
     return enough
 
 

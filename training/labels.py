@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import cv2
@@ -10,16 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, image_class
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
+from eidrive_scenario.roads.signal_states import lamp_colours, lamps, lit
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.furniture import SignalHead
 from eidrive_scenario.world.meshes import actor_mesh
+from eidrive_scenario.world.roadside import FIRST_LABEL
+from eidrive_scenario.world.signs import sign_face
 from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
 
 NEAREST = 0.3
 """Bodies that come nearer to the camera than this are labelled without a silhouette [m]."""
+LEAST_CONTRAST = 0.05
+"""Share of an object's contrast that must arrive through fog and rain."""
+DARK = 10
+"""Grey level, of 255, that something in or around an object must reach."""
+LEAST_FACING = 0.25
+"""Cosine of the angle between where a signal looks and where the camera is, below which it cannot be read."""
 
 
 class Label(NamedTuple):
@@ -28,6 +40,7 @@ class Label(NamedTuple):
     number   of its class in IMAGE_CLASSES;  box  x1 y1 x2 y2 of what is seen of it [px]
     seen     its pixels in sight;  whole  those of its silhouette within the picture, were it alone
     distance from the camera to its centre [m];  place  x y z l w h yaw in the world [m, rad]
+    readable whether anything tells its class: not so for a traffic light from behind, nor in thick fog or the dark
     """
 
     number: int
@@ -36,6 +49,7 @@ class Label(NamedTuple):
     whole: int
     distance: float
     place: tuple[float, ...]
+    readable: bool = True
 
 
 def actor_labels(
@@ -59,6 +73,18 @@ def actor_labels(
         found.append(
             Label(IMAGE_CLASSES.index(name), box, seen, max(whole or seen, seen), distance, tuple(place.tolist()))
         )
+    return found
+
+
+def legible(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
+    """The labels; those objects not readable of which fog leaves nothing, and those that are black on black."""
+    grey = cv2.blur(cv2.cvtColor(reading.rgb, cv2.COLOR_RGB2GRAY), (3, 3))
+    found = []
+    for label in labels:
+        left, top, right, bottom = (int(side) for side in label.box)
+        dark = int(grey[max(top - 3, 0) : bottom + 3, max(left - 3, 0) : right + 3].max()) < DARK
+        lost = math.exp(-weather.extinction * label.distance) < LEAST_CONTRAST
+        found.append(label._replace(readable=label.readable and not dark and not lost))
     return found
 
 
@@ -86,28 +112,69 @@ def silhouette(reading: CameraReading, view: WorldView, row: int, spec: ActorSpe
     return int(canvas.sum())
 
 
-def box_label(reading: CameraReading, number: int, corners: Array, centre: Array, tolerance: float) -> Label | None:
-    """A thing that is no actor, by the corners (8, 3) of its box in the world: seen where the depth is its own.
+def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: Mapping[str, str]) -> list[Label]:
+    """The traffic lights and stop signs in sight; those that turn their back or side to the camera cannot be read."""
+    found = []
+    segmentation = reading.segmentation
+    for number in np.unique(segmentation[segmentation <= FIRST_LABEL]).tolist():
+        head = heads[FIRST_LABEL - number]
+        name = signal_class(head, states.get(head.signal.id, ""))
+        if name is None:
+            continue
+        lines, columns = np.nonzero(segmentation == number)
+        box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
+        pose = head.pose
+        corners, middle = head_box(head)
+        to_eye = reading.pose[:3, 3] - middle
+        facing = (math.cos(pose.h) * to_eye[0] + math.sin(pose.h) * to_eye[1]) / float(np.hypot(to_eye[0], to_eye[1]))
+        found.append(
+            Label(
+                IMAGE_CLASSES.index(name),
+                box,
+                len(lines),
+                max(_outline(reading, corners), len(lines)),
+                float(np.linalg.norm(to_eye)),
+                (*middle.tolist(), 0.0, head.width, head.height, pose.h),
+                readable=facing > LEAST_FACING,
+            )
+        )
+    return found
 
-    None if it is out of the picture or wholly hidden.
-    """
+
+def signal_class(head: SignalHead, state: str) -> str | None:
+    """The class of a traffic light or stop sign; None for all other signs."""
+    colours = lamp_colours(head.signal)
+    if not colours:
+        return STOP_SIGN if sign_face(head.signal).shape == "octagon" else None
+    shining = [colour for (colour, _), on in zip(lamps(state, colours), lit(state, colours, 0.0), strict=True) if on]
+    return f"{LIGHT} {shining[0] if shining else 'off'}"
+
+
+def head_box(head: SignalHead) -> tuple[Array, Array]:
+    """(8, 3) corners and (3,) middle of the box of a signal's head [m]; a light is half as deep as wide."""
+    pose = head.pose
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    deep = 0.5 * head.width if lamp_colours(head.signal) else 0.0
+    corners = np.array(
+        [
+            (pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, pose.z + z)
+            for x in (-deep, 0.0)
+            for y in (-head.width / 2, head.width / 2)
+            for z in (0.0, head.height)
+        ]
+    )
+    return corners, np.asarray(corners.mean(axis=0))
+
+
+def _outline(reading: CameraReading, corners: Array) -> int:
+    """Pixels within the picture that the hull of these corners (8, 3) covers; 0 if it reaches behind the camera."""
     points = to_camera(corners, reading.pose)
     if points[:, 2].min() < NEAREST:
-        return None
-    pixels = project(points, reading)
-    height, width = reading.depth.shape
-    hull = cv2.convexHull(pixels.astype(np.float32)).reshape(-1, 2)
-    canvas = np.zeros((height, width), dtype=np.uint8)
+        return 0
+    hull = cv2.convexHull(project(points, reading).astype(np.float32)).reshape(-1, 2)
+    canvas = np.zeros(reading.segmentation.shape, dtype=np.uint8)
     cv2.fillConvexPoly(canvas, np.rint((hull - 0.5) * 16.0).clip(-(2**26), 2**26).astype(np.int32), 1, shift=4)
-    inside = canvas.astype(bool)
-    whole = int(inside.sum())
-    near, far = points[:, 2].min() - tolerance, points[:, 2].max() + tolerance
-    lines, columns = np.nonzero(inside & (reading.depth >= near) & (reading.depth <= far))
-    if not len(lines):
-        return None
-    box = (float(columns.min()), float(lines.min()), float(columns.max() + 1), float(lines.max() + 1))
-    distance = float(np.linalg.norm(centre - reading.pose[:3, 3]))
-    return Label(number, box, len(lines), whole, distance, (*centre.tolist(), 0.0, 0.0, 0.0, 0.0))
+    return int(canvas.sum())
 
 
 def to_camera(points: Array, pose: Array) -> Array:

@@ -20,6 +20,15 @@ Element = etree._Element
 
 LIGHT = ("1000001", "-1", 0.3, 0.86)
 STOP = ("206", "-1", 0.75, 0.75)
+OTHERS = (("274", "50", 0.6, 0.6), ("205", "-1", 0.9, 0.9), ("306", "-1", 0.6, 0.6), ("283", "-1", 0.6, 0.6))
+_FURNITURE = {
+    "tree": ((4.0, 4.0, 7.0), 9.0),
+    "vegetation": ((1.5, 1.5, 1.2), 3.0),
+    "streetLamp": ((0.16, 0.16, 8.0), 28.0),
+    "pole": ((0.12, 0.12, 4.0), 12.0),
+    "barrier": ((2.0, 0.3, 0.9), 3.0),
+}
+"""Length, width and height of furniture, and from one piece to the next [m]."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +62,7 @@ def random_place(rng: np.random.Generator, folder: Path) -> Place:
         vary_signals(root, rng)
     else:
         root = winding_road(rng)
+    add_furniture(root, rng)
     etree.ElementTree(root).write(str(path), xml_declaration=True, encoding="UTF-8")
     roads = RoadNetwork.load(path)
     return Place(roads, tuple(random_houses(roads, rng)))
@@ -110,6 +120,52 @@ def vary_signals(root: Element, rng: np.random.Generator) -> None:
         signal.set("hOffset", f"{rng.normal(0.0, 0.12):.4f}")
 
 
+def add_furniture(root: Element, rng: np.random.Generator) -> None:
+    """Trees, lamps, poles, hedges and barriers along all roads that are not part of a junction; or none."""
+    if rng.random() < 0.15:
+        return
+    number = 1000
+    for road in root.iterfind("road[@junction='-1']"):
+        length = float(road.get("length", "0"))
+        objects = road.find("objects")
+        if objects is None:
+            objects = etree.Element("objects")
+            signals = road.find("signals")
+            road.insert(len(road) if signals is None else road.index(signals), objects)
+        for side in (-1, 1):
+            edge = _edge(road, side)
+            for kind in rng.permutation(list(_FURNITURE))[: int(rng.integers(0, 3))].tolist():
+                size, gap = _FURNITURE[kind]
+                scale = float(rng.uniform(0.7, 1.4))
+                away = float(rng.uniform(0.3, 3.0))
+                for s in np.arange(rng.uniform(2.0, 20.0), length - 2.0, gap * rng.uniform(0.8, 2.0)).tolist():
+                    number += 1
+                    grow = scale * float(rng.uniform(0.85, 1.15))
+                    add(
+                        objects,
+                        "object",
+                        id=str(number),
+                        name=str(rng.choice(["fir", "tree"])) if kind == "tree" else kind,
+                        type=kind,
+                        s=s,
+                        t=side * (edge + away + (size[0] * grow / 2 if kind == "tree" else 0.0)),
+                        zOffset=0.0,
+                        orientation="none",
+                        length=size[0] * grow,
+                        width=size[1] * grow,
+                        height=size[2] * grow,
+                        hdg=0.0,
+                        pitch=0.0,
+                        roll=0.0,
+                    )
+
+
+def _edge(road: Element, side: int) -> float:
+    """Width of all lanes on one side."""
+    lanes = road.iterfind(f"lanes/laneSection/{'left' if side > 0 else 'right'}/lane")
+    return sum(float(width.get("a", "0")) for lane in lanes for width in lane.iterfind("width"))
+
+
 def winding_road(rng: np.random.Generator) -> Element:
     """A road of lines, clothoids and arcs that climbs and falls, with lights and stop signs along it."""
     street = random_street(rng)
@@ -140,7 +196,8 @@ def winding_road(rng: np.random.Generator) -> Element:
     signals = add(road, "signals")
     for number in range(int(rng.integers(2, 6))):
         sign = int(rng.choice([-1, 1]))
-        kind, subtype, width, height = LIGHT if rng.random() < 0.6 else STOP
+        draw = rng.random()
+        kind, subtype, width, height = LIGHT if draw < 0.55 else STOP if draw < 0.85 else OTHERS[int(rng.integers(4))]
         add(
             signals,
             "signal",

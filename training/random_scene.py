@@ -13,6 +13,8 @@ from eidrive_scenario.geometry import overlap, rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState
+from eidrive_scenario.world.furniture import SignalHead
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
@@ -46,6 +48,12 @@ _ON_LANES: Mapping[str, Mapping[str, float]] = {
     "shoulder": {"car": 0.2, "bicycle": 0.35, "motorbike": 0.1, "pedestrian": 0.3, "box": 0.05},
     "sidewalk": {"pedestrian": 0.78, "bicycle": 0.12, "rsu": 0.05, "box": 0.05},
 }  # fmt: skip
+_LIGHTS: Mapping[str, float] = {
+    "brakeLights": 0.25, "indicatorLeft": 0.08, "indicatorRight": 0.08, "daytimeRunningLights": 0.15, "lowBeam": 0.08,
+    "highBeam": 0.02, "fogLightsRear": 0.04, "reversingLights": 0.03, "warningLights": 0.03,
+}  # fmt: skip
+"""How often vehicles have a light switched on."""
+_MOTIONS = ("walking", "walking", "standing", "running", "reeling")
 _PICTURE_SIZES = ((640, 480), (800, 600), (640, 384), (960, 540))
 
 
@@ -84,8 +92,8 @@ class View:
     carrier: tuple[ActorSpec, Placement] | None
 
 
-def random_view(rng: np.random.Generator, spots: Spots) -> View:
-    """On a vehicle, ahead or aside, or at the roadside up to 8 m high."""
+def random_view(rng: np.random.Generator, spots: Spots, heads: Sequence[SignalHead] = ()) -> View:
+    """On a vehicle, ahead or aside, or at the roadside up to 8 m high; a third of the vehicles before a signal."""
     width, height = _PICTURE_SIZES[int(rng.choice(4, p=[0.5, 0.2, 0.15, 0.15]))]
     fov = 100.0 if rng.random() < 0.4 else float(rng.uniform(55.0, 115.0))
     corner = math.tan(math.radians(fov) / 2) * math.hypot(1.0, height / width)
@@ -93,12 +101,16 @@ def random_view(rng: np.random.Generator, spots: Spots) -> View:
     settings = CameraSettings(width=width, height=height, fov=fov, distortion=(bend, 0.0, 0.0, 0.0, 0.0))
     if rng.random() < 0.35:
         return View(settings, _roadside(rng, spots), None)
-    row = int(rng.choice(np.flatnonzero(spots.kinds == "driving")))
+    rows = np.flatnonzero(spots.kinds == "driving")
+    before = _before_signal(spots, rows, heads[int(rng.integers(len(heads)))]) if heads else rows[:0]
+    to_signal = len(before) > 0 and rng.random() < 0.6
+    row = int(rng.choice(before if to_signal else rows))
     x, y, z, heading = spots.poses[row].tolist()
     heading += float(rng.normal(0.0, 0.08))
     spec = random_actor(rng, "Carrier", "car")
     on_roof = rng.random() < 0.25
-    aside = float(rng.choice([math.radians(100.0), -math.radians(100.0), math.pi])) if rng.random() < 0.3 else 0.0
+    turned = not to_signal and rng.random() < 0.3
+    aside = float(rng.choice([math.radians(100.0), -math.radians(100.0), math.pi])) if turned else 0.0
     if on_roof or aside:
         mount = (
             -0.5 + float(rng.uniform(-1.2, 0.8)),
@@ -112,6 +124,16 @@ def random_view(rng: np.random.Generator, spots: Spots) -> View:
     pose = _camera_pose(place, heading + aside, float(rng.normal(0.0, 0.02)), float(rng.normal(0.0, 0.01)))
     ahead, _, _ = spec.offset
     return View(settings, pose, (spec, Placement(x - cos * ahead, y - sin * ahead, z, heading)))
+
+
+def _before_signal(spots: Spots, rows: NDArray[np.int64], head: SignalHead) -> NDArray[np.int64]:
+    """Those of the rows from which a driver looks at this signal, 4 to 30 m ahead."""
+    x, y, heading = spots.poses[rows, 0], spots.poses[rows, 1], spots.poses[rows, 3]
+    dx, dy = head.pose.x - x, head.pose.y - y
+    ahead = np.cos(heading) * dx + np.sin(heading) * dy
+    aside = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
+    against = np.cos(heading - head.pose.h) < -0.8
+    return np.asarray(rows[(ahead > 4.0) & (ahead < 30.0) & (aside < 0.7 * ahead) & against], dtype=np.int64)
 
 
 def _roadside(rng: np.random.Generator, spots: Spots) -> Array:
@@ -190,6 +212,35 @@ def random_traffic(
         boxes.append(box)
         found.append((spec, placement))
     return found
+
+
+def random_signals(rng: np.random.Generator, roads: RoadNetwork) -> dict[str, str]:
+    """A state for every traffic light."""
+    states = ("red", "redYellow", "yellow", "green", "off")
+    odds = [0.28, 0.06, 0.24, 0.28, 0.14]
+    return {name: str(rng.choice(states, p=odds)) for name, signal in roads.signals.items() if signal.dynamic}
+
+
+def random_looks(
+    rng: np.random.Generator, cast: Sequence[tuple[ActorSpec, Placement]], weather: Weather
+) -> dict[str, Appearance]:
+    """Lights of vehicles that are switched, and how pedestrians hold themselves."""
+    looks = {}
+    for spec, _ in cast:
+        if spec.shape == "pedestrian":
+            motion = str(rng.choice(_MOTIONS))
+            looks[spec.name] = Appearance(animations={"motion": AnimationState("motion", motion)})
+        elif spec.wheelbase > 0.0 and spec.shape != "bicycle":
+            odds = dict(_LIGHTS)
+            if spec.shape in ("ambulance", "firetruck"):
+                odds["specialPurposeLights"] = 0.4
+            lit = [light for light, share in odds.items() if rng.random() < share]
+            lights = {light: LightState(light, "on") for light in lit}
+            if weather.lamps_on and rng.random() < 0.08:
+                lights["lowBeam"] = LightState("lowBeam", "off")
+            if lights:
+                looks[spec.name] = Appearance(lights=lights)
+    return looks
 
 
 def _box(spec: ActorSpec, placement: Placement) -> tuple[float, ...]:

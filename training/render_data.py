@@ -23,11 +23,12 @@ from eidrive_scenario.perception.learned.image_network import resized
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.camera import Photographer
 from eidrive_scenario.world import World
+from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.weather import Weather
 from training.dataset import encode, write
-from training.labels import Label, actor_labels
+from training.labels import Label, actor_labels, legible, signal_labels
 from training.random_roads import Place, random_place
-from training.random_scene import Spots, View, random_traffic, random_view, random_weather
+from training.random_scene import Spots, View, random_looks, random_signals, random_traffic, random_view, random_weather
 
 STORED = (512, 384)
 """Width and height of stored pictures: the input of the networks [px]."""
@@ -61,9 +62,10 @@ def shot(world: World, place: Place, spots: Spots, rng: np.random.Generator) -> 
     """One picture with new traffic; a camera that would stand in a house is drawn again."""
     for name in list(world.names):
         world.remove(name)
-    view = random_view(rng, spots)
+    heads = signal_heads(place.roads)
+    view = random_view(rng, spots, heads)
     while _inside(view, place):
-        view = random_view(rng, spots)
+        view = random_view(rng, spots, heads)
     cast = random_traffic(rng, spots, view)
     if view.carrier is not None:
         cast.append(view.carrier)
@@ -71,9 +73,13 @@ def shot(world: World, place: Place, spots: Spots, rng: np.random.Generator) -> 
         world.add(spec, placement)
     weather = random_weather(rng)
     world.set_weather(weather)
+    states = random_signals(rng, place.roads)
+    world.show(states, random_looks(rng, cast, weather))
     reading = Photographer(view.settings).take(world, view.pose, rng)
     carrier = (view.carrier[0].name,) if view.carrier is not None else ()
     labels = actor_labels(reading, world.view(), {spec.name: spec for spec, _ in cast}, carrier)
+    labels += signal_labels(reading, heads, states)
+    labels = legible(labels, reading, weather)
     settings = view.settings
     camera = (float(settings.width), float(settings.height), settings.fov, float(view.pose[2, 3]))
     return Shot(encode(resized(reading.rgb, STORED), QUALITY), camera, weather, labels)
@@ -109,6 +115,7 @@ def table(taken: list[Shot]) -> dict[str, Any]:
         "seen": np.array([label.seen for _, label in labels], dtype=np.int64),
         "whole": np.array([label.whole for _, label in labels], dtype=np.int64),
         "distance": np.array([label.distance for _, label in labels], dtype=np.float32),
+        "readable": np.array([label.readable for _, label in labels], dtype=bool),
         "place": np.array([label.place for _, label in labels], dtype=np.float32).reshape(-1, 7),
     }
 

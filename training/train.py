@@ -40,6 +40,8 @@ MOST_OBJECTS = 48
 AVERAGE = 0.9995
 """Share of the old weights that the moving average keeps with each step, once it is under way."""
 LEAST_CONFIDENCE = 0.02
+PLAIN_FROM = 0.92
+"""From this share of the training on pictures are no longer zoomed and shifted."""
 
 
 class Samples:
@@ -189,14 +191,13 @@ def train(options: argparse.Namespace) -> None:
         for number in range(per_epoch):
             rows = order[number * options.batch : (number + 1) * options.batch]
             pixels = samples.pictures[rows].float().div_(255.0)
-            last = epoch >= options.epochs - max(options.epochs // 12, 1)
-            if last:
+            # Time, not epochs, sets the schedule where there is a limit, so that it always ends in small steps.
+            progress = max(step / steps, (time.perf_counter() - began) / limit)
+            if progress > PLAIN_FROM:
                 pictures, targets = pixels, Targets(centred(samples.boxes[rows]), samples.classes[rows])
             else:
                 pictures, targets = moved(pixels, samples.boxes[rows], samples.classes[rows], draws)
             pictures = recoloured(pictures, draws)
-            # Time, not epochs, sets the schedule where there is a limit, so that it always ends in small steps.
-            progress = max(step / steps, (time.perf_counter() - began) / limit)
             for group in optimizer.param_groups:
                 group["lr"] = learning_rate(int(progress * steps), steps, options.rate)
             with torch.autocast(device.type, torch.bfloat16, enabled=autocast):
@@ -274,7 +275,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0, help="stop after so long; 0 is no limit")
     parser.add_argument("--batch", type=int, default=32)
     parser.add_argument("--rate", type=float, default=2e-3)
-    parser.add_argument("--check", type=int, default=10, help="epochs from one validation to the next")
+    parser.add_argument("--check", type=int, default=15, help="epochs from one validation to the next")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--device", default="")
     train(parser.parse_args())

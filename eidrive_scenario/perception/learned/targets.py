@@ -25,15 +25,10 @@ class Targets:
 
     def in_ignored(self, points: Tensor) -> Tensor:
         """(B, N) whether points (N, 2) [px] lie in an object of the picture that is ignored."""
-        low = self.boxes[..., :2] - self.boxes[..., 2:] / 2.0
-        high = low + self.boxes[..., 2:]
-        x, y = points[:, 0], points[:, 1]
-        found = torch.zeros((self.boxes.shape[0], len(points)), dtype=torch.bool, device=points.device)
-        for row in range(self.boxes.shape[1]):
-            ignored = self.classes[:, row] == IGNORED
-            if ignored.any():
-                left, top = low[:, row, 0:1], low[:, row, 1:2]
-                right, bottom = high[:, row, 0:1], high[:, row, 1:2]
-                inside = (x >= left) & (x <= right) & (y >= top) & (y <= bottom)
-                found |= inside & ignored[:, None]
-        return found
+        picture, row = torch.nonzero(self.classes == IGNORED, as_tuple=True)
+        centre, half = self.boxes[picture, row].chunk(2, dim=1)
+        half = half / 2.0
+        away = (points[None] - centre[:, None]).abs()
+        inside = (away <= half[:, None]).all(dim=2)
+        found = torch.zeros((self.boxes.shape[0], len(points)), dtype=torch.int32, device=points.device)
+        return found.index_add_(0, picture, inside.int()) > 0
