@@ -145,7 +145,7 @@ class BackgroundTraffic:
         speed  (K,) with which it would start at each;  given_speed  the one that the scenario states, if any
         """
         order = rng.permutation(len(sites))[:TRIES]
-        some, speed = sites.some(order), speed[order]
+        some, speed = sites.some(order), np.minimum(speed[order], participant.spec.max_speed)
         at = np.flatnonzero(free(self.fleet, some, participant, speed, self._foreign))
         if not at.size:
             return False

@@ -33,6 +33,7 @@ class Cars:
     progress, speed  along the lane [m], [m/s]
     front, rear   from the reference point to the bumpers [m]
     own_speed     desired speed, NaN for the limit [m/s];  factor  of the limit that the car keeps to
+    top_speed     what the vehicle can do [m/s]
     fallback      desired speed where the map gives no limit [m/s]
     offset        left of the lane's centre [m];  slope  of the path against it, left positive
     shift         offset at the start of a lane change [m];  shift_done, shift_length  of its way [m]
@@ -49,6 +50,7 @@ class Cars:
     rear: Array = field(default_factory=_floats)
     own_speed: Array = field(default_factory=_floats)
     factor: Array = field(default_factory=_floats)
+    top_speed: Array = field(default_factory=_floats)
     fallback: Array = field(default_factory=_floats)
     offset: Array = field(default_factory=_floats)
     slope: Array = field(default_factory=_floats)

@@ -166,6 +166,7 @@ class Fleet:
             rear=spec.offset[0] - half,
             own_speed=math.nan if desired_speed is None else desired_speed,
             factor=factor,
+            top_speed=spec.max_speed,
             fallback=fallback,
             number=self._made,
             walks=bool(self.lanes.walkable[row]),
@@ -363,7 +364,7 @@ class Fleet:
         wanted = np.where(
             np.isfinite(limit), limit, np.where(np.isinf(limit), np.maximum(FREE, cars.fallback), cars.fallback)
         )
-        wanted = np.where(np.isnan(cars.own_speed), wanted, cars.own_speed)
+        wanted = np.minimum(np.where(np.isnan(cars.own_speed), wanted, cars.own_speed), cars.top_speed)
         seen = (cars.plan >= 0) & (begins <= LOOK_AHEAD)
         bend = self.lanes.tightest(np.where(seen, cars.plan, cars.row[:, None]))
         square = cars.drivers.lateral_acceleration[:, None] / np.maximum(bend, 1e-6)

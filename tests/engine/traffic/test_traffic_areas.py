@@ -101,12 +101,13 @@ def test_a_range_over_several_roads_follows_their_links() -> None:
 def test_roads_must_exist_and_be_linked(street: Street) -> None:
     with pytest.raises(InputError, match="there is no road '2'"):
         road_range(street(), [Cursor("1"), Cursor("2")])
+    lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
+    lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
     apart = RoadNetwork.parse(
         "<OpenDRIVE>"
         + "".join(
             f'<road id="{n}" length="10" junction="-1"><planView><geometry s="0" x="0" y="{n}00" hdg="0" length="10">'
-            '<line/></geometry></planView><lanes><laneSection s="0"><center><lane id="0"/></center><right>'
-            '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>'
+            f"<line/></geometry></planView><lanes>{lanes}</lanes></road>"
             for n in (1, 2)
         )
         + "</OpenDRIVE>"

@@ -1,0 +1,422 @@
+"""The traffic actions in whole runs: who enters the world, is seen, is touched, and leaves it."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from street_scene import STREET, TRIGGER
+from whole_run import Watched
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+Run = Callable[..., Watched]
+
+CATEGORIES = '<VehicleCategoryDistributionEntry category="car" weight="1"/>'
+DRIVER = '<Controller name="d"><Properties><Property name="{}" value="{}"/></Properties></Controller>'
+DEFINITION = (
+    '<TrafficDefinition name="mix"><VehicleCategoryDistribution>{}</VehicleCategoryDistribution>'
+    '<ControllerDistribution><ControllerDistributionEntry weight="1">{}</ControllerDistributionEntry>'
+    "</ControllerDistribution></TrafficDefinition>"
+)
+PEDESTRIAN = (
+    '<Pedestrian name="walker" mass="70" pedestrianCategory="pedestrian"><BoundingBox><Center x="0" y="0" z="0.9"/>'
+    '<Dimensions width="0.5" length="0.5" height="1.8"/></BoundingBox></Pedestrian>'
+)
+VEHICLE = (
+    '<Vehicle name="cart" vehicleCategory="car"><BoundingBox><Center x="1" y="0" z="0.75"/>'
+    '<Dimensions width="1.5" length="3" height="1.5"/></BoundingBox>'
+    '<Performance maxSpeed="{}" maxAcceleration="3" maxDeceleration="8"/>'
+    '<Axles><RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.2" positionX="0" positionZ="0.3"/></Axles>'
+    "</Vehicle>"
+)
+
+FASTER = (
+    "<PrivateAction><LongitudinalAction><SpeedAction>"
+    '<SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
+    '<SpeedActionTarget><AbsoluteTargetSpeed value="30"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+    "</PrivateAction>"
+)
+
+
+def traffic(inside: str, name: str = "crowd") -> str:
+    given = f' trafficName="{name}"' if name else ""
+    return f"<GlobalAction><TrafficAction{given}>{inside}</TrafficAction></GlobalAction>"
+
+
+def distribution(*entities: tuple[float, str]) -> str:
+    entries = "".join(
+        f'<EntityDistributionEntry weight="{weight}"><ScenarioObjectTemplate>{body}</ScenarioObjectTemplate>'
+        "</EntityDistributionEntry>"
+        for weight, body in entities
+    )
+    return (
+        '<TrafficDistribution><TrafficDistributionEntry weight="1"><EntityDistribution>'
+        f"{entries}</EntityDistribution></TrafficDistributionEntry></TrafficDistribution>"
+    )
+
+
+def swarm(
+    count: int = 12, *, centre: str = "Ego", inner: float = 30, reach: float = 150, more: str = "", **given: str
+) -> str:
+    attributes = "".join(f' {name}="{value}"' for name, value in given.items())
+    return (
+        f'<TrafficSwarmAction innerRadius="{inner}" semiMajorAxis="{reach}" semiMinorAxis="60" offset="0" '
+        f'numberOfVehicles="{count}"{attributes}><CentralObject entityRef="{centre}"/>{more}</TrafficSwarmAction>'
+    )
+
+
+def position(s: float, lane: int = -1) -> str:
+    return f'<Position><LanePosition roadId="1" laneId="{lane}" s="{s}"/></Position>'
+
+
+def source(rate: float, s: float, *, more: str = "", **given: float) -> str:
+    attributes = "".join(f' {name}="{value}"' for name, value in given.items())
+    return f'<TrafficSourceAction radius="3" rate="{rate}"{attributes}>{position(s)}{more}</TrafficSourceAction>'
+
+
+def sink(s: float, rate: str = "") -> str:
+    return f'<TrafficSinkAction radius="15"{rate}>{position(s)}</TrafficSinkAction>'
+
+
+def area(count: int, continuous: str, where: str, entities: str = "") -> str:
+    return (
+        f'<TrafficAreaAction numberOfEntities="{count}" continuous="{continuous}">'
+        f"{entities or distribution((1.0, VEHICLE.format(20)))}<TrafficArea>{where}</TrafficArea></TrafficAreaAction>"
+    )
+
+
+def road_range(start: float, end: float, lanes: str = "") -> str:
+    cursor = '<RoadCursor roadId="1" s="{}">{}</RoadCursor>'
+    return f"<RoadRange>{cursor.format(start, lanes)}{cursor.format(end, '')}</RoadRange>"
+
+
+def crowd(played: Watched, time: float, name: str = "crowd") -> list[str]:
+    """The cars of a traffic at a time."""
+    frame = played.frames[round(time / 0.05)]
+    return [one for one in frame.view.names if one.startswith(f"{name}.")]
+
+
+def at_time(value: float) -> str:
+    return f'<ByValueCondition><SimulationTimeCondition value="{value}" rule="greaterOrEqual"/></ByValueCondition>'
+
+
+def test_a_swarm_of_init_is_in_the_world_after_the_first_step(run: Run) -> None:
+    played = run(8.0, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm()))
+    assert crowd(played, 0.0) == []
+    assert len(crowd(played, 0.05)) == 12
+    for frame in played.frames[1:]:
+        rows = [frame.view.rows[name] for name in frame.view.names if name != "Ego"]
+        ego = frame.view.position[frame.view.rows["Ego"], 0]
+        assert all(abs(frame.view.position[row, 0] - ego) < 151.5 for row in rows)
+        assert {frame.view.categories[row] for row in rows} <= {"car"}
+    assert not [contact for frame in played.frames for contact in frame.view.contacts]
+    moved = {name: played.frames[40].view.row(name) for name in crowd(played, 2.0)}
+    assert min(played.frames[40].view.speed[row] for row in moved.values()) > 5.0
+
+
+def test_velocity_is_the_speed_at_the_start(run: Run) -> None:
+    played = run(
+        0.1, globally=traffic(swarm(more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b")), velocity="21"))
+    )
+    frame = played.frames[1]
+    speeds = [float(frame.view.speed[frame.view.row(name)]) for name in crowd(played, 0.05)]
+    assert speeds == pytest.approx([21.0] * 12, abs=0.5)
+
+
+def test_traffic_without_a_name_is_called_after_its_action(run: Run) -> None:
+    played = run(0.1, globally=traffic(swarm(2), name=""))
+    assert crowd(played, 0.05, "TrafficSwarm") == ["TrafficSwarm.0001", "TrafficSwarm.0002"]
+
+
+def test_sensors_of_an_agent_see_the_swarm(run: Run) -> None:
+    seen: set[str] = set()
+
+    def note(simulation: object, frame: object) -> None:
+        step = frame.steps["Ego"]  # type: ignore[attr-defined]
+        seen.add(str(len(step.detections.boxes)))
+
+    played = run(
+        3.0, globally=traffic(swarm(30, inner=8, reach=60)), during=note, settings=RunSettings(detector="oracle")
+    )
+    assert len(crowd(played, 1.0)) > 5
+    assert seen - {"0"}
+
+
+def test_the_action_goes_on_until_it_is_stopped_and_the_cars_stay(run: Run) -> None:
+    played = run(
+        12.0,
+        ("Ego", traffic(source(0.5, 500.0, speed=10.0))),
+        ("Ego", traffic("<TrafficStopAction/>"), at_time(5.0)),
+        driven=False,
+    )
+    changes = {
+        (change.element.rsplit("::", 1)[-1], change.after.value): change.time
+        for frame in played.frames
+        for change in frame.changes
+    }
+    assert changes["action 0", "runningState"] == 0.0
+    assert changes["action 0", "completeState"] == pytest.approx(5.0, abs=0.06)
+    assert changes["action 1", "completeState"] == pytest.approx(5.0, abs=0.06)
+    assert [len(crowd(played, time)) for time in (0.05, 2.5, 4.95, 6.5, 11.9)] == [1, 2, 3, 3, 3]
+
+
+def test_a_stop_is_for_the_traffic_of_its_name_or_for_all(run: Run) -> None:
+    def play(name: str) -> Watched:
+        return run(
+            10.0,
+            ("Ego", traffic("<TrafficStopAction/>", name=name), at_time(3.0)),
+            driven=False,
+            globally=traffic(source(0.5, 500.0, speed=10.0), "one") + traffic(source(0.5, 700.0, speed=10.0), "two"),
+        )
+
+    only, every = play("one"), play("")
+    assert [len(crowd(only, 9.5, name)) for name in ("one", "two")] == [2, 5]
+    assert [len(crowd(every, 9.5, name)) for name in ("one", "two")] == [2, 2]
+
+
+def test_a_source_feeds_a_sink(run: Run) -> None:
+    played = run(
+        60.0,
+        driven=False,
+        ego=(1, 900.0, 0.0),
+        globally=traffic(source(0.5, 100.0, speed=12.0), "in") + traffic(sink(400.0), "out"),
+    )
+    made = {name for frame in played.frames for name in frame.view.names if name.startswith("in.")}
+    assert len(made) == 30
+    assert 8 <= len(crowd(played, 59.0, "in")) <= 16
+    xs = [
+        x
+        for frame in played.frames
+        for name, row in frame.view.rows.items()
+        if name != "Ego"
+        if (x := float(frame.view.position[row, 0]))
+    ]
+    assert max(xs) < 400.0
+
+
+def test_entities_of_the_scenario_pass_a_sink(run: Run) -> None:
+    played = run(10.0, driven=False, ego=(-1, 350.0, 20.0), globally=traffic(sink(400.0)))
+    assert played.x("Ego")[-1] > 500.0
+
+
+def test_an_area_by_roads_and_lanes(run: Run) -> None:
+    where = road_range(300.0, 500.0, '<Lane id="-1"/>')
+    played = run(5.0, driven=False, ego=(1, 900.0, 0.0), globally=traffic(area(6, "true", where)))
+    for frame in played.frames[1:]:
+        for name in frame.view.names:
+            if name != "Ego":
+                assert 299.0 < frame.view.position[frame.view.row(name), 0] < 501.5
+    first = played.frames[1]
+    assert {round(float(first.view.position[first.view.row(name), 1])) for name in crowd(played, 0.05)} == {-2}
+    assert len(crowd(played, 0.05)) == 6
+
+
+def test_an_area_by_a_polygon_is_filled_once_and_its_action_is_done(run: Run) -> None:
+    corners = "".join(
+        f'<Position><WorldPosition x="{x}" y="{y}"/></Position>' for x, y in ((300, -9), (500, -9), (500, 5), (300, 5))
+    )
+    played = run(
+        12.0, ("Ego", traffic(area(5, "false", f"<Polygon>{corners}</Polygon>"))), driven=False, ego=(1, 900.0, 0.0)
+    )
+    assert len(crowd(played, 0.05)) == len(crowd(played, 11.0)) == 5
+    done = [
+        change.time
+        for frame in played.frames
+        for change in frame.changes
+        if change.after.value == "completeState" and "action 0" in change.element
+    ]
+    assert done == [pytest.approx(0.0, abs=0.06)]
+
+
+def test_pedestrians_walk_on_sidewalks(run: Run) -> None:
+    walk = '<lane id="-3" type="sidewalk"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>'
+    entities = distribution((1.0, PEDESTRIAN))
+    played = run(
+        6.0,
+        driven=False,
+        globally=traffic(area(4, "true", road_range(300.0, 400.0), entities)),
+        street=STREET.replace("</right>", walk),
+    )
+    frame = played.frames[-1]
+    rows = [frame.view.row(name) for name in crowd(played, 5.9)]
+    assert len(rows) == 4
+    assert {frame.view.categories[row] for row in rows} == {"pedestrian"}
+    assert frame.view.position[rows, 1] == pytest.approx(-9.5)
+    assert all(1.0 < speed < 1.7 for speed in frame.view.speed[rows])
+
+
+def test_shares_of_categories_and_of_entities(run: Run) -> None:
+    categories = '<VehicleCategoryDistributionEntry category="{}" weight="{}"/>'
+    mixed = categories.format("truck", 1) + categories.format("car", 1) + categories.format("bicycle", 0)
+    played = run(0.1, globally=traffic(swarm(40, reach=400, more=DEFINITION.format(mixed, DRIVER.format("a", "b")))))
+    frame = played.frames[1]
+    drawn = [frame.view.categories[frame.view.row(name)] for name in crowd(played, 0.05)]
+    assert 10 <= drawn.count("truck") <= 30
+    assert set(drawn) == {"car", "truck"}
+    played = run(0.1, globally=traffic(swarm(20, reach=400, more=distribution((1.0, VEHICLE.format(5))))))
+    frame = played.frames[1]
+    rows = [frame.view.row(name) for name in crowd(played, 0.05)]
+    assert len(rows) == 20
+    assert {tuple(size) for size in frame.view.size[rows].tolist()} == {(3.0, 1.5, 1.5)}
+    assert max(frame.view.speed[rows]) <= 5.01
+
+
+def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
+    def lead_gap(time_gap: float) -> float:
+        properties = "".join(
+            f'<Property name="{name}" value="{value}"/>'
+            for name, value in (("module", "eidrive.traffic"), ("time_gap", time_gap))
+        )
+        driver = f'<Controller name="d"><Properties>{properties}</Properties></Controller>'
+        definition = DEFINITION.format(CATEGORIES, driver)
+        played = run(
+            40.0,
+            driven=False,
+            ego=(-1, 140.0, 8.0),
+            globally=traffic(source(0.04, 100.0, more=definition, speed=8.0)),
+            street=STREET.replace('<lane id="-2" type="driving"', '<lane id="-2" type="none"'),
+        )
+        frame = played.frames[-1]
+        return float(
+            frame.view.position[frame.view.row("Ego"), 0] - frame.view.position[frame.view.row("crowd.0001"), 0]
+        )
+
+    assert lead_gap(2.5) - lead_gap(0.8) == pytest.approx(1.7 * 8.0, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        (
+            swarm(semiMinorAxis="60").replace('semiMinorAxis="60" offset', "offset").replace("30", "-3", 1),
+            "innerRadius=-3",
+        ),
+        (swarm(more='<DirectionOfTravelDistribution same="0" opposite="0"/>'), "shares 0, 0"),
+        (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), "speeds from 9 to 3"),
+        (swarm(centre="Egon"), "Egon"),
+        (swarm(more=distribution((0.0, PEDESTRIAN))), "are no shares"),
+        (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "no road '9'"),
+        (
+            swarm(
+                more=DEFINITION.format(
+                    CATEGORIES,
+                    DRIVER.format("module", "eidrive.traffic").replace(
+                        "</Properties>", '<Property name="time_gab" value="1"/></Properties>'
+                    ),
+                )
+            ),
+            "time_gab",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_told_before_the_run(run: Run, inside: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        run(1.0, globally=traffic(inside))
+    assert all(problem.line for problem in caught.value.problems)
+
+
+def test_a_source_far_from_all_lanes_is_told(run: Run) -> None:
+    away = '<Position><WorldPosition x="300" y="200"/></Position>'
+    inside = source(1.0, 100.0).replace(position(100.0), away)
+    with pytest.raises(InputError, match="where no lane is near"):
+        run(1.0, globally=traffic(inside))
+
+
+def test_traffic_needs_roads(run: Run, tmp_path: Path) -> None:
+    run(0.1, globally=traffic(swarm(2)))
+    text = (tmp_path / "scene.xosc").read_text().replace('<LogicFile filepath="street.xodr"/>', "")
+    with pytest.raises(InputError, match="needs lanes to drive on"):
+        Simulation(load_scenario(text.encode()))
+
+
+def test_a_collision_with_any_vehicle_counts_traffic_too(run: Run) -> None:
+    """Ego follows a car that has just come from a source at 5 m/s, and speeds up into it."""
+    touch = (
+        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
+        '</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="vehicle"/></CollisionCondition>'
+        "</EntityCondition></ByEntityCondition>"
+    )
+    played = run(
+        8.0,
+        ("Ego", traffic("<TrafficStopAction/>"), touch),
+        ("Ego", FASTER, at_time(1.0)),
+        driven=False,
+        ego=(-1, 100.0, 5.0),
+        globally=traffic(source(0.01, 130.0, speed=5.0)),
+    )
+    contacts = [frame.view.time for frame in played.frames if frame.view.contacts]
+    assert contacts
+    assert played.begun("event 0") == [pytest.approx(contacts[0], abs=1e-9)]
+
+
+def test_the_same_seed_gives_the_same_trace_in_another_process(run: Run, tmp_path: Path) -> None:
+    played = run(4.0, driven=False, globally=traffic(swarm(15)), seed=3)
+    other = run(4.0, driven=False, globally=traffic(swarm(15)), seed=4)
+    assert played.result.trace_hash != other.result.trace_hash
+    code = (
+        "import sys; from eidrive_scenario.openscenario import load_scenario as load\n"
+        "from eidrive_scenario.simulation import Simulation\n"
+        "print(Simulation(load(sys.argv[1]), seed=3).run().trace_hash)"
+    )
+    scene = str(tmp_path / "scene.xosc")
+    printed = subprocess.run([sys.executable, "-c", code, scene], capture_output=True, text=True, check=True).stdout
+    assert printed.strip() == played.result.trace_hash
+    assert not math.isnan(played.result.simulated_s)
+
+
+@pytest.mark.parametrize(
+    ("version", "inside", "warned"),
+    [
+        ("0", swarm(9, velocity="9", more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))), False),
+        ("1", source(1.0, 300.0, more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b")), velocity=9), False),
+        (
+            "2",
+            swarm(
+                9,
+                more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))
+                + '<SpeedRange lowerLimit="8.5" upperLimit="9.4"/>'
+                + '<AreaDistribution front="1" rear="0" left="0" right="0"/>',
+            ),
+            False,
+        ),
+        ("3", swarm(9, velocity="9", more=DEFINITION.format(CATEGORIES, DRIVER.format("a", "b"))), True),
+    ],
+)
+def test_older_spellings_work_and_newer_versions_warn(
+    run: Run, tmp_path: Path, version: str, inside: str, warned: bool
+) -> None:
+    run(0.2)
+    text = (tmp_path / "scene.xosc").read_text()
+    name = ' trafficName="crowd"' if version != "0" else ""
+    text = text.replace('revMinor="3"', f'revMinor="{version}"').replace(
+        "<Actions>", f"<Actions><GlobalAction><TrafficAction{name}>{inside}</TrafficAction></GlobalAction>"
+    )
+    start, end = text.index("<MonitorDeclarations>"), text.index("</MonitorDeclarations>")
+    text = text[:start] + text[end + len("</MonitorDeclarations>") :]
+    if version in "012":
+        start_trigger = TRIGGER.format(edge="none", condition=at_time(0.0))
+        text = text.replace("</Axles></Vehicle>", "</Axles><Properties/></Vehicle>")
+        text = text.replace("</ManeuverGroup></Act>", f"</ManeuverGroup>{start_trigger}</Act>")
+        text = text.replace("</Action></Event>", f"</Action>{start_trigger}</Event>")
+        text = text.replace("greaterOrEqual", "greaterThan")
+    text = text.replace(' controllerType="movement"', "") if version in "01" else text
+    path = tmp_path / "older.xosc"
+    path.write_text(text)
+    simulation = Simulation(load_scenario(path))
+    with simulation:
+        simulation.tick()
+        frame, _ = simulation.tick()
+    rows = [row for name, row in frame.view.rows.items() if name != "Ego"]
+    assert len(rows) == (1 if version == "1" else 9)
+    assert frame.view.speed[rows] == pytest.approx([9.0] * len(rows), abs=0.6)
+    if version == "2":
+        assert min(frame.view.position[rows, 0]) > frame.view.position[frame.view.row("Ego"), 0]
+    deprecated = [str(warning) for warning in simulation.scenario.warnings if "deprecated" in str(warning)]
+    assert any("velocity" in one or "TrafficDefinition" in one for one in deprecated) is warned
