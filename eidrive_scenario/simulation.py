@@ -174,7 +174,7 @@ class Simulation:
             if self.settings.weather is not None:
                 self._weather = load_weather(self.settings.weather, origin="--weather")
         together.settle()
-        self.world = World(self.roads, dt=self.settings.dt)
+        self.world = World(self.roads, dt=self.settings.dt, entities=self.storyboard.road_objects)
         if self._weather is not None:
             self.world.set_weather(self._weather)
         self._observers = tuple(observers)
@@ -266,6 +266,7 @@ class Simulation:
         for name in self.stations.drivers:
             self.world.set_driven(name, name in commands.driven)
         self.stations.goals = commands.goals
+        self.world.show(commands.signals, commands.appearances)
         self.stations.signals = commands.signals
         if commands.environment is not None:
             self._environment = commands.environment

@@ -48,7 +48,8 @@ def read_truth(
     """What each sensor sees from the actor in its row; all rays of all sensors go out in one batch."""
     boxes = view.boxes
     own = np.asarray(rows, dtype=np.intp)
-    sensor_of, target_of = _candidates(sensors, own, boxes)
+    unseen = [view.rows[name] for name in view.unseen if name in view.rows]
+    sensor_of, target_of = _candidates(sensors, own, boxes, unseen)
     visibility = np.empty(0)
     if len(sensor_of):
         visibility = _visibility(sensors, own, sensor_of, target_of, boxes, scene, view)
@@ -71,13 +72,14 @@ def read_truth(
 
 
 def _candidates(
-    sensors: Sequence[TruthSensor], own: NDArray[np.intp], boxes: Array
+    sensors: Sequence[TruthSensor], own: NDArray[np.intp], boxes: Array, unseen: Sequence[int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs (sensor, row of an object) within range and field of view, the own body left out."""
+    """Pairs (sensor, row of an object) within range and field of view, the own body and unseen ones left out."""
     offset = boxes[None, :, :3] - boxes[own, None, :3]
     reach = np.array([sensor.settings.range for sensor in sensors])
     near = np.einsum("sni,sni->sn", offset, offset) <= (reach * reach)[:, None]
     near[np.arange(len(own)), own] = False
+    near[:, unseen] = False
     for index, sensor in enumerate(sensors):
         if sensor.half_field < math.pi:
             heading = float(boxes[own[index], 6]) + sensor.mounting.yaw

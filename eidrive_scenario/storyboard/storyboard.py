@@ -55,6 +55,11 @@ class Storyboard:
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 
     @property
+    def road_objects(self) -> frozenset[str]:
+        """The ids of the road network's objects that are entities of the scenario."""
+        return frozenset(placed.object.id for placed in self._external.places().values())
+
+    @property
     def changes(self) -> tuple[StateChange, ...]:
         """What changed its state in the last tick."""
         return tuple(self.stage.progress.changes)
@@ -104,7 +109,8 @@ class Storyboard:
                 back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
                 back.motion.jumped, back.motion.speed = front.motion.jumped, front.motion.speed
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.jumped)
-        self.stage.traffic.step(view, self.dt, commands)
+        passed_over = [name for name, look in self.stage.appearances.items() if not look.visibility.traffic]
+        self.stage.traffic.step(view.without(passed_over), self.dt, commands)
         return self._finished(commands)
 
     def _bring_trailers(self) -> None:

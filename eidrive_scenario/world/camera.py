@@ -13,7 +13,10 @@ Array = NDArray[np.float64]
 
 
 class Picture(NamedTuple):
-    """rgb (H, W, 3), depth (H, W) along the optical axis [m], inf where nothing is; segmentation (H, W): row or -1."""
+    """rgb (H, W, 3), depth (H, W) along the optical axis [m], inf where nothing is; segmentation (H, W): row or -1.
+
+    Heads of traffic signals are less than -1: `World.signal_labels` says which.
+    """
 
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]

@@ -6,7 +6,7 @@ Buildings are the scenery's own. What is painted on the road, or has no height, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -89,10 +89,10 @@ class SignalHead(NamedTuple):
     carried: bool
 
 
-def fixtures(roads: RoadNetwork) -> Iterator[Fixture]:
-    """All furniture of a road network, posts of signals included."""
+def fixtures(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Fixture]:
+    """All furniture of a road network, posts of signals included, but for objects with some ids."""
     for placed in placed_objects(roads):
-        found = _fixture(roads, placed)
+        found = _fixture(roads, placed) if placed.object.id not in without else None
         if found is not None:
             yield found
     for head in signal_heads(roads):
@@ -124,7 +124,7 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
     """With its usual size where the map has none, or has the whole assembly of post and head."""
     lamps = signal.dynamic
     width, height = (0.34, 0.94) if lamps else (0.61, 0.61)
-    if 0.1 <= signal.width <= 1.2:
+    if 0.1 <= signal.width <= (0.5 if lamps else 1.2):
         width = signal.width
     low, top = pose.z, pose.z + signal.height
     if signal.z_offset >= 1.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,13 +36,16 @@ class Building:
 class Scenery:
     """The bodies in pybullet of ground, buildings and what else stands at the roads.
 
+    entities  ids of objects that come as actors instead
+
     What stands at the roads gets its bodies when somebody may run into it, or looks at it by rays.
     """
 
-    def __init__(self, client: int, roads: RoadNetwork | None) -> None:
+    def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
         self.buildings: list[Building] = []
         self._client = client
+        self._entities = frozenset(entities)
         self._names: dict[int, str] = {}
         self.level = is_level(roads)
         self._raised = False
@@ -49,7 +53,7 @@ class Scenery:
         self._obstacle_handles: frozenset[int] = frozenset()
         if roads is not None:
             for placed in placed_objects(roads):
-                if placed.object.type == "building":
+                if placed.object.type == "building" and placed.object.id not in entities:
                     building = _building(roads, placed)
                     self.add_building(building.name, building.centre, building.size, building.yaw)
 
@@ -93,7 +97,7 @@ class Scenery:
     @cached_property
     def furniture(self) -> tuple[Fixture, ...]:
         """What stands at the roads, buildings aside."""
-        return tuple(fixtures(self.roads)) if self.roads is not None else ()
+        return tuple(fixtures(self.roads, self._entities)) if self.roads is not None else ()
 
     def raise_obstacles(self) -> bool:
         """Give what stands at the roads its bodies, where it has none yet; True if they were made now."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,8 @@ class WorldView:
     speed         (N,) along the heading, negative backwards [m/s]
     size          (N, 3) length, width, height of the bounding box [m]
     offset        (N, 3) box centre in the actor's frame [m]
+    contacts      touches that began during the step that led here
+    unseen        actors that sensors do not see, as the scenario says
     """
 
     time: float
@@ -53,11 +56,29 @@ class WorldView:
     size: Array
     offset: Array
     contacts: tuple[Contact, ...] = ()
+    unseen: tuple[str, ...] = ()
 
     @cached_property
     def rows(self) -> Mapping[str, int]:
         """Name to row."""
         return {name: row for row, name in enumerate(self.names)}
+
+    def without(self, names: Collection[str]) -> WorldView:
+        """The same instant without some actors."""
+        kept = [row for row, name in enumerate(self.names) if name not in names]
+        if len(kept) == len(self.names):
+            return self
+        arrays: dict[str, Any] = {
+            field.name: value[kept]
+            for field in fields(self)
+            if isinstance(value := getattr(self, field.name), np.ndarray)
+        }
+        return replace(
+            self,
+            names=tuple(self.names[row] for row in kept),
+            categories=tuple(self.categories[row] for row in kept),
+            **arrays,
+        )
 
     def __contains__(self, name: object) -> bool:
         return name in self.rows

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body
 from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.meshes import actor_mesh
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
@@ -20,9 +24,10 @@ from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.render.lamps import Beam
 from eidrive_scenario.world.render.model import Array, Instance, Light, Model, gridded, merged, model, placed
-from eidrive_scenario.world.render.props import Props
 from eidrive_scenario.world.render.renderer import render
+from eidrive_scenario.world.roadside import Roadside
 from eidrive_scenario.world.scenery import Building, Scenery
+from eidrive_scenario.world.vehicle_lamps import beam, glow
 from eidrive_scenario.world.weather import Weather
 
 _BESIDE_ROADS = 1500.0
@@ -32,9 +37,15 @@ _BELOW_ROADS = 0.06
 _LIT_WINDOWS = 0.3
 """Share of a building's windows with a light behind them at night."""
 WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
-HEADLIGHT: Light = (6_500.0, 6_000.0, 4_900.0)
-TAILLIGHT: Light = (300.0, 0.8, 0.5)
-"""Luminance of what shines at night [cd/m²]."""
+"""Luminance of a lit window [cd/m²]."""
+
+
+class Shown(NamedTuple):
+    """What changes beside the poses: the time [s], what signals show, and how actors look."""
+
+    time: float = 0.0
+    signals: Mapping[str, str] = MappingProxyType({})
+    appearances: Mapping[str, Appearance] = MappingProxyType({})
 
 
 class Visuals:
@@ -42,69 +53,53 @@ class Visuals:
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
-        self._props = Props()
+        heads = signal_heads(scenery.roads) if scenery.roads is not None else ()
+        self._roadside = Roadside(scenery.furniture, heads)
         self._shown_buildings = 0
         self._ground = self._ground_parts()
         self._buildings: Model | None = None
         self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
     def radiance(
-        self, bodies: Mapping[int, Body], hidden: Iterable[str], pose: Array, pinhole: Pinhole, weather: Weather
+        self,
+        bodies: Mapping[int, Body],
+        hidden: Iterable[str],
+        pose: Array,
+        pinhole: Pinhole,
+        weather: Weather,
+        shown: Shown = Shown(),  # noqa: B008 - it is immutable
     ) -> Radiance:
-        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine."""
+        """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
+
+        Those that the scenario makes invisible do neither.
+        """
+        looks = {body.name: shown.appearances.get(body.name, _USUAL) for body in bodies.values()}
+        bodies = {row: body for row, body in bodies.items() if looks[body.name].visibility.graphics}
         if self._shown_buildings < len(self._scenery.buildings):
             self._shown_buildings = len(self._scenery.buildings)
             self._buildings = gridded(merged(_building_model(each) for each in self._scenery.buildings))
         dark = weather.lamps_on
-        actors = {body.name: _actor_instance(row, body, self.glow_of(body, weather)) for row, body in bodies.items()}
+        actors = {
+            body.name: _actor_instance(
+                row, body, glow(body.spec, looks[body.name], weather, shown.time), looks[body.name].motion
+            )
+            for row, body in bodies.items()
+        }
         glowing = {"window_lit": WINDOW_LIGHT} if dark and weather.sun_elevation < 3.0 else {}
         houses = []
         if self._buildings is not None:
             houses = [Instance(self._buildings, np.eye(3), np.zeros(3), -1, glowing)]
-        beams = [beam for body in bodies.values() for beam in self.beams_of(body, weather)]
+        beams = [
+            _beam(body, *lit)
+            for body in bodies.values()
+            if (lit := beam(body.spec, looks[body.name], weather, shown.time)) is not None
+        ]
         left_out = frozenset(hidden)
-        props = self._props.instances()
-        drawn = [*self._ground, *houses, *props, *(each for name, each in actors.items() if name not in left_out)]
-        casters = [*houses, *props, *actors.values()]
+        roadside = self._roadside.instances(pose[:3, 3], shown.signals, shown.time)
+        drawn = [*self._ground, *houses, *roadside, *(each for name, each in actors.items() if name not in left_out)]
+        casters = [*houses, *roadside, *actors.values()]
         ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
         return render(drawn, casters, beams, weather, pose, pinhole, ground)
-
-    def glow_of(self, body: Body, weather: Weather) -> Mapping[str, Light]:
-        """What an actor's materials emit [cd/m²]."""
-        if weather.lamps_on and _has_lamps(body.spec):
-            return {"headlight": HEADLIGHT, "taillight": TAILLIGHT}
-        return {}
-
-    def beams_of(self, body: Body, weather: Weather) -> Sequence[Beam]:
-        """The headlamps of an actor that are on."""
-        if not (weather.lamps_on and _has_lamps(body.spec)):
-            return ()
-        rotation, foot = _stance(body)
-        length, _, height = body.spec.size
-        lamp = np.array([length / 2, 0.0, min(0.7, 0.45 * height)])
-        return (Beam(foot + rotation @ lamp, rotation),)
-
-    def _add(self, triangles: Array, colour: Colour, material: str = "matt", label: int = -1) -> list[int]:
-        """Put up triangles (K, 3, 3) of one colour and material; returns their handles."""
-        return [self._props.add(triangles, colour, material, label)]
-
-    def _move(self, handles: Sequence[int], at: Sequence[float], turn: Sequence[float]) -> None:
-        """Put parts elsewhere: position, and quaternion x, y, z, w."""
-        x, y, z, w = turn
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        for handle in handles:
-            self._props.move(handle, rotation, np.asarray(at, dtype=float))
-
-    def _glow(self, handles: Sequence[int], light: Light) -> None:
-        """Let parts emit this luminance [cd/m²], linear red, green, blue; (0, 0, 0) is off."""
-        for handle in handles:
-            self._props.glow(handle, light)
 
     def _ground_parts(self) -> list[Instance]:
         """Roads, their markings, and the land around, cut along a grid."""
@@ -123,15 +118,22 @@ class Visuals:
         return [Instance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
 
 
-def _has_lamps(spec: ActorSpec) -> bool:
-    return spec.wheelbase > 0.0 and spec.shape != "bicycle"
+_USUAL = Appearance()
 
 
-def _actor_instance(row: int, body: Body, glow: Mapping[str, Light]) -> Instance:
+def _beam(body: Body, brightness: float, high: bool) -> Beam:
+    """The headlamps of an actor."""
+    rotation, foot = _stance(body)
+    length, _, height = body.spec.size
+    lamp = np.array([length / 2, 0.0, min(0.7, 0.45 * height)])
+    return Beam(foot + rotation @ lamp, rotation, brightness, high)
+
+
+def _actor_instance(row: int, body: Body, emitted: Mapping[str, Light], motion: str) -> Instance:
     spec = body.spec
     rotation, foot = _stance(body)
-    shape = _actor_model(spec.shape, spec.size, spec.offset, spec.wheelbase, spec.wheel_radius, _paint(spec))
-    return Instance(shape, rotation, foot, row, glow)
+    shape = _actor_model(spec.shape, spec.size, spec.offset, spec.wheelbase, spec.wheel_radius, _paint(spec), motion)
+    return Instance(shape, rotation, foot, row, emitted)
 
 
 def _paint(spec: ActorSpec) -> Colour:
@@ -146,9 +148,10 @@ def _actor_model(
     wheelbase: float,
     wheel_radius: float,
     colour: Colour,
+    motion: str,
 ) -> Model:
     spec = ActorSpec("", shape, "", size, offset, wheelbase=wheelbase, wheel_radius=wheel_radius)
-    return model(actor_mesh(spec), {"paint": colour})
+    return model(actor_mesh(spec, motion), {"paint": colour})
 
 
 def _stance(body: Body) -> tuple[Array, Array]:

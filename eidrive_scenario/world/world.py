@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from types import TracebackType
 from typing import NamedTuple
 
@@ -13,17 +13,20 @@ from eidrive_scenario.errors import Problem, SettingError, SimulationError, sugg
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
 from eidrive_scenario.world.bullet import bullet, connect
 from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
 from eidrive_scenario.world.contacts import ContactTracker
+from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
 from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
 from eidrive_scenario.world.render.tones import toned, white_level
+from eidrive_scenario.world.roadside import FIRST_LABEL
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
-from eidrive_scenario.world.visuals import Visuals
+from eidrive_scenario.world.visuals import Shown, Visuals
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
@@ -44,9 +47,18 @@ class World:
 
     `step` moves scripted actors exactly to their placements and driven ones by their controls, in physics steps of
     1 / `physics_rate` seconds. Everything is deterministic. Close it after use, or use it in a `with` statement.
+
+    entities  ids of the road network's objects that come as actors, and so are no part of the scenery
     """
 
-    def __init__(self, roads: RoadNetwork | None = None, *, dt: float = 0.05, physics_rate: float = 200.0) -> None:
+    def __init__(
+        self,
+        roads: RoadNetwork | None = None,
+        *,
+        dt: float = 0.05,
+        physics_rate: float = 200.0,
+        entities: Collection[str] = (),
+    ) -> None:
         self.dt = dt
         self.tick = 0
         substeps = substeps_per_tick(dt, physics_rate)
@@ -55,6 +67,9 @@ class World:
         self._bodies: dict[str, Body] = {}
         self._driven: dict[str, DrivenBody] = {}
         self._weather = Weather()
+        self._signals: Mapping[str, str] = {}
+        self._appearances: Mapping[str, Appearance] = {}
+        self._unseen: tuple[str, ...] = ()
         self._friction = 1.0
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
@@ -64,7 +79,7 @@ class World:
         self._cast: _Cast | None = None
         self._row_of_handle = np.empty(0, dtype=np.int64)
         self._broadphase_fresh = False
-        self._scenery = Scenery(self._client, roads)
+        self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
         self._changed()
@@ -145,6 +160,20 @@ class World:
         self._weather = weather
         self._friction = weather.friction_scale
 
+    def show(self, signals: Mapping[str, str], appearances: Mapping[str, Appearance]) -> None:
+        """What traffic signals show from now on, by their ids, and how those actors look that are not as usual."""
+        self._signals = signals
+        if appearances is not self._appearances:
+            self._appearances = appearances
+            self._unseen = tuple(name for name, look in appearances.items() if not look.visibility.sensors)
+            self._view = None
+
+    @property
+    def signal_labels(self) -> Mapping[int, str]:
+        """What the heads of traffic signals are in the segmentation of pictures, and their ids."""
+        heads = signal_heads(self._roads) if self._roads is not None else ()
+        return {FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
+
     def add_building(
         self, name: str, centre: Vector3, size: Vector3, yaw: float = 0.0, colour: Vector3 | None = None
     ) -> None:
@@ -199,6 +228,7 @@ class World:
                 size=cast.size,
                 offset=cast.offset,
                 contacts=self._contacts,
+                unseen=self._unseen,
             )
             self._view.__dict__["rows"] = cast.rows
         return self._view
@@ -208,9 +238,11 @@ class World:
         return box_distance(self._body(first).box, self._body(second).box)
 
     def cast(self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> RayHits:
-        """What rays (M, 3) to (M, 3) meet first; the actors in `ignore` are looked through."""
+        """What rays (M, 3) to (M, 3) meet first; actors in `ignore`, and such that sensors do not see, are passed."""
         self._refresh()
-        passed = np.array([self.view().rows[name] for name in ignore], dtype=np.int64)
+        rows = self.view().rows
+        unseen = [rows[name] for name in self._unseen if name in rows]
+        passed = np.array([*(rows[name] for name in ignore), *unseen], dtype=np.int64)
         begin, end = (np.ascontiguousarray(np.reshape(points, (-1, 3)), dtype=float) for points in (origins, targets))
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
         return cast_rays(self._client, begin, end, self._row_of_handle, passed)
@@ -247,7 +279,8 @@ class World:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows
         bodies = {rows[name]: body for name, body in self._bodies.items()}
-        return self._visuals.radiance(bodies, ignore, np.asarray(pose, dtype=float), pinhole, self._weather)
+        shown = Shown(self.time, self._signals, self._appearances)
+        return self._visuals.radiance(bodies, ignore, np.asarray(pose, dtype=float), pinhole, self._weather, shown)
 
     def _body(self, name: str) -> Body:
         body = self._bodies.get(name)

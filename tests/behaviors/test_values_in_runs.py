@@ -125,3 +125,16 @@ def test_a_pedestrian_waves_and_a_loop_goes_on(run: Any) -> None:
     held = played.frames[-1].appearances["Ego"]
     assert (held.motion, held.animations["motion"].gestures) == ("standing", ("wavingRightArm",))
     assert not any(c.element == "action 0" and c.transition is Transition.END for f in played.frames for c in f.changes)
+
+
+def test_who_is_hidden_from_sensors_is_not_detected_and_is_there_all_the_same(run: Any) -> None:
+    hide = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
+    played = run(
+        2,
+        ("Other", hide.format("false"), after(0.5)),
+        ("Other", hide.format("true"), after(1.2)),
+        others={"Other": (-1, 120.0, 20.0)},
+    )
+    seen = [len(frame.steps["Ego"].detections) for frame in played.frames]
+    assert seen == [1] * 12 + [0] * 14 + [1] * 15
+    assert all("Other" in frame.view for frame in played.frames)

@@ -8,9 +8,10 @@ from functools import lru_cache
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.meshes.cars import car
 from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
-from eidrive_scenario.world.meshes.figures import crate, pedestrian, roadside_unit
+from eidrive_scenario.world.meshes.figures import crate, roadside_unit
 from eidrive_scenario.world.meshes.frame import Frame
 from eidrive_scenario.world.meshes.heavy import bus, firetruck, truck
+from eidrive_scenario.world.meshes.people import in_motion, pedestrian
 from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
 from eidrive_scenario.world.meshes.vans import ambulance, van
 
@@ -29,14 +30,17 @@ BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
 }
 
 
-def actor_mesh(spec: ActorSpec) -> Mapping[str, Array]:
-    """Material to triangles (K, 3, 3) of an actor: origin at the centre of its box on the ground, x forward [m]."""
+def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
+    """Material to triangles (K, 3, 3) of an actor: origin at the centre of its box on the ground, x forward [m].
+
+    A pedestrian stands, walks or lies as its motion says, in the standard's words.
+    """
     length, width, height = spec.size
     if spec.wheelbase > 0.0:
         rear, front, radius = -spec.offset[0], spec.wheelbase - spec.offset[0], spec.wheel_radius
     else:
         rear, front, radius = -0.3 * length, 0.3 * length, min(0.35, 0.3 * height)
-    return _mesh(spec.shape, Frame(length, width, height, front, rear, radius))
+    return _mesh(spec.shape, Frame(length, width, height, front, rear, radius), motion)
 
 
 def shadow(spec: ActorSpec) -> Array:
@@ -56,5 +60,7 @@ _ABOVE_GROUND = 0.035
 
 
 @lru_cache(maxsize=256)
-def _mesh(shape: str, frame: Frame) -> Mapping[str, Array]:
+def _mesh(shape: str, frame: Frame, motion: str) -> Mapping[str, Array]:
+    if shape == "pedestrian" and motion:
+        return in_motion(frame, motion)
     return BUILDERS[shape](frame).materials()

@@ -103,9 +103,11 @@ def _details(mesh: Mesh, frame: Frame, belt: float, upright: bool) -> None:
         "plate", box((nose - 0.01, 0, z(0.22)), (0.05, 0.52, 0.11)), box((tail + 0.005, 0, z(0.42)), (0.03, 0.52, 0.11))
     )
     mesh.add_mirrored("headlight", box((x(0.972), 0.70 * side, z(belt - 0.19)), (0.16, 0.30 * side, z(0.055))))
-    mesh.add_mirrored("indicator", box((x(0.955), 0.865 * side, z(belt - 0.19)), (0.12, 0.07 * side, z(0.045))))
+    mesh.add_sided("indicator", box((x(0.955), 0.865 * side, z(belt - 0.19)), (0.12, 0.07 * side, z(0.045))))
     light = z(belt - 0.09)
     mesh.add_mirrored("taillight", box((x(0.02), 0.74 * side, light), (0.15, 0.36 * side, z(0.085))))
+    mesh.add_sided("indicator", box((x(0.019), 0.86 * side, light), (0.15, 0.125 * side, z(0.08))))
+    mesh.add_mirrored("reversing_light", box((x(0.019), 0.61 * side, light), (0.15, 0.10 * side, z(0.06))))
     mesh.add_mirrored("trim", box((x(0.70), 0.985 * side, z(belt + 0.05)), (0.10, 0.05, 0.05)))
     mesh.add_mirrored("paint", box((x(0.705), 0.99 * side, z(belt + 0.075)), (0.12, 0.16, 0.12)))
     for share in (0.245, 0.475, 0.70):

@@ -25,6 +25,8 @@ def motorbike(frame: Frame) -> Mesh:
     mesh.add("headlight", ball((x1 - 0.08 * base, 0, seat + 0.10), (0.07, 0.09, 0.09)))
     mesh.add("paint", box((x1, 0, 2 * radius + 0.03), (0.42, 0.12, 0.03)))
     mesh.add("taillight", box((x0 - 0.22, 0, seat), (0.04, 0.12, 0.06)))
+    for along in (x0 - 0.20, x1 - 0.06 * base):
+        mesh.add_sided("indicator", ball((along, 0.14, seat), (0.03, 0.03, 0.03), 4, 6))
     mesh.add("plate", box((x0 - 0.25, 0, seat - 0.16), (0.02, 0.20, 0.16)))
     _rider(mesh, frame, x0 + 0.30 * base, seat + 0.05, steer, foot=(middle, 0.17, radius - 0.02), lean=0.20)
     return mesh

@@ -1,41 +1,9 @@
-"""People, masts and boxes."""
+"""Masts and boxes."""
 
 from __future__ import annotations
 
 from eidrive_scenario.world.meshes.frame import Frame
-from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, box, cylinder, tapered_box
-
-
-def pedestrian(frame: Frame) -> Mesh:
-    """Somebody in mid-stride, arms swinging, inside the box."""
-    mesh = Mesh()
-    z, side = frame.z, frame.side
-    stride = min(0.5 * frame.length - 0.11, 0.16 * frame.height)
-    shoulder = min(0.132 * frame.height, side - 0.06)
-    hip, neck, head = z(0.50), z(0.835), 0.068 * frame.height
-    thigh, calf = 0.047 * frame.height, 0.034 * frame.height
-    for sign in (-1, 1):
-        y = sign * 0.40 * shoulder
-        knee = (0.45 * sign * stride + 0.03, y, z(0.275))
-        ankle = (sign * stride, y, z(0.05))
-        mesh.add("trousers", cylinder((0, y, hip + 0.02), knee, thigh, 0.85 * thigh, sides=8))
-        mesh.add("trousers", cylinder(knee, ankle, 0.85 * thigh, calf, sides=8))
-        mesh.add("shoes", bevelled_box((ankle[0] + 0.04, y, z(0.023)), (0.24, 0.10, z(0.046)), 0.015))
-        arm = sign * shoulder
-        hand = (-0.8 * sign * stride, arm, z(0.47))
-        elbow = (-0.35 * sign * stride - 0.02, arm, z(0.645))
-        mesh.add("paint", cylinder((0, arm, neck - 0.05), elbow, 0.034 * frame.height, 0.03 * frame.height, sides=8))
-        mesh.add("paint", cylinder(elbow, hand, 0.03 * frame.height, 0.024 * frame.height, sides=8))
-        mesh.add("skin", ball(hand, (0.045, 0.035, 0.055), 4, 6))
-    mesh.add("trousers", bevelled_box((0, 0, hip), (0.2, 1.5 * shoulder, z(0.08)), 0.04))
-    mesh.add(
-        "paint",
-        tapered_box((0, 0, (hip + neck) / 2 + 0.02), (0.19, 1.45 * shoulder, neck - hip), (0.22, 2.0 * shoulder)),
-    )
-    mesh.add("skin", cylinder((0, 0, neck), (0, 0, neck + 0.03 * frame.height), 0.05, sides=8))
-    mesh.add("skin", ball((0.01, 0, frame.height - 1.12 * head), (0.82 * head, 0.72 * head, head)))
-    mesh.add("hair", ball((-0.015, 0, frame.height - 0.92 * head), (0.86 * head, 0.78 * head, 0.92 * head)))
-    return mesh
+from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylinder
 
 
 def roadside_unit(frame: Frame) -> Mesh:

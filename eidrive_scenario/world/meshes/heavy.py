@@ -96,7 +96,7 @@ def bus(frame: Frame) -> Mesh:
     nose, tail = x(1.0) - 0.01, x(0.0) + 0.01
     mesh.add("glass", box((nose, 0, z(0.58)), (0.04, 1.76 * side, z(0.42))))
     mesh.add("trim", box((nose, 0, z(0.87)), (0.04, 1.5 * side, z(0.085))))
-    mesh.add("indicator", box((nose + 0.012, 0, z(0.87)), (0.03, 1.0 * side, z(0.045))))
+    mesh.add("marker_light", box((nose + 0.012, 0, z(0.87)), (0.03, 1.0 * side, z(0.045))))
     mesh.add("glass", box((tail, 0, z(0.68)), (0.04, 1.5 * side, z(0.26))))
     for share in (0.90, 0.50):
         for leaf in (-1, 1):
@@ -109,8 +109,10 @@ def bus(frame: Frame) -> Mesh:
         box((tail + 0.02, 0, z(0.135)), (0.08, 1.9 * side, z(0.09))),
     )
     mesh.add_mirrored("headlight", box((nose, 0.74 * side, z(0.235)), (0.05, 0.30 * side, z(0.055))))
-    mesh.add_mirrored("indicator", box((nose, 0.93 * side, z(0.235)), (0.05, 0.06 * side, z(0.055))))
+    mesh.add_sided("indicator", box((nose, 0.93 * side, z(0.235)), (0.05, 0.06 * side, z(0.055))))
     mesh.add_mirrored("taillight", box((tail, 0.86 * side, z(0.32)), (0.05, 0.14 * side, z(0.15))))
+    mesh.add_sided("indicator", box((tail, 0.86 * side, z(0.425)), (0.05, 0.14 * side, z(0.045))))
+    mesh.add_mirrored("reversing_light", box((tail, 0.86 * side, z(0.22)), (0.05, 0.14 * side, z(0.035))))
     mesh.add(
         "plate", box((nose + 0.02, 0, z(0.135)), (0.03, 0.52, 0.11)), box((tail - 0.0, 0, z(0.25)), (0.05, 0.52, 0.11))
     )
@@ -173,9 +175,7 @@ def _cab(mesh: Mesh, frame: Frame, length: float, top: float, material: str, *, 
     mesh.add_mirrored(
         "headlight", box((nose - 0.01, 0.78 * side, floor + 0.16 * high), (0.05, 0.28 * side, 0.10 * high))
     )
-    mesh.add_mirrored(
-        "indicator", box((nose - 0.02, 0.95 * side, floor + 0.16 * high), (0.06, 0.06 * side, 0.10 * high))
-    )
+    mesh.add_sided("indicator", box((nose - 0.02, 0.95 * side, floor + 0.16 * high), (0.06, 0.06 * side, 0.10 * high)))
     mesh.add_mirrored(
         "trim", box((nose - 0.20, 0.965 * side, sill + 0.42 * (roof - sill)), (0.10, 0.13, 0.42 * (roof - sill)))
     )
@@ -185,6 +185,8 @@ def _tail(mesh: Mesh, frame: Frame, floor: float) -> None:
     x, side = frame.x(0.0), frame.side
     mesh.add("plastic", box((x + 0.08, 0, floor - 0.30), (0.12, 1.84 * side, 0.16)))
     mesh.add_mirrored("taillight", box((x + 0.02, 0.82 * side, floor - 0.13), (0.06, 0.26 * side, 0.14)))
+    mesh.add_sided("indicator", box((x + 0.018, 0.90 * side, floor - 0.13), (0.06, 0.09 * side, 0.12)))
+    mesh.add_mirrored("reversing_light", box((x + 0.018, 0.72 * side, floor - 0.13), (0.06, 0.06 * side, 0.10)))
     mesh.add("plate", box((x + 0.015, 0, floor - 0.30), (0.03, 0.52, 0.11)))
 
 

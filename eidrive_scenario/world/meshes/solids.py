@@ -28,6 +28,11 @@ class Mesh:
         """Put solids and their mirror images on the other side (y -> -y) into the mesh."""
         self.add(material, *solids, *(mirrored(solid) for solid in solids))
 
+    def add_sided(self, material: str, *solids: Array) -> None:
+        """Put solids of the left side (y > 0) and their mirror images into the mesh, as materials of their own."""
+        self.add(f"{material}_left", *solids)
+        self.add(f"{material}_right", *(mirrored(solid) for solid in solids))
+
     def materials(self) -> dict[str, Array]:
         """Material to its triangles (K, 3, 3)."""
         return {material: np.concatenate(solids) for material, solids in self.triangles.items()}

@@ -112,7 +112,7 @@ def _cab_details(mesh: Mesh, frame: Frame) -> None:
     mesh.add("plastic", bevelled_box((nose - 0.09, 0, z(0.18)), (0.20, 1.84 * side, z(0.10)), 0.04))
     mesh.add("plate", box((nose + 0.005, 0, z(0.18)), (0.03, 0.52, 0.11)))
     mesh.add_mirrored("headlight", box((x(0.975), 0.76 * side, z(0.36)), (0.16, 0.25 * side, z(0.09))))
-    mesh.add_mirrored("indicator", box((x(0.962), 0.885 * side, z(0.37)), (0.12, 0.06 * side, z(0.07))))
+    mesh.add_sided("indicator", box((x(0.962), 0.885 * side, z(0.37)), (0.12, 0.06 * side, z(0.07))))
     mesh.add_mirrored("trim", box((x(0.90), 0.985 * side, z(0.60)), (0.12, 0.10, 0.26)))
 
 
@@ -125,3 +125,5 @@ def _rear_doors(mesh: Mesh, frame: Frame, _: str) -> None:
     mesh.add("plastic", box((tail + 0.06, 0, z(0.16)), (0.14, 1.8 * side, z(0.06))))
     mesh.add("plate", box((tail + 0.01, 0.45 * side, z(0.34)), (0.04, 0.52, 0.11)))
     mesh.add_mirrored("taillight", box((tail + 0.03, 0.88 * side, z(0.40)), (0.08, 0.13 * side, z(0.16))))
+    mesh.add_sided("indicator", box((tail + 0.03, 0.88 * side, z(0.51)), (0.08, 0.13 * side, z(0.05))))
+    mesh.add_mirrored("reversing_light", box((tail + 0.03, 0.88 * side, z(0.30)), (0.08, 0.13 * side, z(0.04))))

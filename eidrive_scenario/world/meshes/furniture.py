@@ -1,0 +1,130 @@
+"""What stands at the roads, to scale: origin at the middle of the foot, x along the object's heading."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+from eidrive_scenario.world.meshes.solids import Array, Mesh, ball, box, cylinder, tapered_box
+
+CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
+LAMP_COLOURS = ("red", "yellow", "green")
+
+
+@lru_cache(maxsize=512)
+def furniture(kind: str, name: str, length: float, width: float, height: float, radius: float) -> Mapping[str, Array]:
+    """Material to triangles (K, 3, 3) of one piece."""
+    mesh = Mesh()
+    _BUILDERS[kind](mesh, name, length, width, height, radius)
+    return mesh.materials()
+
+
+@lru_cache(maxsize=64)
+def traffic_light(colours: tuple[str, ...], width: float, height: float) -> Mapping[str, Array]:
+    """A head with lamps from top to bottom, looking along +x; origin at the middle of its lower edge.
+
+    The lamps are materials of their own: `lamp_red 0`, … numbered from the top.
+    """
+    mesh = Mesh()
+    deep, cell = 0.5 * width, height / max(len(colours), 1)
+    lens = min(0.36 * width, 0.40 * cell)
+    mesh.add("plastic", box((-deep / 2, 0, height / 2), (deep, width, height)))
+    for number, colour in enumerate(colours):
+        z = height - (number + 0.5) * cell
+        mesh.add(f"lamp_{colour} {number}", cylinder((0.0, 0, z), (0.012, 0, z), lens, sides=12))
+        mesh.add("plastic", _visor(z, lens))
+    return mesh.materials()
+
+
+def _visor(z: float, lens: float) -> Array:
+    """A small roof over a lamp."""
+    return tapered_box((0.07, 0, z + 1.12 * lens), (0.14, 2.0 * lens, 0.02), (0.14, 1.6 * lens))
+
+
+def _tree(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    girth = 0.6 * radius
+    mesh.add("bark", cylinder((0, 0, 0), (0, 0, 0.45 * height), girth, 0.7 * girth, sides=6))
+    if any(word in name.lower() for word in CONIFERS):
+        for low, high, share in ((0.15, 0.62, 1.0), (0.42, 0.85, 0.7), (0.68, 1.0, 0.45)):
+            reach = share * (length + width) / 4
+            mesh.add("needles", cylinder((0, 0, low * height), (0, 0, high * height), reach, 0.02, sides=7))
+        return
+    middle, half = 0.65 * height, (length / 2, width / 2, 0.35 * height)
+    mesh.add("leaves", ball((0, 0, middle), half, 5, 8))
+    mesh.add(
+        "leaves",
+        ball((0.22 * length, 0.1 * width, middle - 0.1 * height), (0.3 * length, 0.3 * width, 0.2 * height), 4, 7),
+    )
+
+
+def _bush(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("leaves", ball((0, 0, 0.45 * height), (length / 2, width / 2, 0.55 * height), 4, 7))
+    mesh.add(
+        "leaves", ball((0.2 * length, -0.15 * width, 0.35 * height), (0.3 * length, 0.3 * width, 0.4 * height), 4, 6)
+    )
+
+
+def _pole(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.8 * radius, sides=8))
+
+
+def _lamp(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.6 * radius, sides=8))
+    mesh.add("steel", cylinder((0, 0, height - 0.1), (1.4, 0, height), 0.6 * radius, 0.5 * radius, sides=6))
+    mesh.add("plastic", box((1.6, 0, height), (0.6, 0.25, 0.1)))
+
+
+def _guide_post(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("white", tapered_box((0, 0, height / 2), (2 * radius, 2 * radius, height), (1.6 * radius, 1.6 * radius)))
+    mesh.add("trim", box((0, 0, 0.8 * height), (2.1 * radius, 2.1 * radius, 0.15 * height)))
+    mesh.add("plate", box((-radius, 0, 0.8 * height), (0.02, radius, 0.1 * height)))
+
+
+def _barrier(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("concrete", tapered_box((0, 0, 0.16 * height), (length, width, 0.32 * height), (length, 0.6 * width)))
+    mesh.add(
+        "concrete", tapered_box((0, 0, 0.66 * height), (length, 0.6 * width, 0.68 * height), (length, 0.4 * width))
+    )
+
+
+def _railing(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("steel", box((0, 0, 0.7 * height), (length, 0.25 * width, 0.6 * height)))
+    mesh.add("steel", box((0, 0, 0.35 * height), (0.1, 0.4 * width, 0.7 * height)))
+
+
+def _obstacle(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    if "cone" in name.lower():
+        mesh.add("trim", box((0, 0, 0.02), (length, width, 0.04)))
+        mesh.add("orange", cylinder((0, 0, 0.04), (0, 0, height), 0.38 * min(length, width), 0.03, sides=10))
+        return
+    if radius:
+        mesh.add("grey", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
+        return
+    mesh.add(
+        "steel" if "post" in name.lower() or "pole" in name.lower() else "cargo",
+        box((0, 0, height / 2), (length, width, height)),
+    )
+
+
+def _gantry(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add_mirrored("steel", box((0, width / 2, height / 2), (0.3, 0.3, height)))
+    mesh.add("steel", box((0, 0, height - 0.3), (0.3, width, 0.6)))
+
+
+def _island(mesh: Mesh, name: str, length: float, width: float, height: float, radius: float) -> None:
+    mesh.add("pavement", tapered_box((0, 0, height / 2), (length, width, height), (0.97 * length, 0.97 * width)))
+
+
+_BUILDERS: Mapping[str, Callable[[Mesh, str, float, float, float, float], None]] = {
+    "tree": _tree,
+    "vegetation": _bush,
+    "pole": _pole,
+    "post": _pole,
+    "lamp": _lamp,
+    "guide post": _guide_post,
+    "barrier": _barrier,
+    "railing": _railing,
+    "obstacle": _obstacle,
+    "gantry": _gantry,
+    "island": _island,
+}

@@ -1,0 +1,104 @@
+"""Traffic signs: plates of all shapes with borders, numbers and words; origin at the middle of their lower edge.
+
+They look along +x, at the traffic; as that sees it, y runs to the right and z upwards.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
+from eidrive_scenario.world.signs import NO_ENTRY, SignFace
+
+LAYER = 0.004
+"""Each layer of paint lies so far before the one below [m]; far more than in truth, for the eyes of a far camera."""
+BORDERS = {"octagon": 0.06, "board": 0.05, "diamond": 0.14}
+BORDER = 0.12
+"""Width of a border as a share of the plate's, by its shape where it is not the usual one."""
+
+GLYPHS = {
+    "0": "111101101101111", "1": "010110010010111", "2": "111001111100111", "3": "111001011001111",
+    "4": "101101111001001", "5": "111100111001111", "6": "111100111101111", "7": "111001010010010",
+    "8": "111101111101111", "9": "111101111001111",
+    "S": "111100111001111", "T": "111010010010010", "O": "111101101101111", "P": "111101111100100",
+}  # fmt: skip
+"""Three columns and five lines, from the top left."""
+
+
+@lru_cache(maxsize=256)
+def sign(face: SignFace, width: float, height: float) -> dict[str, Array]:
+    """Material to triangles (K, 3, 3) of a sign."""
+    mesh = Mesh()
+    outline = _outline(face.shape, width, height)
+    mesh.add("steel", polygon(_at(outline, -LAYER))[:, ::-1])
+    middle = np.array([0.0, height / 2 if face.shape not in ("triangle", "yield") else _inner(face.shape, height)])
+    mesh.add(f"sign_{face.border or face.fill}", polygon(_at(outline, 0.0)))
+    if face.border:
+        inner = 1.0 - 2.0 * BORDERS.get(face.shape, BORDER if face != NO_ENTRY else 0.03)
+        mesh.add(f"sign_{face.fill}", polygon(_at(middle + inner * (outline - middle), LAYER)))
+    if face == NO_ENTRY:
+        bar = np.array([(-0.36, -0.08), (0.36, -0.08), (0.36, 0.08), (-0.36, 0.08)]) * (width, height)
+        mesh.add("sign_white", polygon(_at(middle + bar, 2 * LAYER)))
+    if face.text:
+        ink = "white" if face.fill in ("red", "blue") else "black"
+        mesh.add(f"sign_{ink}", *_letters(face.text, middle, 0.62 * width, 0.42 * height))
+    return mesh.materials()
+
+
+def _outline(shape: str, width: float, height: float) -> Array:
+    """(M, 2) corners, counter-clockwise as the traffic sees it."""
+    half, tall = width / 2, height / 2
+    if shape == "board":
+        return np.array([(-half, 0.0), (half, 0.0), (half, height), (-half, height)])
+    if shape == "diamond":
+        return np.array([(0.0, 0.0), (half, tall), (0.0, height), (-half, tall)])
+    if shape == "triangle":
+        return np.array([(-half, 0.0), (half, 0.0), (0.0, height)])
+    if shape == "yield":
+        return np.array([(0.0, 0.0), (half, height), (-half, height)])
+    corners = 8 if shape == "octagon" else 28
+    turns = np.arange(corners) * (2 * math.pi / corners) + (math.pi / 8 if shape == "octagon" else 0.0)
+    scale = 1.0 / math.cos(math.pi / 8) if shape == "octagon" else 1.0
+    return np.stack([half * scale * np.cos(turns), tall + tall * scale * np.sin(turns)], axis=1)
+
+
+def _inner(shape: str, height: float) -> float:
+    """Height of a triangle's centre."""
+    return height / 3 if shape == "triangle" else 2 * height / 3
+
+
+def _letters(text: str, middle: Array, width: float, height: float) -> list[Array]:
+    """Cells of the letters as small squares, joined along each line."""
+    columns = 4 * len(text) - 1
+    cell = min(width / columns, height / 5)
+    left, top = -cell * columns / 2, middle[1] + 2.5 * cell
+    parts = []
+    for number, letter in enumerate(text):
+        for line in range(5):
+            bits = GLYPHS.get(letter, "0" * 15)[3 * line : 3 * line + 3]
+            for run in _runs(bits):
+                y0 = left + (4 * number + run[0]) * cell
+                y1, z1 = y0 + (run[1] - run[0]) * cell, top - line * cell
+                corners = np.array([(y0, z1 - cell), (y1, z1 - cell), (y1, z1), (y0, z1)])
+                parts.append(polygon(_at(corners, 2 * LAYER)))
+    return parts
+
+
+def _runs(bits: str) -> list[tuple[int, int]]:
+    """Stretches of ones: where each begins, and where it has ended."""
+    found: list[tuple[int, int]] = []
+    for index, bit in enumerate(bits):
+        if bit == "1":
+            found = (
+                [*found[:-1], (found[-1][0], index + 1)]
+                if found and found[-1][1] == index
+                else [*found, (index, index + 1)]
+            )
+    return found
+
+
+def _at(corners: Array, x: float) -> Array:
+    return np.column_stack([np.full(len(corners), x), corners])

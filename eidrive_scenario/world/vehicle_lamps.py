@@ -1,0 +1,87 @@
+"""The lamps of vehicles: which of them shine, how brightly, and what they throw on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.appearance import Appearance, LightState
+from eidrive_scenario.world.render.model import Light, linear
+from eidrive_scenario.world.weather import Weather
+
+HEADLIGHT: Light = (6_500.0, 6_000.0, 4_900.0)
+TAILLIGHT: Light = (300.0, 0.8, 0.5)
+"""Luminance of what shines at night [cd/m²]."""
+
+_HIGH: Light = (26_000.0, 24_000.0, 20_000.0)
+_DAY: Light = (9_000.0, 9_200.0, 9_600.0)
+_BRAKE: Light = (7_500.0, 12.0, 8.0)
+_REAR_FOG: Light = (9_000.0, 14.0, 9.0)
+_INDICATOR: Light = (11_000.0, 3_600.0, 30.0)
+_WHITE: Light = (7_000.0, 6_800.0, 6_200.0)
+_PLATE: Light = (28.0, 26.0, 22.0)
+_BEACON: Light = (150.0, 700.0, 11_000.0)
+_RED_BEACON: Light = (11_000.0, 20.0, 12.0)
+"""Luminous intensities between the bounds of UN Regulations 7, 6, 38, 23, 87 and 65 over the areas of our lamps."""
+
+_SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
+    "daytimeRunningLights": (("headlight", _DAY),),
+    "lowBeam": (("headlight", HEADLIGHT), ("taillight", TAILLIGHT)),
+    "highBeam": (("headlight", _HIGH), ("taillight", TAILLIGHT)),
+    "fogLights": (("headlight", HEADLIGHT), ("taillight", _REAR_FOG)),
+    "fogLightsFront": (("headlight", HEADLIGHT),),
+    "fogLightsRear": (("taillight", _REAR_FOG),),
+    "brakeLights": (("taillight", _BRAKE),),
+    "warningLights": (("indicator_left", _INDICATOR), ("indicator_right", _INDICATOR)),
+    "indicatorLeft": (("indicator_left", _INDICATOR),),
+    "indicatorRight": (("indicator_right", _INDICATOR),),
+    "reversingLights": (("reversing_light", _WHITE),),
+    "licensePlateIllumination": (("plate", _PLATE),),
+    "specialPurposeLights": (("blue_light", _BEACON), ("red_light", _RED_BEACON)),
+}
+"""The standard's lights, and the materials of our meshes that shine when they are on."""
+_BEAMS = ("lowBeam", "highBeam", "fogLights", "fogLightsFront")
+
+
+def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> Mapping[str, Light]:
+    """What an actor's materials emit at `time` [s], linear red, green, blue [cd/m²].
+
+    Lamps that nobody has switched follow the weather: low beam and tail lamps where it is dark or the air is thick.
+    """
+    found: dict[str, Light] = {}
+    for name, light in _lights(spec, appearance, weather).items():
+        brightness = light.brightness(time)
+        for material, luminance in _SHINES.get(name, ()) if brightness > 0.0 else ():
+            shown = _coloured(luminance, light, brightness)
+            found[material] = _brighter(found.get(material), shown)
+    return found
+
+
+def beam(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> tuple[float, bool] | None:
+    """How bright the headlamps are, in [0, 1], and whether on high beam; None where they are dark."""
+    lights = _lights(spec, appearance, weather)
+    found = {name: lights[name].brightness(time) for name in _BEAMS if name in lights}
+    brightest = max(found.values(), default=0.0)
+    return (brightest, found.get("highBeam", 0.0) > 0.0) if brightest > 0.0 else None
+
+
+def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mapping[str, LightState]:
+    """The lights that were switched, and low beam by itself where it was not."""
+    lights = appearance.lights
+    if weather.lamps_on and "lowBeam" not in lights and spec.wheelbase > 0.0 and spec.shape != "bicycle":
+        return {"lowBeam": LightState("lowBeam", "on"), **lights}
+    return lights
+
+
+def _coloured(luminance: Light, light: LightState, brightness: float) -> Light:
+    """In the light's own colour where it has one, as bright as before."""
+    if light.colour is not None:
+        red, green, blue = linear(light.colour)
+        most = max(red, green, blue)
+        scale = max(luminance) / most if most > 0.0 else 0.0
+        luminance = (red * scale, green * scale, blue * scale)
+    return luminance[0] * brightness, luminance[1] * brightness, luminance[2] * brightness
+
+
+def _brighter(one: Light | None, other: Light) -> Light:
+    return other if one is None or max(other) >= max(one) else one

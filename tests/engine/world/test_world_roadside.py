@@ -1,0 +1,289 @@
+"""Traffic lights, signs and lamps in pictures: what is lit where, whose it is, and what nobody sees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork, Signal, SignalPlace
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
+from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.meshes import actor_mesh
+from eidrive_scenario.world.meshes.signs import sign
+from eidrive_scenario.world.signs import NO_ENTRY, OTHER, PRIORITY, STOP, WARNING, YIELD, SignFace, sign_face
+from eidrive_scenario.world.weather import Weather
+
+CarFactory = Callable[..., ActorSpec]
+STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+  <road name="" length="200" id="1" junction="-1"><link/>
+    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
+    <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+    <lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
+    <signals><signal id="L" name="" s="30" t="-5" zOffset="2" height="0.9" width="0.4" type="1000001" subtype="-1"
+      dynamic="yes" orientation="+"/><signal id="P" name="" s="30" t="-7" zOffset="2" height="0.6" width="0.4"
+      type="1000002" subtype="-1" dynamic="yes" orientation="+"/><signal id="S" name="" s="30" t="1" zOffset="2"
+      height="0.8" width="0.8" type="206" country="DE" subtype="-1" dynamic="no" orientation="+"/></signals>
+  </road></OpenDRIVE>"""
+
+
+def looking(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
+    """A level camera."""
+    pose = np.eye(4)
+    pose[:3, 0] = (math.sin(yaw), -math.cos(yaw), 0.0)
+    pose[:3, 1] = (0.0, 0.0, -1.0)
+    pose[:3, 2] = (math.cos(yaw), math.sin(yaw), 0.0)
+    pose[:3, 3] = (x, y, z)
+    return pose
+
+
+def picture(world: World, *pose: float) -> Any:
+    return world.camera(looking(*pose), 400, 300, math.radians(40))
+
+
+@pytest.fixture
+def street() -> Any:
+    with World(RoadNetwork.parse(STREET)) as world:
+        yield world
+
+
+# Signals
+
+
+def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) -> list[str]:
+    """Colours of the thirds (or halves) of a light's head that shine, from the top."""
+    while world.time < time - 1e-9:
+        world.step({}, {})
+    world.show({signal: state}, {})
+    label = next(label for label, name in world.signal_labels.items() if name == signal)
+    shot = picture(world, 22.0, -5.0 if signal == "L" else -7.0, 2.45)
+    rows, columns = np.nonzero(shot.segmentation == label)
+    count = 3 if signal == "L" else 2
+    found = []
+    for part in np.array_split(np.arange(rows.min(), rows.max() + 1), count):
+        inside = np.isin(rows, part)
+        colours = shot.rgb[rows[inside], columns[inside]].astype(float)
+        red, green, blue = colours[colours.max(axis=1).argsort()[-12:]].mean(axis=0)
+        bright = max(red, green, blue) > 150
+        found.append("" if not bright else "yellow" if min(red, green) > 110 else "red" if red > green else "green")
+    return found
+
+
+@pytest.mark.parametrize(
+    ("state", "expected"),
+    [
+        ("red", ["red", "", ""]),
+        ("off;on;off", ["", "yellow", ""]),
+        ("GREEN", ["", "", "green"]),
+        ("redYellow", ["red", "yellow", ""]),
+        ("off", ["", "", ""]),
+        ("some state", ["", "", ""]),
+    ],
+)
+def test_the_lamps_of_a_light_shine_by_its_state(street: World, state: str, expected: list[str]) -> None:
+    assert lit_lamps(street, state) == expected
+
+
+def test_a_light_for_pedestrians_has_two_lamps_and_unset_ones_are_dark(street: World) -> None:
+    assert lit_lamps(street, "off;on", "P") == ["", "green"]
+    assert lit_lamps(street, "red", "P") == ["red", ""]
+    street.show({}, {})
+    assert lit_lamps(street, "off") == ["", "", ""]
+
+
+def test_a_flashing_lamp_is_dark_every_other_half_second(street: World) -> None:
+    assert [lit_lamps(street, "flashing", time=time)[1] for time in (0.0, 0.25, 0.6, 1.1)] == [
+        *("yellow", "yellow", "", "yellow")
+    ]
+
+
+def test_the_segmentation_tells_signals_apart(street: World) -> None:
+    assert set(street.signal_labels.values()) == {"L", "P", "S"}
+    assert max(street.signal_labels) == -10
+    shot = picture(street, 15.0, -3.0, 2.4)
+    assert set(np.unique(shot.segmentation)) == {-1, *street.signal_labels}
+
+
+def test_from_behind_a_sign_is_bare_metal(street: World) -> None:
+    label = next(label for label, name in street.signal_labels.items() if name == "S")
+
+    def redness(shot: Any) -> float:
+        colours = shot.rgb[shot.segmentation == label].astype(float)
+        return float((colours[:, 0] - colours[:, 1]).mean())
+
+    assert redness(picture(street, 25.0, 1.0, 2.4)) > 40.0
+    assert abs(redness(picture(street, 35.0, 1.0, 2.4, math.pi))) < 10.0
+
+
+# Faces of signs
+
+
+def signal(
+    kind: str, *, country: str = "DE", subtype: str = "-1", value: float | None = None, name: str = ""
+) -> Signal:
+    place = SignalPlace("1", 0.0, 0.0, "+")
+    return Signal("x", name, kind, subtype, country, value, "", "", False, place, 2.0, 0.0, 0.6, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("given", "face"),
+    [
+        (signal("206"), STOP),
+        (signal("205", country="OpenDRIVE"), YIELD),
+        (signal("306"), PRIORITY),
+        (signal("267"), NO_ENTRY),
+        (signal("101"), WARNING),
+        (signal("R1-1", country="US"), STOP),
+        (signal("b", country="se", subtype="2"), STOP),
+        (signal("unheard of", name="Sign_Stop"), STOP),
+        (signal("99999"), OTHER),
+        (signal("274", value=50.0), SignFace("disc", "white", "red", "50")),
+        (signal("274", name="Sg274-120.flt"), SignFace("disc", "white", "red", "120")),
+        (signal("c", country="se", subtype="31", value=5.0, name="speed_50_1"), SignFace("disc", "white", "red", "50")),
+        (signal("R2-1", country="US", value=35.0), SignFace("board", "white", "black", "35")),
+    ],
+)
+def test_signs_by_country_and_number(given: Signal, face: SignFace) -> None:
+    assert sign_face(given) == face
+
+
+@pytest.mark.parametrize("face", [STOP, YIELD, PRIORITY, NO_ENTRY, WARNING, OTHER])
+def test_a_sign_fits_its_size_and_faces_the_traffic(face: SignFace) -> None:
+    parts = np.concatenate(list(sign(face, 0.6, 0.9).values()))
+    assert parts[..., 1].min() >= -0.301
+    assert parts[..., 1].max() <= 0.301
+    assert parts[..., 2].min() >= -1e-3
+    assert parts[..., 2].max() <= 0.901
+    normals = np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])
+    behind = parts[..., 0].mean(axis=1) < -1e-3
+    assert (normals[~behind, 0] > 0.0).all()
+    assert (normals[behind, 0] < 0.0).all()
+
+
+# Lamps of vehicles
+
+
+def tail(world: World) -> np.ndarray:
+    """Mean colour of the left half, and of the right half, of the car's rear where it is brightest."""
+    shot = picture(world, 0.0, 0.0, 1.0)
+    rows, columns = np.nonzero(shot.segmentation == 0)
+    halves = []
+    middle = (columns.min() + columns.max()) / 2
+    for side in (columns < middle, columns > middle):
+        colours = shot.rgb[rows[side], columns[side]].astype(float)
+        strength = colours[:, 0] - colours[:, 2]
+        halves.append(colours[strength.argsort()[-15:]].mean(axis=0))
+    return np.array(halves)
+
+
+def lights(*states: LightState) -> dict[str, Appearance]:
+    return {"Ego": Appearance(lights={state.light: state for state in states})}
+
+
+@pytest.fixture
+def grey(car: CarFactory) -> ActorSpec:
+    return replace(car("Ego"), colour=(0.4, 0.4, 0.4))
+
+
+def test_brake_lights_brighten_both_sides(world: World, grey: ActorSpec) -> None:
+    world.add(grey, Placement(8.0, 0.0))
+    dark = tail(world)
+    world.show({}, lights(LightState("brakeLights", "on")))
+    assert (tail(world)[:, 0] > dark[:, 0] + 25.0).all()
+    world.show({}, lights(LightState("brakeLights", "off")))
+    assert tail(world) == pytest.approx(dark, abs=3.0)
+
+
+def test_an_indicator_flashes_on_its_side(world: World, grey: ActorSpec) -> None:
+    world.add(grey, Placement(8.0, 0.0))
+    dark = tail(world)[:, 1]
+    world.show({}, lights(LightState("indicatorLeft", "flashing")))
+    left, right = tail(world)[:, 1]
+    assert left > dark[0] + 30.0
+    assert right == pytest.approx(dark[1], abs=3.0)
+    while world.time < 0.6:
+        world.step({}, {})
+    assert tail(world)[0, 1] == pytest.approx(dark[0], abs=3.0)
+
+
+def test_low_beam_lights_the_road_at_night_by_itself_or_by_the_scenario(world: World, grey: ActorSpec) -> None:
+    world.add(grey, Placement(0.0, 0.0))
+    world.set_weather(Weather(sun_elevation=-30.0, street_lighting=1.0))
+
+    def road() -> float:
+        return float(world.radiance(looking(-2.0, 3.0, 3.0), _pinhole()).luminance[200:].mean())
+
+    by_itself = road()
+    world.show({}, lights(LightState("lowBeam", "off")))
+    switched_off = road()
+    world.show({}, lights(LightState("lowBeam", "off"), LightState("highBeam", "on")))
+    assert switched_off < 0.8 * by_itself
+    assert road() > 1.05 * switched_off
+
+
+def _pinhole() -> Pinhole:
+    return Pinhole.of_fov(400, 300, math.radians(60))
+
+
+# Who sees whom
+
+
+def test_an_actor_without_graphics_is_in_no_picture(world: World, grey: ActorSpec) -> None:
+    world.add(grey, Placement(8.0, 0.0))
+    assert (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
+    world.show({}, {"Ego": Appearance(visibility=Visibility(graphics=False))})
+    assert not (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
+    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
+
+
+def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, grey: ActorSpec) -> None:
+    world.add(grey, Placement(8.0, 0.0))
+    world.show({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
+    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
+    assert world.view().unseen == ("Ego",)
+    world.show({}, {})
+    assert world.view().unseen == ()
+    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
+
+
+def test_a_view_without_some_actors(world: World, car: CarFactory) -> None:
+    for number, name in enumerate(("A", "B", "C")):
+        world.add(car(name), Placement(10.0 * number, 0.0))
+    less = world.view().without({"B", "nobody"})
+    assert (less.names, less.position[:, 0].tolist(), less.rows["C"]) == (("A", "C"), [0.0, 20.0], 1)
+    assert world.view().without(()) is world.view()
+
+
+# Postures
+
+
+@pytest.mark.parametrize(
+    ("motion", "tall"),
+    [("", 1.8), ("standing", 1.8), ("lying", 0.3), ("sitting", 1.4), ("crawling", 0.75), ("unknown", 1.8)],
+)
+def test_people_are_as_tall_as_their_posture(motion: str, tall: float) -> None:
+    spec = ActorSpec("Anna", "pedestrian", "pedestrian", (0.6, 0.5, 1.8), (0.0, 0.0, 0.9))
+    points = np.concatenate(list(actor_mesh(spec, motion).values())).reshape(-1, 3)
+    assert points[:, 2].max() - points[:, 2].min() == pytest.approx(tall, abs=0.15)
+    assert points[:, 2].min() == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_posture_shows_in_the_picture(world: World) -> None:
+    spec = ActorSpec("Anna", "pedestrian", "pedestrian", (0.6, 0.5, 1.8), (0.0, 0.0, 0.9))
+    world.add(spec, Placement(8.0, 0.0, yaw=math.pi / 2))
+
+    def extent() -> tuple[int, int]:
+        rows, columns = np.nonzero(picture(world, 0.0, 0.0, 1.0).segmentation == 0)
+        return int(np.ptp(columns)), int(np.ptp(rows))
+
+    wide, tall = extent()
+    assert tall > 2 * wide
+    world.show({}, {"Anna": Appearance(animations={"motion": AnimationState("motion", "lying")})})
+    wide, tall = extent()
+    assert wide > 2 * tall
