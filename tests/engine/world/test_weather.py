@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.library import names
 from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.weather import Weather, load_weather
 from eidrive_scenario.world.weather_of import solar_position, weather_of
@@ -140,8 +142,20 @@ def test_the_sun_by_the_clock() -> None:
     assert weather_of(running, 12 * 3600.0 + 5.0).sun_elevation == pytest.approx(65.45, abs=0.1)
 
 
-def test_weather_sets_the_grip_of_the_world() -> None:
+@pytest.mark.parametrize("grip", [1.0, 0.5, 0.2])
+def test_a_slippery_road_lengthens_the_way_to_a_stop(car: Callable[..., ActorSpec], grip: float) -> None:
+    """From 12 m/s with full brakes (8 m/s²), or with what the tyres give (grip · 9.81 m/s²): v² / 2 a."""
     with World() as world:
+        world.set_weather(Weather(friction=grip))
+        world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)
+        while world.view().speed[0] > 0.05:
+            world.step({}, {"Ego": Control(brake=1.0)})
+        assert world.view().position[0, 0] == pytest.approx(12.0**2 / 2 / min(8.0, grip * 9.81), rel=0.05)
+
+
+def test_weather_is_the_world_s() -> None:
+    with World() as world:
+        assert world.weather == Weather()
         world.set_weather(load_weather("storm"))
         assert world.weather.name == "storm"
-        assert world._friction == pytest.approx(1 - 0.41 * 0.8)
+        assert world.weather.friction_scale == pytest.approx(1 - 0.41 * 0.8)

@@ -1,0 +1,206 @@
+"""The camera against closed forms: where a point lands, noise, exposure, drops, the same picture for the same seed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.camera import Camera, Photographer
+from eidrive_scenario.sensing.exposure import BASE_SPEED, LENS, SATURATION, Exposure, develop, metered, noise_of
+from eidrive_scenario.sensing.optics import Optics, lens_of
+from eidrive_scenario.sensing.precipitation import drops_before
+from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.camera import Pinhole, Radiance
+from eidrive_scenario.world.weather import Weather, load_weather
+
+BARREL = (-0.28, 0.07, 0.001, -0.0005, 0.0)
+CRATE = ActorSpec("Crate", "box", "misc", (0.4, 0.4, 0.4), (0.0, 0.0, 0.2))
+
+
+def level(x: float = 0.0, y: float = 0.0, z: float = 1.4) -> np.ndarray:
+    """A camera that looks along x."""
+    pose = np.eye(4)
+    pose[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    pose[:3, 3] = (x, y, z)
+    return pose
+
+
+@pytest.mark.parametrize("distortion", [(0.0,) * 5, BARREL, (0.12, 0.0, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("place", [(6.0, 0.0), (6.0, 3.5), (7.0, -4.5)])
+def test_a_known_point_lands_where_opencv_projects_it(
+    distortion: tuple[float, ...], place: tuple[float, float]
+) -> None:
+    """The middle of a small crate, of which the camera sees the pixels' mean."""
+    settings = CameraSettings(width=400, height=300, fov=90, distortion=distortion)
+    with World() as world:
+        world.add(CRATE, Placement(*place))
+        reading = Photographer(settings).take(world, level(z=0.2), generator(1, "test"))
+    rows, columns = np.nonzero(reading.segmentation == 0)
+    in_camera = np.array([[-place[1], 0.0, place[0]]])
+    expected = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), reading.intrinsics, np.array(distortion))[0]
+    found = (columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2
+    assert found == pytest.approx(tuple(expected.ravel()), abs=3.0)
+    assert len(rows) > 100
+
+
+def test_each_pixel_of_a_bent_picture_shows_the_direction_that_distorts_to_it() -> None:
+    """A picture whose colours are the directions of its rays comes out of the lens as OpenCV's distortion has it."""
+    settings = CameraSettings(width=160, height=120, fov=100, distortion=BARREL)
+    optics = Optics(settings)
+    hole = optics.pinhole
+    rows, columns = np.indices((hole.height, hole.width), dtype=np.float32) + 0.5
+    rays = np.stack([(columns - hole.centre_x) / hole.focal, (rows - hole.centre_y) / hole.focal], axis=-1)
+    light = np.concatenate([rays, np.ones_like(rays[..., :1])], axis=-1).astype(np.float32)
+    flat = np.zeros((hole.height, hole.width), np.float32)
+    seen = optics.bent(Radiance(light, flat, flat.astype(np.int32))).luminance
+    lens = lens_of(settings)
+    pixels = cv2.projectPoints(
+        seen.reshape(-1, 3).astype(float), np.zeros(3), np.zeros(3), lens.intrinsics, np.array(BARREL)
+    )[0].reshape(120, 160, 2)
+    wanted = np.stack(np.meshgrid(np.arange(160) + 0.5, np.arange(120) + 0.5), axis=-1)
+    np.testing.assert_allclose(pixels, wanted, atol=1 / 32)  # OpenCV interpolates between 32nds of a pixel
+
+
+def test_a_lens_that_folds_the_picture_is_refused() -> None:
+    with pytest.raises(ValidationError, match="folds the picture"):
+        CameraSettings(fov=100, distortion=(-0.6, 0.0))
+    with pytest.raises(ValidationError, match="up to five coefficients"):
+        CameraSettings(distortion=(0.0,) * 6)
+
+
+def test_supersampling_is_the_mean_of_finer_pixels() -> None:
+    with World() as world:
+        world.add(CRATE, Placement(4.0, 0.5))
+        fine = CameraSettings(width=80, height=60, fov=70, supersampling=2)
+        hole = lens_of(fine)
+        seen = Optics(fine).bent(world.radiance(level(), Optics(fine).pinhole))
+        double = world.radiance(level(), hole.finer(2)).luminance
+    np.testing.assert_allclose(seen.luminance, double.reshape(60, 2, 80, 2, 3).mean(axis=(1, 3)), rtol=1e-4)
+    assert seen.depth.shape == (60, 80)
+
+
+def test_exposure_by_iso_12232() -> None:
+    """L_sat = 78 / S · N² / (0.65 t): at f/2, 1/100 s and 0 dB, 78 / 100 · 4 / 0.65 · 100 = 480 cd/m²; 20 dB take ten
+    times less."""
+    grey = np.full((8, 8, 3), 10.0, np.float32)
+    settings = CameraSettings(f_number=2.0, exposure_time=0.01, gain=0.0)
+    assert metered(grey, settings).saturation == pytest.approx(SATURATION / BASE_SPEED * 4.0 / LENS / 0.01)
+    assert metered(grey, settings).saturation == pytest.approx(480.0)
+    louder = metered(grey, settings.model_copy(update={"gain": 20.0}))
+    assert louder.saturation == pytest.approx(48.0)
+
+
+def test_the_meter_turns_up_time_first_then_gain() -> None:
+    settings = CameraSettings()
+    noon, dusk, night = (metered(np.full((8, 8, 3), level, np.float32), settings) for level in (5000.0, 5.0, 0.05))
+    assert noon.time < 0.001
+    assert noon.gain == dusk.gain == 0.0 or dusk.time == settings.longest_exposure
+    assert night.time == settings.longest_exposure
+    assert night.gain > 10.0
+    assert noon.saturation > dusk.saturation > night.saturation
+    pitch_dark = metered(np.full((8, 8, 3), 1e-6, np.float32), CameraSettings(highest_gain=12.0))
+    assert (pitch_dark.time, pitch_dark.gain) == (0.03, 12.0)
+
+
+@pytest.mark.parametrize("gain", [0.0, 20.0])
+@pytest.mark.parametrize("signal", [0.0, 0.1, 0.7])
+def test_noise_is_that_of_emva_1288(signal: float, gain: float) -> None:
+    """A share s of a well of W electrons, shown G times as bright: deviation √(s W / G + r²) / (W / G)."""
+    noise = NoiseSettings(full_well=12_000.0, read_noise=5.0)
+    well = 12_000.0 / 10 ** (gain / 20)
+    exposure = Exposure(0.01, gain, 1000.0)
+    drawn = noise_of(np.full((200, 200, 3), signal, np.float32), exposure, noise, generator(5, "noise"))
+    expected = math.sqrt(signal * well + 25.0) / well
+    count = drawn.size
+    assert drawn.std() == pytest.approx(expected, rel=5 / math.sqrt(2 * count))
+    assert abs(drawn.mean()) < 5 * expected / math.sqrt(count)
+    kurtosis = float(((drawn / drawn.std()) ** 4).mean())
+    assert kurtosis == pytest.approx(3.0, abs=5 * math.sqrt(24 / count))
+
+
+def test_what_overfills_the_wells_is_white_and_no_light_is_black() -> None:
+    exposure = Exposure(0.01, 0.0, 100.0)
+    light = np.array([[[0.0, 100.0, 1e6]]], np.float32)
+    assert develop(light, exposure, None, generator(1)).tolist() == [[[0, 255, 255]]]
+    tones = develop(np.linspace(0, 100, 500, dtype=np.float32)[None, :, None], exposure, None, generator(1)).ravel()
+    assert np.all(np.diff(tones.astype(int)) >= 0)
+
+
+def test_drops_are_as_many_and_as_large_as_marshall_and_palmer_have_them() -> None:
+    """At 5 mm/h: L = 4.1 · 5^-0.21 = 2.92 / mm, 8000 / 2.92 · exp(-2.92 · 0.6) = 475 drops per m³ above 0.6 mm."""
+    rain = Weather(precipitation="rain", precipitation_intensity=5.0)
+    hole = Pinhole.of_fov(100, 75, math.radians(70))
+    runs = [drops_before(rain, hole, generator(seed, "drops")) for seed in range(60)]
+    diameters = np.concatenate([run.diameters for run in runs])
+    slope = 4.1 * 5.0**-0.21
+    assert slope == pytest.approx(2.92, abs=0.01)
+    assert diameters.min() >= 0.6
+    assert diameters.mean() == pytest.approx(0.6 + 1 / slope, rel=5 / math.sqrt(len(diameters)))
+    farthest = hole.focal * (0.6 + 1 / slope) * 1e-3 / 0.22
+    farthest = max(farthest, 0.8)
+    volume = 4 * 0.55 * 100 / hole.focal * 0.65 * 75 / hole.focal * farthest**3 / 3
+    expected = 8000 / slope * math.exp(-slope * 0.6) * volume
+    assert len(diameters) / 60 == pytest.approx(expected, rel=5 / math.sqrt(60 * expected))
+    fall = np.concatenate([run.velocities[:, 2] for run in runs])
+    np.testing.assert_allclose(fall, -(9.65 - 10.3 * np.exp(-0.6 * diameters)))
+
+
+def test_rain_streaks_change_the_picture_and_dry_weather_does_not() -> None:
+    settings = CameraSettings(width=200, height=150, noise=None, lens_drops=False)
+
+    def pictures(weather: Weather) -> list[np.ndarray]:
+        with World() as world:
+            world.set_weather(weather)
+            camera = Photographer(settings)
+            return [camera.take(world, level(), generator(seed, "rain")).rgb.astype(int) for seed in (1, 2)]
+
+    first, second = pictures(Weather())
+    np.testing.assert_array_equal(first, second)
+    first, second = pictures(load_weather("storm"))
+    assert np.any(np.abs(first - second) > 3, axis=2).mean() > 0.005
+
+
+def test_the_same_seed_station_and_tick_give_the_same_picture() -> None:
+    spec = ActorSpec("Ego", "car", "car", (4.5, 1.8, 1.5), (1.3, 0.0, 0.75), wheelbase=2.7)
+
+    def take(seed: int, name: str = "front") -> bytes:
+        with World() as world:
+            world.add(spec, Placement(0.0, 0.0))
+            world.add(CRATE, Placement(9.0, 1.0))
+            world.set_weather(load_weather("storm"))
+            camera = Camera(CameraSettings(width=96, height=64), spec, name, seed)
+            return camera.read(world, world.view(), 0).rgb.tobytes()
+
+    assert take(1) == take(1)
+    assert len({take(1), take(2), take(1, "back")}) == 3
+
+
+def test_noise_does_not_depend_on_other_cameras(boxes: Any) -> None:
+    view = boxes.view({"Ego": (0.0, 0.0, 0.0)})
+    scene = boxes.scene(view)
+    camera = Camera(CameraSettings(width=16, height=12), boxes.spec("Ego"), "front", 4)
+    alone = camera.read(scene, view, 0).rgb
+    Camera(CameraSettings(width=16, height=12), boxes.spec("Ego"), "back", 4).read(scene, view, 0)
+    np.testing.assert_array_equal(camera.read(scene, view, 0).rgb, alone)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"width": 0}, {"height": -3}, {"fov": 180}, {"near": 2, "far": 1}, {"noise": {"read_noise": -1}}, {"gain": 100}],
+)
+def test_wrong_settings(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        CameraSettings(**wrong)
+
+
+def test_noise_can_be_switched_off_in_words() -> None:
+    assert CameraSettings.model_validate({"noise": "none"}).noise is None
+    assert CameraSettings.model_validate({"noise": False}).noise is None

@@ -1,0 +1,92 @@
+"""The weather of a run: by EnvironmentAction, from a catalog, by an option; and wrong sensors before it starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.world.weather import load_weather
+
+INIT = "<Init>\n         <Actions>"
+RAIN = """<GlobalAction><EnvironmentAction><Environment name="Shower">
+  <Weather fractionalCloudCover="sixOktas"><Sun azimuth="0" elevation="0.5" intensity="50000"/>
+  <Fog visualRange="800"/><Precipitation precipitationType="rain" precipitationIntensity="12"/></Weather>
+  <RoadCondition frictionScaleFactor="0.6" wetness="wetWithPuddles"/></Environment></EnvironmentAction></GlobalAction>
+"""
+FROM_CATALOG = """<GlobalAction><EnvironmentAction>
+  <CatalogReference catalogName="environments" entryName="storm"/></EnvironmentAction></GlobalAction>
+"""
+
+
+def edited(tmp_path: Path, *changes: tuple[str, str]) -> Path:
+    """Scenario 1 with places of its text changed, its references still leading to the library."""
+    source = resolve_scenario("coop/scenario_1")
+    text = source.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "edited.xosc"
+    path.write_text(text.replace('"../', f'"{source.parent.parent}/'))
+    return path
+
+
+def test_an_environment_action_sets_light_air_and_grip(tmp_path: Path) -> None:
+    with Simulation(load_scenario(edited(tmp_path, (INIT, INIT + RAIN)))) as run:
+        weather = run.world.weather
+        assert (weather.name, weather.cloud_cover, weather.visual_range) == ("Shower", 0.75, 800.0)
+        assert (weather.precipitation, weather.precipitation_intensity, weather.wetness) == ("rain", 12.0, 0.5)
+        assert run.world._friction == weather.friction_scale == 0.6
+
+
+def test_an_environment_comes_from_a_catalog(tmp_path: Path) -> None:
+    place = '<EnvironmentCatalog><Directory path="../catalogs"/></EnvironmentCatalog>'
+    after = "<MiscObjectCatalog>"
+    path = edited(tmp_path, (INIT, INIT + FROM_CATALOG), (after, place + after))
+    with Simulation(load_scenario(path)) as run:
+        storm, preset = run.world.weather, load_weather("storm")
+        assert storm.precipitation_intensity == preset.precipitation_intensity
+        assert storm.visual_range == preset.visual_range
+        assert storm.sun_elevation == pytest.approx(preset.sun_elevation, abs=0.1)
+        assert storm.friction_scale == pytest.approx(preset.friction_scale, abs=0.01)
+
+
+def test_the_option_wins_over_the_file(tmp_path: Path) -> None:
+    path = edited(tmp_path, (INIT, INIT + RAIN))
+    with Simulation(load_scenario(path), settings=RunSettings(weather="midnight")) as run:
+        run.tick()
+        assert run.world.weather == load_weather("midnight")
+
+
+def test_an_unknown_preset_is_told_before_the_run_with_everything_else(tmp_path: Path) -> None:
+    wrong = tmp_path / "mine.yaml"
+    wrong.write_text("name: mine\nfog: 40\n")
+    scenario = load_scenario(resolve_scenario("coop/scenario_1"))
+    with pytest.raises(InputError, match=r"--weather: no weather preset 'hail'"):
+        Simulation(scenario, settings=RunSettings(weather="hail"))
+    with pytest.raises(InputError, match=r"mine\.yaml:2: unknown setting 'fog'"):
+        Simulation(scenario, settings=RunSettings(weather=wrong))
+
+
+@pytest.mark.parametrize(
+    ("sensors", "complaint"),
+    [
+        ("{front: {kind: camera, width: 0}}", "width"),
+        ("{front: {kind: camera, fov: 100, distortion: [-0.9]}}", "folds the picture"),
+        ("{front: {kind: camera, widht: 800}}", "did you mean 'width'"),
+        ("{truth: {}, roof: {kind: lidar, channels: 16, elevations: [1, 2]}}", "as many elevations"),
+        ("{truth: {}, sky: {kind: gps}}", "gnss"),
+    ],
+)
+def test_wrong_sensors_name_file_and_line(tmp_path: Path, sensors: str, complaint: str) -> None:
+    line = '<Property name="detector" value="oracle"/>'
+    path = edited(tmp_path, (line, f'{line}\n<Property name="sensors" value="{sensors}"/>'))
+    number = path.read_text().split("\n").index(f'<Property name="sensors" value="{sensors}"/>') + 1
+    with pytest.raises(InputError) as caught:
+        Simulation(load_scenario(path))
+    assert f"edited.xosc:{number}: " in str(caught.value)
+    assert complaint in str(caught.value)
