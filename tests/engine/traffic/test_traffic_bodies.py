@@ -1,0 +1,84 @@
+"""Who background traffic is made of."""
+
+from __future__ import annotations
+
+from collections import Counter
+from types import SimpleNamespace
+
+import pytest
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.traffic import Mixture
+from eidrive_scenario.traffic.bodies import library_bodies
+
+NO_CONTROLLER = model.ControllerDistribution(
+    controller_distribution_entry=(
+        model.ControllerDistributionEntry(weight=1.0, controller=model.Controller(name="somebody")),
+    )
+)
+
+
+def definition(categories: dict[VehicleCategory, float], roles: dict[Role, float] | None = None) -> Mixture:
+    entries = tuple(model.VehicleCategoryDistributionEntry(category=c, weight=w) for c, w in categories.items())
+    shares = None
+    if roles is not None:
+        shares = model.VehicleRoleDistribution(
+            vehicle_role_distribution_entry=tuple(
+                model.VehicleRoleDistributionEntry(role=r, weight=w) for r, w in roles.items()
+            )
+        )
+    element = model.TrafficDefinition(
+        name="mix",
+        vehicle_category_distribution=model.VehicleCategoryDistribution(vehicle_category_distribution_entry=entries),
+        vehicle_role_distribution=shares,
+        controller_distribution=NO_CONTROLLER,
+    )
+    return Mixture(SimpleNamespace(), element, None)  # type: ignore[arg-type]
+
+
+def drawn(mixture: Mixture, count: int = 400) -> Counter[str]:
+    return Counter(mixture.draw(generator(5, "bodies", n)).spec.name for n in range(count))
+
+
+def test_without_a_definition_there_are_the_cars_of_the_library() -> None:
+    found = drawn(Mixture(SimpleNamespace(), None, None))  # type: ignore[arg-type]
+    assert set(found) == {spec.name for spec, role in library_bodies(VehicleCategory.CAR) if role is Role.NONE}
+    assert len(found) >= 3
+
+
+def test_categories_have_their_shares() -> None:
+    """Of 400 draws with 3 : 1, 100 vans in the mean, 8.7 the standard deviation."""
+    found = drawn(definition({VehicleCategory.CAR: 3.0, VehicleCategory.VAN: 1.0}))
+    assert 65 <= found["van"] <= 135
+    assert "truck" not in found
+
+
+def test_dimensions_are_those_of_the_catalog() -> None:
+    truck = definition({VehicleCategory.TRUCK: 1.0}).draw(generator(1, "one"))
+    assert truck.spec.size == (8.3, 2.5, 3.55)
+    assert truck.driver.acceleration == 1.0
+    bicycle = definition({VehicleCategory.BICYCLE: 1.0}).draw(generator(1, "one"))
+    assert bicycle.spec.category == "bicycle"
+    assert bicycle.spec.max_speed == 12.0
+
+
+@pytest.mark.parametrize(
+    ("category", "role", "name"),
+    [
+        (VehicleCategory.TRUCK, Role.FIRE, "firetruck"),
+        (VehicleCategory.VAN, Role.AMBULANCE, "ambulance"),
+        (VehicleCategory.TRUCK, Role.CIVIL, "truck"),
+        (VehicleCategory.TRUCK, Role.POLICE, "truck"),
+        (VehicleCategory.TRAM, Role.NONE, "bus"),
+        (VehicleCategory.SEMITRAILER, Role.NONE, "truck"),
+    ],
+)
+def test_roles_choose_among_the_vehicles_of_a_category(category: VehicleCategory, role: Role, name: str) -> None:
+    assert set(drawn(definition({category: 1.0}, {role: 2.0}), 20)) == {name}
+
+
+def test_a_mixture_knows_the_categories_that_it_draws() -> None:
+    mixture = definition({VehicleCategory.CAR: 1.0, VehicleCategory.BUS: 0.0, VehicleCategory.VAN: 2.0})
+    assert mixture.categories == {"car", "van"}
