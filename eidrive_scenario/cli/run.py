@@ -37,6 +37,9 @@ def run(
     param: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Value of a parameter of the scenario; repeatable.")
     ] = None,
+    user_value: Annotated[
+        list[str] | None, typer.Option(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with seeds from --seed on.")] = 1,
     max_runs: Annotated[
@@ -67,13 +70,14 @@ def run(
     if json and log == PRINTED:
         raise SettingError(Problem("--log - and --json would both print", "give the log a file"))
 
-    parameters = _parameters(param or [])
+    parameters = _assigned("--param", param or [])
     settings = RunSettings(
         channel=channel,
         detector=detector,
         cooperate=_senders(cooperate),
         weather=weather,
         parameters=parameters,
+        user_values=_assigned("--user-value", user_value or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
     )
@@ -122,14 +126,14 @@ def _senders(text: str | None) -> tuple[str, ...] | None:
     return () if text == "none" else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def _parameters(assignments: list[str]) -> dict[str, str]:
-    parameters: dict[str, str] = {}
+def _assigned(option: str, assignments: list[str]) -> dict[str, str]:
+    values: dict[str, str] = {}
     for assignment in assignments:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
-            raise SettingError(Problem(f"--param {assignment!r} assigns nothing", "write --param NAME=VALUE"))
-        parameters[name] = value
-    return parameters
+            raise SettingError(Problem(f"{option} {assignment!r} assigns nothing", f"write {option} NAME=VALUE"))
+        values[name] = value
+    return values
 
 
 def _positive(option: str, value: float) -> float:

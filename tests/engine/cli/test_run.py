@@ -87,6 +87,7 @@ def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
         (["no/such"], "no scenario 'no/such'"),
         (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
+        (["{file}", "--user-value", "mood"], "--user-value 'mood' assigns nothing; write --user-value NAME=VALUE"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
         (["{file}", "--dt", "0"], "--dt is 0"),
     ],
