@@ -71,4 +71,4 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
             if begun[ray] < 1.0:
                 going_on.append(ray)
         open_rays = np.array(going_on, dtype=np.int64)
-    return SightLines(states, heights, tuple(map(tuple, found)))
+    return SightLines(states, heights, {ray: tuple(names) for ray, names in enumerate(found) if names})

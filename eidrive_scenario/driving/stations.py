@@ -140,14 +140,16 @@ class Stations:
         }
 
     def send(self, steps: Mapping[str, AgentStep], now: float) -> None:
-        """What the agents said goes on the air, each message on the link to each station that listens."""
+        """What the agents said goes on the air, each message on the link to each station that listens.
+
+        A message that nobody listens to takes its time on the air all the same.
+        """
         if self._channel is None:
             return
         outbox = []
         for sender, step in steps.items():
             receivers = self._listeners(sender)
-            if receivers:
-                outbox += [(message, receivers) for message in step.outbox]
+            outbox += [(message, receivers) for message in step.outbox]
         self.links = tuple(self._channel.transmit(outbox, now))
 
     def metrics(self, now: float) -> dict[str, float]:

@@ -50,9 +50,13 @@ class LinkStatistics:
         return written
 
 
-@dataclass
+@dataclass(slots=True)
 class Book:
-    """What is written down as a link is used."""
+    """What is written down as a link is used.
+
+    floors  ages of the newest information just after each update [s];  peaks  just before, from the second update on.
+            Age rises at slope 1 in between, so these say all of it
+    """
 
     sent: int = 0
     received: int = 0
@@ -65,12 +69,8 @@ class Book:
     """By class of distance: how many fates are known, and how many of them are deliveries."""
     newest: float | None = None
     """When the newest information at the receiver was said [s]."""
-    since: float = 0.0
-    until: float = 0.0
-    age_area: float = 0.0
     peaks: array[float] = field(default_factory=lambda: array("d"))
     floors: array[float] = field(default_factory=lambda: array("d"))
-    """Ages just after each update, the first included [s]; `peaks` are those just before, from the second on."""
 
     def lose(self, reason: str, count: int = 1) -> None:
         """Messages were lost."""
@@ -86,21 +86,22 @@ class Book:
     def arrive(self, said: float, sent: float, arrived: float) -> None:
         """A message was heard."""
         self.received += 1
-        self.delay_sum += arrived - sent
-        self.delay_max = max(self.delay_max, arrived - sent)
-        if self.newest is None:
-            self.newest, self.since, self.until = said, arrived, arrived
+        delay = arrived - sent
+        self.delay_sum += delay
+        if delay > self.delay_max:
+            self.delay_max = delay
+        newest = self.newest
+        if newest is None:
             self.floors.append(arrived - said)
-        elif said > self.newest:
-            self._age_until(arrived)
-            self.peaks.append(arrived - self.newest)
+            self.newest = said
+        elif said > newest:
+            self.peaks.append(arrived - newest)
             self.floors.append(arrived - said)
             self.newest = said
 
     def statistics(self, now: float, busy_ratio: float | None = None) -> LinkStatistics:
         """The books as they stand."""
-        self._age_until(now)
-        span = self.until - self.since
+        mean_age, p95_age = self._ages(now)
         return LinkStatistics(
             sent=self.sent,
             received=self.received,
@@ -110,29 +111,29 @@ class Book:
             mean_delay=self.delay_sum / self.received if self.received else None,
             max_delay=self.delay_max if self.received else None,
             age=None if self.newest is None else now - self.newest,
-            mean_age=self.age_area / span if span > 0.0 else None,
+            mean_age=mean_age,
             peak_age=sum(self.peaks) / len(self.peaks) if self.peaks else None,
-            p95_age=self._age_quantile(0.95) if span > 0.0 else None,
+            p95_age=p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple((DISTANCE_BIN * place, known, kept) for place, (known, kept) in sorted(self.fates.items())),
             busy_ratio=busy_ratio,
         )
 
-    def _age_until(self, time: float) -> None:
-        if self.newest is not None and time > self.until:
-            middle = (time + self.until) / 2.0
-            self.age_area += (time - self.until) * (middle - self.newest)
-            self.until = time
+    def _ages(self, now: float) -> tuple[float | None, float | None]:
+        """Mean and 95th percentile over the time since the first arrival [s], exactly; None before that.
 
-    def _age_quantile(self, share: float) -> float:
-        """The age that is not exceeded in this share of the time [s], exactly.
-
-        Age rises at slope 1 from a floor to the next peak, so the time spent below x is piecewise linear in x.
+        The time spent below an age x is piecewise linear in x, and bends at floors and peaks.
         """
-        assert self.newest is not None
-        floors, peaks = np.array(self.floors), np.array([*self.peaks, self.until - self.newest])
+        if self.newest is None:
+            return None, None
+        floors = np.array(self.floors)
+        peaks = np.maximum(np.array([*self.peaks, now - self.newest]), floors)
+        span = float(np.sum(peaks - floors))
+        if span <= 0.0:
+            return None, None
         levels = np.concatenate([floors, peaks])
         order = np.argsort(levels, kind="stable")
-        rising = np.cumsum(np.repeat([1.0, -1.0], len(floors))[order])
-        spent = np.concatenate([[0.0], np.cumsum(rising[:-1] * np.diff(levels[order]))])
-        return float(np.interp(share * spent[-1], spent, levels[order]))
+        at_once = np.cumsum(np.repeat([1.0, -1.0], len(floors))[order])
+        spent = np.concatenate([[0.0], np.cumsum(at_once[:-1] * np.diff(levels[order]))])
+        mean = float(np.sum(peaks**2 - floors**2)) / (2.0 * span)
+        return mean, float(np.interp(0.95 * spent[-1], spent, levels[order]))

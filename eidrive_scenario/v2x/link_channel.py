@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
-from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.channel import Channel, Outgoing
 from eidrive_scenario.v2x.links import Links, LinkStatistics
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 from eidrive_scenario.v2x.surroundings import NOWHERE, Surroundings
@@ -18,6 +18,8 @@ class LinkChannel(Channel):
         self._links = Links()
         self.surroundings = NOWHERE
         """Where the antennas are."""
+
+        self._remaining: list[LinkEvent] = []
 
     @abstractmethod
     def fate(self, message: Message, receiver: str, now: float) -> float | str:
@@ -36,6 +38,9 @@ class LinkChannel(Channel):
             else:
                 events.append(self._links.put(message, receiver, now, fate, distance))
         return tuple(events)
+
+    def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
+        return [*self.untold(), *super().transmit(outbox, now)]
 
     def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
         return self._links.deliver(receiver, now)
@@ -56,6 +61,12 @@ class LinkChannel(Channel):
             raise TypeError(f"{type(self).__name__} cannot carry on for a {type(previous).__name__}")
         previous.settle()
         self._links = previous._links
+        self._remaining = list(previous.untold())
 
     def settle(self) -> None:
         """Decide at once whatever is undecided: another channel takes over."""
+
+    def untold(self) -> Sequence[LinkEvent]:
+        """Fates that are known, and that nobody was told yet; each is told once."""
+        untold, self._remaining = self._remaining, []
+        return untold

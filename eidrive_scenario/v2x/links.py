@@ -12,7 +12,8 @@ TIME_TOLERANCE = 1e-9
 
 __all__ = ["TIME_TOLERANCE", "LinkStatistics", "Links"]
 
-Entry = tuple[float, str, int, float, Message]
+Entry = tuple[float, str, int, float, Received]
+"""Arrival, sender, number, sending, and what the receiver gets; several receivers may share one."""
 
 
 class Links:
@@ -23,13 +24,17 @@ class Links:
 
     def __init__(self) -> None:
         self._queues: dict[str, list[Entry]] = {}
-        self._books: dict[tuple[str, str], Book] = {}
+        self._books: dict[str, dict[str, Book]] = {}
+        """By receiver and sender."""
 
     def book(self, sender: str, receiver: str) -> Book:
         """The book of a link, opened if there is none."""
-        book = self._books.get((sender, receiver))
+        books = self._books.get(receiver)
+        if books is None:
+            books = self._books[receiver] = {}
+        book = books.get(sender)
         if book is None:
-            book = self._books[sender, receiver] = Book()
+            book = books[sender] = Book()
         return book
 
     def put(
@@ -39,7 +44,7 @@ class Links:
         if not delay >= 0.0:
             raise ValueError(f"a delay of {delay} s would let {receiver!r} hear a message before it was said")
         arrives = now + delay
-        self.carry((arrives, message.sender, message.number, now, message), receiver)
+        self.carry((arrives, message.sender, message.number, now, Received(message, arrives)), receiver)
         book = self._enter(message, receiver)
         if distance is not None:
             book.fate(distance, True)
@@ -56,7 +61,7 @@ class Links:
         return LinkEvent(message.sender, receiver, message.number, now, "lost", None, reason, message.size)
 
     def carry(self, entry: Entry, receiver: str) -> None:
-        """Put (arrival, sender, number, sending, message) on its way without writing it down."""
+        """Put a message on its way whose sending is in the books."""
         queue = self._queues.get(receiver)
         if queue is None:
             queue = self._queues[receiver] = []
@@ -82,11 +87,11 @@ class Links:
         else:
             queue[:] = [entry for entry in queue if entry[0] > latest or entry[3] > oldest]
         due.sort()
-        arrived = []
-        for arrives, sender, _, sent, message in due:
-            self.book(sender, receiver).arrive(message.generated, sent, arrives)
-            arrived.append(Received(message, arrives))
-        return tuple(arrived)
+        books = self._books.setdefault(receiver, {})
+        for arrives, sender, _, sent, received in due:
+            book = books.get(sender) or self.book(sender, receiver)
+            book.arrive(received.message.generated, sent, arrives)
+        return tuple([entry[4] for entry in due])
 
     def in_flight(self) -> int:
         """How many messages are on their way, over all links."""
@@ -99,4 +104,6 @@ class Links:
 
         `busy_ratio` says how busy a station found the channel.
         """
-        return {link: self._books[link].statistics(now, busy_ratio(link[1])) for link in sorted(self._books)}
+        links = sorted((sender, receiver) for receiver, books in self._books.items() for sender in books)
+        busy = {receiver: busy_ratio(receiver) for receiver in self._books}
+        return {link: self._books[link[1]][link[0]].statistics(now, busy[link[1]]) for link in links}

@@ -28,12 +28,12 @@ class SightLines(NamedTuple):
 
     states    (M,) LOS, NLOSV or NLOS
     heights   (M,) top of the highest vehicle in between, in the world frame [m]; minus infinity where there is none
-    blockers  M tuples with the names of those in between, from the first antenna on
+    blockers  by place of the ray: names of the bodies in between, from the first antenna on; open rays are not there
     """
 
     states: Integers
     heights: Array
-    blockers: tuple[tuple[str, ...], ...]
+    blockers: Mapping[int, tuple[str, ...]]
 
 
 Sight = Callable[[Sequence[tuple[str, str]]], SightLines]

@@ -1,0 +1,105 @@
+"""How fast the radio is: 200 stations at 10 Hz on one channel, sending, contending, receiving and being heard.
+
+Cars stand every 20 m on each of two lanes of a 2 km road and drive at 25 m/s; every tenth line of sight is blocked by a
+truck. All stations listen to all others, so each simulated second decides 398,000 fates. Times are those of the
+processor, summed over threads.
+
+    python benchmarks/bench_radio.py [--stations 200] [--seconds 3] [--technology 80211p]
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import pstats
+import time
+from functools import cache
+
+import numpy as np
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.message import Message, StationState
+from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.radio.profile import RadioProfile
+from eidrive_scenario.v2x.surroundings import LOS, NLOSV, SightLines, Surroundings
+
+TICK = 0.05
+RATE = 10.0
+SIZE = 300
+SPEED = 25.0
+LENGTH = 2000.0
+NOTHING = Detections(0.0)
+
+
+def place(row: int, stations: int, now: float) -> tuple[float, float, float]:
+    """Antenna of a car that goes round and round the road."""
+    half = stations // 2
+    along = (row % half) * LENGTH / half + (SPEED * now if row < half else -SPEED * now)
+    return along, 0.0 if row < half else 4.0, 1.6
+
+
+@cache
+def trucks(stations: int) -> SightLines:
+    """Every tenth pair has a truck in between; no rays are cast here."""
+    first, second = np.triu_indices(stations, 1)
+    blocked = (first + second) % 10 == 0
+    behind: dict[int, tuple[str, ...]] = {int(pair): ("Truck",) for pair in np.flatnonzero(blocked)}
+    return SightLines(np.where(blocked, NLOSV, LOS), np.where(blocked, 3.0, -np.inf), behind)
+
+
+def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[float, RadioChannel]:
+    """Seconds of one core for `seconds` of traffic; with `look` every fate is made into an event, as a run does."""
+    path_loss = {"kind": "tr37885", "environment": "highway"}
+    profile = {"technology": technology, "path_loss": path_loss, "jitter": TICK, "queue": {"discipline": "lcfs"}}
+    channel = RadioChannel(RadioProfile.model_validate(profile), seed=1)
+    names = [f"{row:03d}" for row in range(stations)]
+    others = {name: [other for other in names if other != name] for name in names}
+    period = round(1.0 / RATE / TICK)
+    started = time.process_time()
+    for tick in range(round(seconds / TICK)):
+        now = tick * TICK
+        places = {name: place(row, stations, now) for row, name in enumerate(names)}
+        channel.around(Surroundings(places, lambda pairs: trucks(stations)))
+        for name in names:
+            channel.deliver(name, now)
+        outbox = [
+            (
+                Message(name, tick // period, now, StationState(now, *places[name], 0.0, SPEED), NOTHING, SIZE),
+                others[name],
+            )
+            for row, name in enumerate(names)
+            if (tick + row) % period == 0
+        ]
+        events = channel.transmit(outbox, now)
+        if look:
+            list(events)
+    return time.process_time() - started, channel
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stations", type=int, default=200)
+    parser.add_argument("--seconds", type=float, default=3.0)
+    parser.add_argument("--technology", choices=["80211p", "cv2x_mode4"], default=None)
+    parser.add_argument("--profile", action="store_true", help="say where the time goes")
+    given = parser.parse_args()
+    print(f"{given.stations} stations at {RATE:g} Hz, {SIZE} bytes, {given.seconds:g} s, one core")
+    for technology in (given.technology,) if given.technology else ("80211p", "cv2x_mode4"):
+        for look in (False, True):
+            wall, channel = run(given.stations, given.seconds, technology, look)
+            books = channel.statistics(given.seconds).values()
+            sent, received = sum(book.sent for book in books), sum(book.received for book in books)
+            what = "with an event for each fate" if look else "messages and books only"
+            aim = "" if look else "   (aim: above 1)"
+            print(f"  {technology:11} {what:28} {given.seconds / wall:6.2f} times real time{aim}")
+        busy = np.mean([channel.busy_ratio(f"{row:03d}") or 0.0 for row in range(given.stations)])
+        print(f"  {technology:11} {sent} fates, {100 * received / sent:.1f} % heard, busy ratio {busy:.3f}")
+        if given.profile:
+            profile = cProfile.Profile()
+            profile.runcall(run, given.stations, given.seconds, technology, False)
+            pstats.Stats(profile).sort_stats("tottime").print_stats(22)
+
+
+if __name__ == "__main__":
+    main()

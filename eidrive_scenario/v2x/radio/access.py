@@ -1,0 +1,234 @@
+"""Access to the medium: who is on the air when. The base keeps queues and gates; a technology says when to start."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.message import Message
+from eidrive_scenario.v2x.radio.congestion import Gate
+
+Array = NDArray[np.float64]
+
+EARLY = 1e-9
+"""Instants nearer than this are one [s]."""
+
+
+class QueueSettings(Settings):
+    """What waits for the medium at a sender.
+
+    discipline  `fifo`: first come, first served, and what does not fit is lost; `lcfs`: the newest message takes the
+                place of one that waits, as old news are worth nothing
+    length      how many messages can wait; of `lcfs` always one
+    """
+
+    discipline: Literal["fifo", "lcfs"] = "fifo"
+    length: Annotated[int, Field(ge=1)] = 16
+
+
+@dataclass(eq=False)
+class Transmission:
+    """A message on its way through a sender: said at `sent`, ready at `ready`, on the air from `start` to `end` [s]."""
+
+    message: Message
+    receivers: Sequence[str]
+    sent: float
+    ready: float
+    duration: float
+    start: float = math.nan
+    end: float = math.nan
+    first_band: int = 0
+    bands: int = 1
+    """Which subchannels it takes."""
+
+
+class Access(ABC):
+    """A discrete-event model of the medium for the stations in `names`, one row each.
+
+    sensing_dbm  a station senses a message of at least this power
+    """
+
+    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: Gate, sensing_dbm: float) -> None:
+        self.names = names
+        self.gate = gate
+        self.queue = queue
+        self.sensing_dbm = sensing_dbm
+        count = len(names)
+        self._rows = {name: row for row, name in enumerate(names)}
+        self._waiting: list[deque[Transmission]] = [deque() for _ in names]
+        self._arrivals: deque[Transmission] = deque()
+        self._head: list[Transmission | None] = [None] * count
+        self.ready = np.full(count, math.inf)
+        """When the first message of each station may contend [s]; infinity where there is none."""
+        self._last_start = np.full(count, -math.inf)
+        self._last_duration = np.zeros(count)
+        self.free_from = np.full(count, -math.inf)
+        """From when on each station finds the medium free, as far as is known [s]."""
+        self._busy_time = np.zeros(count)
+        self._period_busy = np.zeros(count)
+        self._period_end: float | None = None
+        self.on_air: list[Transmission] = []
+        """What may overlap with something whose end is not reached."""
+
+    def offer(self, transmissions: Sequence[Transmission]) -> None:
+        """Messages that stations have said; they enter their queues when they are ready."""
+        self._arrivals = deque(sorted([*self._arrivals, *transmissions], key=_entry))
+
+    @property
+    def waiting(self) -> list[Transmission]:
+        """What has not started."""
+        return [*self._arrivals, *(entry for queue in self._waiting for entry in queue)]
+
+    def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
+        """Play the medium up to `until` [s]: what has started, and what was thrown out of queues.
+
+        power  (N, N) at which each station (column) receives each other (row) [dBm]
+        """
+        started: list[Transmission] = []
+        dropped: list[Transmission] = []
+        if not self.names:
+            return started, dropped
+        sensed = power >= self.sensing_dbm
+        np.fill_diagonal(sensed, True)
+        while True:
+            starts = self.starts()
+            row = int(np.argmin(starts))
+            start = float(starts[row])
+            if self._arrivals and self._arrivals[0].ready <= min(start, until - EARLY):
+                dropped += self._arrive(self._arrivals.popleft())
+                continue
+            if not start < until - EARLY:
+                break
+            self._measure(start)
+            transmission = self._head[row]
+            assert transmission is not None
+            self._begin(row, transmission, start, sensed[row], starts)
+            started.append(transmission)
+        if math.isfinite(until):
+            self._measure(until)
+        return started, dropped
+
+    @abstractmethod
+    def starts(self) -> Array:
+        """(N,) when the first message of each station would go on the air [s]; infinity where none waits."""
+
+    @abstractmethod
+    def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
+        """A station has gone on the air, and those in `sensed` notice; `starts` are what `starts()` said before."""
+
+    @abstractmethod
+    def headed(self, row: int, transmission: Transmission | None) -> None:
+        """A message has become the first in the queue of its station; None: the queue is empty now."""
+
+    def share(self, transmission: Transmission) -> float:
+        """Which share of the channel a message takes while it is on the air."""
+        return 1.0
+
+    def rest(self, until: float) -> None:
+        """Nobody has anything to say up to `until` [s]."""
+        if math.isfinite(until):
+            self._measure(until)
+
+    def busy_for(self, row: int) -> float:
+        """How long a station has found the medium busy so far [s]."""
+        return float(self._busy_time[row] + self._period_busy[row])
+
+    def rearrange(self, names: tuple[str, ...]) -> list[Transmission]:
+        """Other stations from now on; the answer is what those had still to say who have left."""
+        rows = [self._rows.get(name) for name in names]
+        gone = [name for name in self.names if name not in names]
+        lost = [entry for name in gone for entry in self._waiting[self._rows[name]]]
+        lost += [entry for entry in self._arrivals if entry.message.sender in gone]
+        self._arrivals = deque(entry for entry in self._arrivals if entry.message.sender not in gone)
+        self._waiting = [deque() if old is None else self._waiting[old] for old in rows]
+        self._head = [None if old is None else self._head[old] for old in rows]
+        for field, fresh in (
+            ("ready", math.inf),
+            ("_last_start", -math.inf),
+            ("_last_duration", 0.0),
+            ("free_from", -math.inf),
+            ("_busy_time", 0.0),
+            ("_period_busy", 0.0),
+        ):
+            setattr(self, field, moved(getattr(self, field), rows, fresh))
+        self.gate = self.gate.rearranged(rows)
+        self.names, self._rows = names, {name: row for row, name in enumerate(names)}
+        self.reorder(rows)
+        return lost
+
+    @abstractmethod
+    def reorder(self, rows: Sequence[int | None]) -> None:
+        """Stations have other rows now: the former row of each is in `rows`, None for those who are new."""
+
+    def forget(self, before: float) -> None:
+        """Drop what ended before this instant [s], as nothing that goes on overlaps with it."""
+        self.on_air = [entry for entry in self.on_air if entry.end > before]
+
+    def _arrive(self, transmission: Transmission) -> list[Transmission]:
+        row = self._rows[transmission.message.sender]
+        queue = self._waiting[row]
+        dropped = []
+        if self.queue.discipline == "lcfs" and queue:
+            dropped = list(queue)
+            queue.clear()
+            self._head[row] = None
+        elif len(queue) >= self.queue.length:
+            return [transmission]
+        queue.append(transmission)
+        if len(queue) == 1:
+            self._next(row)
+        return dropped
+
+    def _next(self, row: int) -> None:
+        """The first message in the queue of a station becomes the one that contends, as soon as the gate is open."""
+        queue = self._waiting[row]
+        if not queue:
+            self._head[row], self.ready[row] = None, math.inf
+            self.headed(row, None)
+            return
+        first = queue[0]
+        opens = self._last_start[row] + self.gate.interval(row, float(self._last_duration[row]))
+        self._head[row], self.ready[row] = first, max(first.ready, opens)
+        self.headed(row, first)
+
+    def _begin(
+        self, row: int, transmission: Transmission, start: float, sensed: NDArray[np.bool_], starts: Array
+    ) -> None:
+        transmission.start, transmission.end = start, start + transmission.duration
+        self._waiting[row].popleft()
+        self._last_start[row], self._last_duration[row] = start, transmission.duration
+        self.on_air.append(transmission)
+        busy = np.where(sensed, np.maximum(0.0, transmission.end - np.maximum(start, self.free_from)), 0.0)
+        self._period_busy += busy * self.share(transmission)
+        self.began(row, transmission, sensed, starts)
+        self.free_from[sensed] = np.maximum(self.free_from[sensed], transmission.end)
+        self._next(row)
+
+    def _measure(self, now: float) -> None:
+        """Tell congestion control how busy each of its periods was."""
+        period = self.gate.control.period
+        if self._period_end is None:
+            self._period_end = math.floor(now / period + 1e-6) * period + period
+        while now >= self._period_end - EARLY:
+            self._busy_time += self._period_busy
+            self.gate.measured(np.minimum(1.0, self._period_busy / period))
+            self._period_busy = np.zeros(len(self.names))
+            self._period_end += period
+
+
+def moved(values: Array, rows: Sequence[int | None], fresh: float) -> Array:
+    """An array by station for other stations: the value of the former row, or `fresh`."""
+    return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
+
+
+def _entry(transmission: Transmission) -> tuple[float, str, int]:
+    return transmission.ready, transmission.message.sender, transmission.message.number

@@ -1,0 +1,170 @@
+"""The link budget between all stations at one instant: distance, line of sight, path loss with correlated shadowing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from eidrive_scenario.v2x.counter_draws import Integers, Keys, joined, key, uniforms
+from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss
+from eidrive_scenario.v2x.radio.propagation import probability_of_los
+from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Surroundings
+
+Array = NDArray[np.float64]
+Number = TypeVar("Number", np.float64, np.int64)
+
+OUT_OF_REACH = 170.0
+"""Where even an open path loses so much, nobody looks what stands on it [dB]."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Between N stations, in the order of `names`; all matrices are symmetric.
+
+    distance  (N, N) [m];  loss  (N, N) path loss with shadowing and blockage [dB];  mean_loss  without shadowing [dB]
+    states    (N, N) LOS, NLOSV or NLOS;  blockers  pairs of rows, the lower first, to names of bodies in between
+    """
+
+    names: tuple[str, ...]
+    rows: Mapping[str, int]
+    distance: Array
+    loss: Array
+    mean_loss: Array
+    states: Integers
+    blockers: Mapping[tuple[int, int], tuple[str, ...]]
+
+
+class LinkBudget:
+    """Follows the shadowing of each pair of stations as they move, the same in both directions.
+
+    Shadowing is correlated over the way that both antennas have covered, e^(-way / d) (M. Gudmundson, Electronics
+    Letters 27(23), 1991), and so is the loss by vehicles in between. Draws are keyed by pair and count of updates.
+
+    line_of_sight  `rays` through the world, `random` after TR 37.885's probabilities, or `clear`
+    """
+
+    def __init__(
+        self,
+        path_loss: PathLoss,
+        *,
+        seed: int,
+        frequency_ghz: float,
+        line_of_sight: str = "rays",
+        environment: str = "urban",
+        shadowing_db: float | None = None,
+        decorrelation: float | None = None,
+    ) -> None:
+        self._path_loss = path_loss
+        self._seed = seed
+        self._frequency = frequency_ghz
+        self._line_of_sight = line_of_sight
+        self._environment = environment
+        self._spread = shadowing_db
+        self._decorrelation = decorrelation
+        self._names: tuple[str, ...] = ()
+        self._rows: dict[str, int] = {}
+        self._first = self._second = np.zeros(0, dtype=np.int64)
+        self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self._take_in(())
+
+    def at(self, surroundings: Surroundings) -> Budget:
+        """The budget with the antennas where they are now."""
+        names, positions = surroundings.names, surroundings.positions
+        if names != self._names:
+            self._take_in(names)
+        count, first, second = len(names), self._first, self._second
+        distance = np.linalg.norm(positions[first] - positions[second], axis=1)
+        between, blockers = self._between(surroundings, positions, distance)
+        shadow = self._walk(positions, between.states)
+        mean_loss = self._path_loss.loss(between, self._frequency, ndtr(shadow[1]))
+        spread = self._path_loss.shadowing(between.states) if self._spread is None else self._spread
+        loss = mean_loss + spread * shadow[0]
+
+        def square(values: NDArray[Number]) -> NDArray[Number]:
+            matrix = np.zeros((count, count), dtype=values.dtype)
+            matrix[first, second] = matrix[second, first] = values
+            return matrix
+
+        return Budget(
+            names,
+            self._rows,
+            square(distance),
+            square(loss),
+            square(mean_loss),
+            square(between.states),
+            blockers,
+        )
+
+    def _take_in(self, names: tuple[str, ...]) -> None:
+        """Other stations from now on; pairs that were there keep their shadowing."""
+        count, former = len(names), len(self._names)
+        first, second = np.triu_indices(count, 1)
+        normals, updates = np.zeros((2, len(first))), np.full(len(first), -1)
+        places = np.full((count, 3), np.nan)
+        old = np.array([self._rows.get(name, -1) for name in names], dtype=np.int64)
+        pair_at = np.full((former + 1, former + 1), -1)
+        pair_at[self._first, self._second] = pair_at[self._second, self._first] = np.arange(len(self._first))
+        was = pair_at[old[first], old[second]] if count else updates
+        known = was >= 0
+        normals[:, known], updates[known] = self._normals[:, was[known]], self._updates[was[known]]
+        places[old >= 0] = self._places[old[old >= 0]]
+        self._names, self._rows = names, {name: row for row, name in enumerate(names)}
+        self._first, self._second = first, second
+        self._normals, self._updates, self._places = normals, updates, places
+        self._pairs = [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True)]
+
+        def keys(purpose: str) -> Keys:
+            own = np.array([key(self._seed, purpose, name) for name in names], dtype=np.uint64)
+            return joined(own[first], own[second])
+
+        self._keys = (keys("shadowing"), keys("blockage"))
+        self._sight_keys = keys("sight")
+
+    def _between(
+        self, surroundings: Surroundings, positions: Array, distance: Array
+    ) -> tuple[Between, dict[tuple[int, int], tuple[str, ...]]]:
+        count = len(distance)
+        heights = positions[:, 2]
+        lower = np.minimum(heights[self._first], heights[self._second])
+        upper = np.maximum(heights[self._first], heights[self._second])
+        states, tops = np.full(count, LOS), np.full(count, -np.inf)
+        vehicles = np.zeros(count, dtype=np.int64)
+        between = Between(distance, states, lower, upper, tops, vehicles)
+        blockers: dict[tuple[int, int], tuple[str, ...]] = {}
+        if self._line_of_sight == "random":
+            hidden = uniforms(self._sight_keys, 0) > probability_of_los(distance, self._environment)
+            states[hidden], tops[hidden], vehicles[hidden] = NLOSV, upper[hidden] + 0.1, 1
+        elif self._line_of_sight == "rays" and surroundings.sight is not None and count:
+            open_loss = self._path_loss.loss(between, self._frequency, np.full(count, 0.5))
+            near = np.flatnonzero(open_loss < OUT_OF_REACH)
+            asked = self._pairs if len(near) == count else [self._pairs[pair] for pair in near.tolist()]
+            seen = surroundings.sight(asked)
+            states[near], tops[near] = seen.states, seen.heights
+            for ray, names in seen.blockers.items():
+                pair = int(near[ray])
+                vehicles[pair] = len(names)
+                blockers[int(self._first[pair]), int(self._second[pair])] = names
+        return between, blockers
+
+    def _walk(self, positions: Array, states: Integers) -> Array:
+        """(2, M) standard normal numbers behind shadowing and blockage, moved on by what the stations have moved."""
+        moved = np.linalg.norm(positions - self._places, axis=1)
+        way = np.nan_to_num(moved[self._first] + moved[self._second], nan=math.inf)
+        reach = self._path_loss.decorrelation(states) if self._decorrelation is None else self._decorrelation
+        moving = way > 0.0
+        self._updates[moving] += 1
+        kept = np.exp(-way / reach)
+        fresh = np.sqrt(1.0 - kept**2)
+        for which, keys in enumerate(self._keys):
+            innovation = ndtri(uniforms(keys, self._updates))
+            self._normals[which] = np.where(
+                moving, kept * self._normals[which] + fresh * innovation, self._normals[which]
+            )
+        self._places = positions.copy()
+        return self._normals

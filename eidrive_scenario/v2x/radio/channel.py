@@ -1,0 +1,263 @@
+"""The radio channel: messages queue, contend for the medium, and reach whom the link budget lets them reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.channel import Outgoing
+from eidrive_scenario.v2x.composed import delay_of
+from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniforms
+from eidrive_scenario.v2x.delay import ConstantDelay
+from eidrive_scenario.v2x.draws import LinkDraws
+from eidrive_scenario.v2x.link_channel import LinkChannel
+from eidrive_scenario.v2x.links import LinkStatistics
+from eidrive_scenario.v2x.loss import NoLoss
+from eidrive_scenario.v2x.loss_draws import LossDraws
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.v2x.radio.access import Access, Transmission
+from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
+from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.csma import Csma
+from eidrive_scenario.v2x.radio.events import Batch, LinkEvents
+from eidrive_scenario.v2x.radio.ledger import Ledger
+from eidrive_scenario.v2x.radio.path_loss import Tr37885
+from eidrive_scenario.v2x.radio.profile import RadioProfile
+from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
+from eidrive_scenario.v2x.radio.sidelink import Sidelink
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+Array = NDArray[np.float64]
+
+QUEUE, ABSENT = "queue", "absent"
+"""Reasons of loss beside those of the reception: thrown out while waiting; sender or receiver has left the world."""
+
+
+class RadioChannel(LinkChannel):
+    """What a message meets on its way is known when it has left the air, so its fate is told in a later tick.
+
+    The medium is played up to `now` when somebody first listens at `now`, with the antennas where they are then.
+    Stations are kept in alphabetical order: nothing depends on the order in which they are listed.
+    """
+
+    settings: ClassVar[type[ChannelProfile]] = RadioProfile
+
+    def __init__(self, profile: RadioProfile, seed: int) -> None:
+        super().__init__()
+        self.profile = profile
+        self._seed = seed
+        path_loss = profile.path_loss
+        self._link_budget = LinkBudget(
+            path_loss,
+            seed=seed,
+            frequency_ghz=profile.frequency_ghz,
+            line_of_sight=profile.line_of_sight,
+            environment=path_loss.environment if isinstance(path_loss, Tr37885) else "highway",
+            shadowing_db=profile.shadowing_db,
+            decorrelation=profile.decorrelation,
+        )
+        self._receiver = Receiver(
+            profile.noise,
+            profile.sensing,
+            profile.curves,
+            locks=profile.technology == "80211p",
+            background=profile.background_by_loss(),
+        )
+        self._losses = LossDraws(profile.loss, seed)
+        self._draws = LinkDraws(seed)
+        self._rows: dict[str, int] = {}
+        self._access = self._new_access(())
+        self._ledger = Ledger(())
+        self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
+        self._jitter_keys: Keys = np.zeros(0, dtype=np.uint64)
+        self._budget: Budget | None = None
+        self._open: list[Transmission] = []
+        self._told: list[Batch] = []
+        self._dropped: list[LinkEvent] = []
+        self._since: float | None = None
+        self._until = 0.0
+
+    def _new_access(self, names: tuple[str, ...]) -> Access:
+        profile = self.profile
+        gate = Gate(profile.congestion, len(names))
+        if profile.technology == "80211p":
+            return Csma(names, profile.queue, gate, profile.sensing, self._seed)
+        return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink)
+
+    def fate(self, message: Message, receiver: str, now: float) -> float | str:
+        """Nothing can be said of one link alone. Raises TypeError."""
+        raise TypeError("a radio decides about messages together: use transmit")
+
+    def around(self, surroundings: Surroundings) -> None:
+        super().around(surroundings)
+        self._budget = None
+
+    def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
+        return self.transmit([(message, receivers)], now)
+
+    def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
+        self._advance(now)
+        offered = []
+        for message, receivers in outbox:
+            row = self._row(message.sender)
+            wait = self.profile.jitter * float(uniforms(self._jitter_keys[row : row + 1], message.number)[0])
+            duration = self.profile.airtime(message.size)
+            offered.append(Transmission(message, receivers, now, now + wait, duration))
+            self._ledger.send(row, self._rows_of(receivers), message.size)
+        self._access.offer(offered)
+        return self.untold()
+
+    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+        self._advance(now)
+        return super().deliver(receiver, now)
+
+    def in_flight(self) -> int:
+        undecided = sum(len(entry.receivers) for entry in [*self._access.waiting, *self._open])
+        return super().in_flight() + undecided
+
+    def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
+        self._ledger.write_into(self._links)
+        return super().statistics(now)
+
+    def busy_ratio(self, station: str) -> float | None:
+        background = self._receiver.background
+        outside = 0.0 if background is None else background[0].busy_ratio
+        row = self._rows.get(station)
+        if row is None or self._since is None or self._until <= self._since:
+            return outside
+        return min(1.0, self._access.busy_for(row) / (self._until - self._since) + outside)
+
+    def settle(self) -> None:
+        self._advance(math.inf)
+        self._ledger.write_into(self._links)
+
+    def untold(self) -> Sequence[LinkEvent]:
+        told = LinkEvents([*super().untold(), *self._dropped], self._told)
+        self._told, self._dropped = [], []
+        return told
+
+    def _rows_of(self, names: Sequence[str]) -> list[int]:
+        rows = self._rows
+        try:
+            return [rows[name] for name in names]
+        except KeyError as error:
+            raise ValueError(f"the radio was not told where {error.args[0]!r} is") from None
+
+    def _row(self, name: str) -> int:
+        row = self._rows.get(name)
+        if row is None:
+            raise ValueError(f"the radio was not told where {name!r} is")
+        return row
+
+    def _take_in(self, names: tuple[str, ...]) -> None:
+        """Other stations from now on; what those say who have left is lost."""
+        self._ledger.write_into(self._links)
+        lost = self._access.rearrange(names)
+        gone = [entry for entry in self._open if entry.message.sender not in names]
+        self._open = [entry for entry in self._open if entry not in gone]
+        self._access.on_air = [entry for entry in self._access.on_air if entry.message.sender in names]
+        self._rows = {name: row for row, name in enumerate(names)}
+        self._ledger = Ledger(names)
+        own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
+        self._keys = joined(own[:, None], own[None, :])
+        self._jitter_keys = np.array([key(self._seed, "jitter", name) for name in names], dtype=np.uint64)
+        for entry in [*lost, *gone]:
+            for receiver in entry.receivers:
+                self._lose(entry, receiver, ABSENT)
+
+    def _advance(self, now: float) -> None:
+        """Play the medium up to `now`; more than once at one instant does nothing."""
+        if self.surroundings.names != self._access.names:
+            self._take_in(self.surroundings.names)
+        if self._since is None:
+            self._since = self._until = now
+        if now <= self._until:
+            return
+        if math.isfinite(now):
+            self._until = now
+        if not self._open and not self._access.waiting:
+            self._access.rest(now)
+            return
+        if self._budget is None:
+            self._budget = self._link_budget.at(self.surroundings)
+        power = self.profile.radiated - self._budget.loss
+        started, dropped = self._access.advance(now, power)
+        for entry in dropped:
+            for receiver in entry.receivers:
+                self._lose(entry, receiver, QUEUE)
+        under_way = [*self._open, *started]
+        ended = [entry for entry in under_way if entry.end <= now]
+        self._open = [entry for entry in under_way if entry.end > now]
+        if ended:
+            self._receive(ended, power, self._budget)
+        self._access.forget(min((entry.start for entry in self._open), default=now))
+
+    def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
+        """Decide who hears the messages that have left the air, and put them on their way."""
+        receptions = self._receiver.receive(ended, self._access.on_air, power, budget, self._keys)
+        batch = Batch(ended, receptions, budget)
+        plain = isinstance(self.profile.loss, NoLoss)
+        for place, entry in enumerate(ended):
+            present = [self._rows[name] for name in entry.receivers if name in self._rows]
+            for name in entry.receivers:
+                if name not in self._rows:
+                    self._lose(entry, name, ABSENT)
+            if not plain:
+                present = self._spared(entry, present, receptions.causes[place], budget)
+            batch.receivers.append(np.array(present, dtype=np.int64))
+            self._carry(entry, place, batch, budget)
+        counts = [len(rows) for rows in batch.receivers]
+        places, receivers = np.repeat(np.arange(len(ended)), counts), np.concatenate(batch.receivers)
+        senders = receptions.senders[places]
+        causes = receptions.causes[places, receivers].astype(np.int64)
+        self._ledger.decide(senders, receivers, causes, budget.distance[senders, receivers])
+        self._told.append(batch)
+
+    def _carry(self, entry: Transmission, place: int, batch: Batch, budget: Budget) -> None:
+        """Put a message on its way to those who hear it."""
+        rows = batch.receivers[place]
+        heard = rows[batch.receptions.causes[place, rows] == DELIVERED].tolist()
+        message, delay = entry.message, self.profile.delay
+        if isinstance(delay, ConstantDelay):
+            arrives = entry.end + delay.seconds
+            batch.arrivals[place] = arrives
+            parcel = (arrives, message.sender, message.number, entry.sent, Received(message, arrives))
+            for row in heard:
+                self._links.carry(parcel, budget.names[row])
+            return
+        for row in heard:
+            name = budget.names[row]
+            arrives = entry.end + delay_of(delay, self._draws, message, name)
+            batch.arrivals[place, row] = arrives
+            self._links.carry((arrives, message.sender, message.number, entry.sent, Received(message, arrives)), name)
+
+    def _spared(self, entry: Transmission, rows: Sequence[int], causes: NDArray[np.int8], budget: Budget) -> list[int]:
+        """Those among the receivers for whom the loss that comes on top of the radio does not strike."""
+        spared = []
+        sender = self._rows[entry.message.sender]
+        for row in rows:
+            distance = float(budget.distance[sender, row])
+            reason = None
+            if causes[row] == DELIVERED:
+                reason = self._losses.reason(entry.message, budget.names[row], entry.sent, distance)
+            if reason is None:
+                spared.append(row)
+            else:
+                self._lose(entry, budget.names[row], reason, distance)
+        return spared
+
+    def _lose(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
+        """A message that was written down as sent is lost for a reason that the reception does not know."""
+        message = entry.message
+        book = self._links.book(message.sender, receiver)
+        book.lose(reason)
+        if distance is not None:
+            book.fate(distance, False)
+        self._dropped.append(
+            LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
+        )

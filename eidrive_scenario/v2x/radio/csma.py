@@ -1,0 +1,68 @@
+"""Access of IEEE 802.11p: listen before talk, with a random wait after a busy medium (IEEE 802.11-2012, 9.19)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.counter_draws import key, uniforms
+from eidrive_scenario.v2x.radio.access import Access, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.congestion import Gate
+
+Array = NDArray[np.float64]
+
+SLOT = 13e-6
+"""aSlotTime in 10 MHz [s]."""
+AIFS = 32e-6 + 6 * SLOT
+"""SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
+CONTENTION_WINDOW = 15
+"""aCWmin: broadcast messages wait 0 to 15 slots and are never repeated."""
+
+
+class Csma(Access):
+    """A message goes out at once if the medium was free for AIFS; else after AIFS and a number of free slots.
+
+    Whoever starts within one slot of another cannot have noticed that, and both are on the air together.
+    """
+
+    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: Gate, sensing_dbm: float, seed: int) -> None:
+        super().__init__(names, queue, gate, sensing_dbm)
+        self._seed = seed
+        self._slots = np.full(len(names), math.nan)
+        """How many free slots the first message of each station waits for; NaN while it found no busy medium."""
+        self._fixed = np.full(len(names), math.nan)
+        """Starts that no later transmission delays any more [s]."""
+
+    def starts(self) -> Array:
+        met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
+        for row in np.flatnonzero(met_busy).tolist():
+            self._slots[row] = self._drawn(row)
+        waited = np.maximum(self.ready, self.free_from) + AIFS + self._slots * SLOT
+        contending = np.where(np.isnan(self._slots), self.ready, waited)
+        return np.where(np.isnan(self._fixed), contending, self._fixed)
+
+    def headed(self, row: int, transmission: Transmission | None) -> None:
+        self._slots[row] = self._fixed[row] = math.nan
+
+    def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
+        start = transmission.start
+        others = sensed & np.isfinite(starts)
+        others[row] = False
+        unaware = others & (starts < start + SLOT)
+        self._fixed[unaware] = starts[unaware]
+        waiting = others & ~unaware & ~np.isnan(self._slots)
+        counted = np.floor((start - np.maximum(self.ready, self.free_from) - AIFS) / SLOT + 1e-9)
+        self._slots[waiting] -= np.clip(counted[waiting], 0.0, self._slots[waiting])
+
+    def reorder(self, rows: Sequence[int | None]) -> None:
+        self._slots, self._fixed = moved(self._slots, rows, math.nan), moved(self._fixed, rows, math.nan)
+
+    def _drawn(self, row: int) -> float:
+        head = self._head[row]
+        assert head is not None
+        own = key(self._seed, "backoff", self.names[row])
+        drawn = float(uniforms(np.array([own], dtype=np.uint64), head.message.number)[0])
+        return math.floor(drawn * (CONTENTION_WINDOW + 1))

@@ -1,0 +1,59 @@
+"""Counts of many links at once; they go into the books of the links when somebody reads those."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.books import DISTANCE_BIN
+from eidrive_scenario.v2x.links import Links
+from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_CLASSES = 41
+"""Classes of distance; the last one takes all beyond 1 km."""
+
+
+class Ledger:
+    """For N stations, by row of sender and receiver."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+        count = len(names)
+        self._sent = np.zeros((count, count), dtype=np.int64)
+        self._bytes = np.zeros((count, count), dtype=np.int64)
+        self._causes = np.zeros((count, count, len(CAUSES)), dtype=np.int64)
+        self._fates = np.zeros((count, count, _CLASSES, 2), dtype=np.int64)
+
+    def send(self, row: int, receivers: Sequence[int], size: int) -> None:
+        """A message of `size` bytes was said."""
+        self._sent[row, receivers] += 1
+        self._bytes[row, receivers] += size
+
+    def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
+        """Fates of messages, one entry per message and receiver."""
+        np.add.at(self._causes, (senders, receivers, causes), 1)
+        place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
+        np.add.at(self._fates, (senders, receivers, place, (causes == DELIVERED).astype(np.int64)), 1)
+
+    def write_into(self, links: Links) -> None:
+        """Carry everything over into the books, and begin anew."""
+        used = np.argwhere(self._sent + self._causes.sum(axis=2))
+        for sender, receiver in used.tolist():
+            book = links.book(self.names[sender], self.names[receiver])
+            book.sent += int(self._sent[sender, receiver])
+            book.bytes_sent += int(self._bytes[sender, receiver])
+            for code, number in enumerate(self._causes[sender, receiver].tolist()):
+                if code != DELIVERED and number:
+                    book.lose(CAUSES[code], number)
+            for place, (lost, kept) in enumerate(self._fates[sender, receiver].tolist()):
+                if lost or kept:
+                    known = book.fates.setdefault(place, [0, 0])
+                    known[0] += lost + kept
+                    known[1] += kept
+        for counts in (self._sent, self._bytes, self._causes, self._fates):
+            counts[...] = 0

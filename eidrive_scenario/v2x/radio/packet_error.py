@@ -1,0 +1,75 @@
+"""Packet errors by the ratio of signal to interference and noise: named curves with their sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.load import cv2x_mode4, ieee80211p
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ErrorCurve:
+    """Packet error rate at ratios that rise [dB]; 1 below the first and `floor` above the last.
+
+    size  of the packets for which it holds [bytes]; None: for all
+    """
+
+    ratios: tuple[float, ...]
+    errors: tuple[float, ...]
+    size: int | None
+    source: str
+    floor: float = 0.0
+
+    def at(self, ratio_db: Array, size: float | Array) -> Array:
+        """Packet error rate of packets of `size` [bytes], broadcast.
+
+        Other sizes than the curve's: 1 - (1 - PER)^(size / curve's size), as if the bytes failed independently.
+        """
+        errors = np.interp(ratio_db, self.ratios, self.errors, left=1.0, right=self.floor)
+        if self.size is None:
+            return errors
+        scaled: Array = 1.0 - (1.0 - errors) ** (np.asarray(size) / self.size)
+        return scaled
+
+
+_WILAB = "WiLabV2Xsim, IEEE 802.11p at 6 Mbit/s (MCS 2), 350 bytes, channel model "
+_GOUBET_RATIOS, _GOUBET_ERRORS = ieee80211p.FRAME_ERRORS
+
+CURVES = {
+    "80211p_highway_los": ErrorCurve(
+        tuple(map(float, range(-2, 9))),
+        (0.9916, 0.9388, 0.7662, 0.5076, 0.264, 0.1108, 0.0404, 0.0132, 0.0028, 0.001, 0.0002),
+        350,
+        _WILAB + "highway LOS",
+    ),
+    "80211p_highway_nlos": ErrorCurve(
+        tuple(map(float, range(1, 11))),
+        (0.996, 0.9714, 0.8928, 0.6886, 0.4328, 0.2014, 0.0712, 0.02, 0.0024, 0.001),
+        350,
+        _WILAB + "highway NLOS",
+    ),
+    "80211p_crossing_nlos": ErrorCurve(
+        tuple(map(float, range(1, 11))),
+        (0.9896, 0.933, 0.766, 0.5012, 0.2412, 0.087, 0.0236, 0.0068, 0.0008, 0.0002),
+        350,
+        _WILAB + "crossing NLOS",
+    ),
+    "80211p_goubet": ErrorCurve(
+        tuple(ratio - 10.0 * float(np.log10(10e6 / 6e6)) for ratio in _GOUBET_RATIOS),
+        _GOUBET_ERRORS,
+        None,
+        "O. Goubet et al., IEEE TVT 64(9), 2015, fig. 14, at 6 Mbit/s in 10 MHz, as in Sepulcre et al. 2021",
+        floor=0.001,
+    ),
+    "cv2x_r0.7": ErrorCurve(
+        *cv2x_mode4.CODINGS[4][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.7, 280 km/h, 190 bytes", floor=1e-4
+    ),
+    "cv2x_r0.5": ErrorCurve(
+        *cv2x_mode4.CODINGS[2][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.5, 280 km/h, 190 bytes", floor=1e-4
+    ),
+}

@@ -1,0 +1,114 @@
+"""Path loss as a setting: which published model, and what it makes of bodies in between."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat
+from scipy.special import ndtri
+
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.radio.propagation import (
+    blockage_moments,
+    building_nlos,
+    highway_los,
+    urban_los,
+    winner_b1,
+)
+from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, Integers
+
+Array = NDArray[np.float64]
+
+
+class Between:
+    """M links and what stands on them.
+
+    distance  (M,) between the antennas [m];  states  (M,) LOS, NLOSV or NLOS;  lower, upper  (M,) heights of the
+    antennas, tops  (M,) and of the highest vehicle in between [m];  vehicles  (M,) how many there are
+    """
+
+    def __init__(
+        self, distance: Array, states: Integers, lower: Array, upper: Array, tops: Array, vehicles: Integers
+    ) -> None:
+        self.distance = np.maximum(distance, 1.0)
+        self.states = states
+        self.lower = lower
+        self.upper = upper
+        self.tops = tops
+        self.vehicles = vehicles
+
+
+class Tr37885(Settings):
+    """3GPP TR 37.885: LOS of streets or of highways, NLOS behind buildings, and vehicles that add to LOS.
+
+    blockage  how the loss by vehicles in between is spread: `lognormal` as ns-3 reads the report, `normal` and not
+              below 0 dB, or its `mean`
+    """
+
+    kind: Literal["tr37885"] = "tr37885"
+    environment: Literal["urban", "highway"] = "urban"
+    blockage: Literal["lognormal", "normal", "mean"] = "lognormal"
+
+    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
+        los = urban_los if self.environment == "urban" else highway_los
+        clear = los(between.distance, frequency_ghz)
+        mean, spread = blockage_moments(between.distance, between.lower, between.upper, between.tops)
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self._blocked(mean, spread, draws)],
+            building_nlos(between.distance, frequency_ghz),
+        )
+
+    def _blocked(self, mean: Array, spread: Array, draws: Array) -> Array:
+        if self.blockage == "mean":
+            return mean
+        if self.blockage == "normal":
+            return np.maximum(0.0, mean + spread * ndtri(draws))
+        some = np.where(mean > 0.0, mean, 1.0)
+        variance = np.log1p((spread / some) ** 2)
+        return np.where(mean > 0.0, np.exp(np.log(some) - variance / 2.0 + np.sqrt(variance) * ndtri(draws)), 0.0)
+
+    def shadowing(self, states: Integers) -> Array:
+        """Its standard deviation (M,) [dB] (table 6.2.1-2)."""
+        return np.where(states == NLOS, 4.0, 3.0)
+
+    def decorrelation(self, states: Integers) -> Array:
+        """Distance over which shadowing loses all but 1/e of its correlation (M,) [m]: 25 m on highways."""
+        return np.where(states == LOS, 10.0, 13.0) if self.environment == "urban" else np.full(len(states), 25.0)
+
+
+class WinnerB1(Settings):
+    """WINNER+ B1 as in 3GPP TR 36.885, with one loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+
+    environment_height  taken off the antennas' heights [m]: 1.0 after 3GPP; 0.5 and 0 in the analytic models of 802.11p
+                        and C-V2X. 16 dB at 200 m hang on it
+    Buildings have the NLOS of TR 37.885, as that of TR 36.885 needs the corners of streets.
+    """
+
+    kind: Literal["winner_b1"]
+    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 1.0
+    per_vehicle_db: NonNegativeFloat = 6.9
+
+    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+        height = 1.5 - self.environment_height
+        clear = winner_b1(between.distance, frequency_ghz, height, height)
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self.per_vehicle_db * between.vehicles],
+            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
+        )
+
+    def shadowing(self, states: Integers) -> Array:
+        """Its standard deviation (M,) [dB]."""
+        return np.where(states == NLOS, 4.0, 3.0)
+
+    def decorrelation(self, states: Integers) -> Array:
+        """Distance over which shadowing loses all but 1/e of its correlation (M,) [m]."""
+        return np.full(len(states), 25.0)
+
+
+PathLoss = Annotated[Tr37885 | WinnerB1, Field(discriminator="kind")]

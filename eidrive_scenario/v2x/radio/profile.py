@@ -1,0 +1,148 @@
+"""The settings of a radio."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.composed import ComposedProfile
+from eidrive_scenario.v2x.load.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.radio.access import QueueSettings
+from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
+from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoControl
+from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
+from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss, Tr37885
+from eidrive_scenario.v2x.radio.sidelink import SidelinkSettings
+from eidrive_scenario.v2x.surroundings import LOS
+
+Array = NDArray[np.float64]
+
+Technology = Literal["80211p", "cv2x_mode4"]
+Background = Annotated[Ieee80211pLoss | Cv2xMode4Loss, Field(discriminator="kind")]
+
+_SENSING = {"80211p": -85.0, "cv2x_mode4": -90.5}
+_CURVES = {
+    "80211p": ("80211p_highway_los", "80211p_highway_nlos", "80211p_crossing_nlos"),
+    "cv2x_mode4": ("cv2x_r0.7",) * 3,
+}
+_BLOCKS, _BLOCKS_OF_A_MESSAGE = 50, 10
+
+
+class PacketErrors(Settings):
+    """Names of curves of packet errors by what stands between the antennas; `eidrive_scenario.v2x.radio.packet_error`
+    has them with their sources."""
+
+    los: str
+    nlosv: str
+    nlos: str
+
+    @model_validator(mode="after")
+    def _known(self) -> PacketErrors:
+        for name in (self.los, self.nlosv, self.nlos):
+            if name not in CURVES:
+                raise ValueError(f"no curve of packet errors {name!r}; {suggestion(name, CURVES)}")
+        return self
+
+
+class RadioProfile(ComposedProfile):
+    """A radio channel; `delay` and `loss` come on top of what the radio does.
+
+    technology     80211p (listen before talk) or cv2x_mode4 (resources kept for some messages)
+    frequency_ghz, tx_power_dbm, antenna_gain_dbi   carrier, transmitter, and gain of each of the two antennas
+    noise_dbm      in 10 MHz;  sensing_dbm  least power that is noticed, None is the technology's (-85, -90.5 dBm)
+    path_loss      which model, and its settings
+    line_of_sight  `rays` through the world, `random` after the probabilities of TR 37.885, `clear`
+    shadowing_db   standard deviation, None is the model's, 0 is no shadowing;  decorrelation  its distance [m]
+    packet_errors  name of one curve, or a mapping from los, nlosv and nlos to one each; None is the technology's
+    data_rate_mbps of 802.11p;  mtu  largest frame [bytes]
+    jitter         from the tick to the moment when a message is ready: evenly up to this, anew for each message [s]
+    sidelink       resources of C-V2X Mode 4
+    queue          what waits at a sender;  congestion  control of the message rate
+    background     traffic that is not simulated, by one of the analytic models
+    """
+
+    model: Literal["radio"] = "radio"  # type: ignore[assignment]
+    technology: Technology = "80211p"
+    frequency_ghz: Annotated[float, Field(ge=0.5, le=100.0)] = 5.9
+    tx_power_dbm: Annotated[float, Field(ge=-30.0, le=50.0)] = 23.0
+    antenna_gain_dbi: float = 3.0
+    noise_dbm: float = -95.0
+    sensing_dbm: float | None = None
+    path_loss: PathLoss = Tr37885()
+    line_of_sight: Literal["rays", "random", "clear"] = "rays"
+    shadowing_db: NonNegativeFloat | None = None
+    decorrelation: PositiveFloat | None = None
+    packet_errors: PacketErrors | None = None
+    data_rate_mbps: float = 6.0
+    mtu: PositiveInt = 1400
+    jitter: NonNegativeFloat = 0.01
+    sidelink: SidelinkSettings = SidelinkSettings()
+    queue: QueueSettings = QueueSettings()
+    congestion: CongestionControl = NoControl()
+    background: Background | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_curve_for_all(cls, data: Any) -> Any:
+        if isinstance(data, dict) and isinstance(data.get("packet_errors"), str):
+            name = data["packet_errors"]
+            return {**data, "packet_errors": {"los": name, "nlosv": name, "nlos": name}}
+        return data
+
+    @model_validator(mode="after")
+    def _fits(self) -> RadioProfile:
+        if self.data_rate_mbps not in BITS_PER_SYMBOL:
+            rates = ", ".join(f"{rate:g}" for rate in BITS_PER_SYMBOL)
+            raise ValueError(f"data_rate_mbps is {self.data_rate_mbps:g}; known: {rates}")
+        if self.own_perception:
+            raise ValueError("own_perception does not go with a radio: nobody hears its own antenna")
+        if self.background is not None and self.background.kind != self.technology:
+            raise ValueError(f"the background is {self.background.kind}, the technology {self.technology}")
+        return self
+
+    @property
+    def sensing(self) -> float:
+        """Least power that is noticed [dBm]."""
+        return _SENSING[self.technology] if self.sensing_dbm is None else self.sensing_dbm
+
+    @property
+    def noise(self) -> float:
+        """In the band of one message [dBm]: C-V2X takes 10 of the 50 resource blocks of 10 MHz."""
+        if self.technology == "80211p":
+            return self.noise_dbm
+        return self.noise_dbm - 10.0 * float(np.log10(_BLOCKS / _BLOCKS_OF_A_MESSAGE))
+
+    @property
+    def radiated(self) -> float:
+        """Transmitted power with the gain of both antennas [dBm]."""
+        return self.tx_power_dbm + 2.0 * self.antenna_gain_dbi
+
+    @property
+    def curves(self) -> tuple[ErrorCurve, ErrorCurve, ErrorCurve]:
+        """Of packet errors with LOS, NLOSv and NLOS."""
+        chosen = self.packet_errors
+        names = _CURVES[self.technology] if chosen is None else (chosen.los, chosen.nlosv, chosen.nlos)
+        return CURVES[names[0]], CURVES[names[1]], CURVES[names[2]]
+
+    def airtime(self, size: int) -> float:
+        """How long a message of `size` bytes is on the air [s]."""
+        if self.technology == "80211p":
+            return ieee80211p_airtime(size, self.data_rate_mbps, self.mtu)
+        return SUBFRAME * self.sidelink.extent(size)[1]
+
+    def background_by_loss(self) -> tuple[ErrorTable, Array] | None:
+        """The table of the background traffic, and the open path loss at each of its distances [dB]."""
+        if self.background is None:
+            return None
+        distance = np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
+        count = len(distance)
+        heights, nothing = np.full(count, 1.5), np.zeros(count, dtype=np.int64)
+        between = Between(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), nothing)
+        open_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
+        return self.background.table(), np.maximum.accumulate(open_loss)

@@ -1,0 +1,116 @@
+"""Who receives what: for each message and station the signal, what disturbs it, and so the cause of loss."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.counter_draws import Keys, uniforms
+from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.radio.access import EARLY, Transmission
+from eidrive_scenario.v2x.radio.budget import Budget
+from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int8]
+
+CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision")
+"""In the order in which they strike; codes in arrays are places here."""
+DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION = range(len(CAUSES))
+BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
+"""What traffic that is not simulated adds; signal strength is known, and so not among them."""
+
+
+@dataclass(frozen=True)
+class Receptions:
+    """T messages at N stations: code of the cause (T, N), signal to noise (T, N) [dB], and who sent (T,)."""
+
+    causes: Codes
+    snr: Array
+    senders: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """What all receivers have in common.
+
+    noise_dbm, sensing_dbm  noise in the band of a message, and the least power that is noticed
+    curves     packet error by code of the state of the line of sight
+    locks      whether a receiver stays with the message that came first (IEEE 802.11p), deaf to those that overlap it
+    background traffic that is not simulated, and the mean path loss over distance (D,) to which its table belongs
+    """
+
+    noise_dbm: float
+    sensing_dbm: float
+    curves: Sequence[ErrorCurve]
+    locks: bool
+    background: tuple[ErrorTable, Array] | None = None
+
+    def receive(
+        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+    ) -> Receptions:
+        """What becomes of the messages in `ended`; `on_air` has all that may overlap with them, themselves included.
+
+        power  (N, N) at which each station (column) receives each other (row) [dBm]
+        keys   (N, N) of the links, by sender and receiver
+        """
+        rows = np.array([budget.rows[entry.message.sender] for entry in on_air], dtype=np.int64)
+        place = {id(entry): index for index, entry in enumerate(on_air)}
+        own = np.array([place[id(entry)] for entry in ended], dtype=np.int64)
+        start, end = (np.array([getattr(entry, name) for entry in on_air]) for name in ("start", "end"))
+        first = np.array([entry.first_band for entry in on_air])
+        last = first + np.array([entry.bands for entry in on_air])
+        together = (start[None, :] < end[own, None] - EARLY) & (start[own, None] < end[None, :] - EARLY)
+        together[np.arange(len(own)), own] = False
+        same_band = together & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
+
+        senders = rows[own]
+        signal = power[senders]
+        snr = signal - self.noise_dbm
+        numbers = np.array([entry.message.number for entry in ended])[:, None]
+        draws = uniforms(keys[senders], numbers)
+        sizes = np.array([entry.message.size for entry in ended], dtype=float)[:, None]
+        states = budget.states[senders]
+        lost_alone = self._errors(snr, states, sizes)
+
+        causes = np.zeros(snr.shape, dtype=np.int8)
+        if same_band.any():
+            milliwatts = 10.0 ** (power[rows] / 10.0)
+            noise = 10.0 ** (self.noise_dbm / 10.0)
+            disturbed = signal - 10.0 * np.log10(noise + same_band.astype(float) @ milliwatts)
+            causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
+        causes[draws < lost_alone] = PROPAGATION
+        if together.any():
+            if self.locks:
+                earlier = same_band & (start[None, :] < start[own, None])
+                causes[(earlier.astype(float) @ (power[rows] >= self.sensing_dbm).astype(float)) > 0.0] = BUSY
+            talking = np.zeros((len(on_air), len(budget.names)))
+            talking[np.arange(len(on_air)), rows] = 1.0
+            deaf = together.astype(float) @ talking > 0.0
+        else:
+            deaf = np.zeros(snr.shape, dtype=bool)
+        causes[signal < self.sensing_dbm] = SENSING
+        causes[deaf] = HALF_DUPLEX
+        if self.background is not None:
+            self._add_background(causes, budget.mean_loss[senders], keys[senders], numbers)
+        return Receptions(causes, snr, senders)
+
+    def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
+        if len({id(curve) for curve in self.curves}) == 1:
+            return self.curves[0].at(ratio, sizes)
+        return np.choose(states, [curve.at(ratio, sizes) for curve in self.curves])
+
+    def _add_background(self, causes: Codes, mean_loss: Array, keys: Keys, numbers: NDArray[np.int64]) -> None:
+        """Losses by vehicles that are not simulated, at the distance at which their model has this path loss."""
+        assert self.background is not None
+        table, loss_at = self.background
+        distance = np.interp(mean_loss, loss_at, table.distance)
+        for salt, (cause, code) in enumerate(BACKGROUND.items(), start=1):
+            if cause in table.given:
+                probability = np.interp(distance, table.distance, table.given[cause])
+                draws = uniforms(keys + np.uint64(salt), numbers)
+                strikes = (draws < probability) & ((causes == DELIVERED) | (causes > code))
+                causes[strikes] = code

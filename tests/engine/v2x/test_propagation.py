@@ -1,0 +1,145 @@
+"""Path loss, airtime and packet errors against published values."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
+from eidrive_scenario.v2x.radio.packet_error import CURVES
+from eidrive_scenario.v2x.radio.path_loss import Between, Tr37885, WinnerB1
+from eidrive_scenario.v2x.radio.propagation import (
+    blockage_moments,
+    building_nlos,
+    highway_los,
+    probability_of_los,
+    urban_los,
+    winner_b1,
+)
+from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV
+
+D = np.array([10.0, 100.0, 1000.0])
+
+
+def between(state: int, distance: float, top: float = 3.0, lower: float = 1.6, upper: float = 1.6) -> Between:
+    values = (np.array([value]) for value in (lower, upper, top))
+    return Between(np.array([distance]), np.array([state]), *values, np.array([1 if state == NLOSV else 0]))
+
+
+def test_tr_37_885_gives_the_vectors_of_ns_3() -> None:
+    """ns-3's three-gpp-v2v tests at 5 GHz."""
+    assert urban_los(D, 5.0) == pytest.approx([68.1913, 84.8913, 101.5913], abs=1e-4)
+    assert highway_los(D, 5.0) == pytest.approx([66.3794, 86.3794, 106.3794], abs=1e-4)
+    assert building_nlos(D, 5.0) == pytest.approx([80.0605, 110.0605, 140.0605], abs=1e-4)
+
+
+def test_at_5_9_ghz_over_100_m() -> None:
+    at = np.array([100.0])
+    assert urban_los(at, 5.9)[0] == pytest.approx(86.20, abs=0.005)
+    assert highway_los(at, 5.9)[0] == pytest.approx(87.82, abs=0.005)
+    assert building_nlos(at, 5.9)[0] == pytest.approx(111.42, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("environment_height", "break_point", "loss"), [(1.0, 19.7, 112.1), (0.5, 78.5, 101.7), (0.0, 177, 95.6)]
+)
+def test_winner_b1_hangs_on_the_environment_height(environment_height: float, break_point: float, loss: float) -> None:
+    height = 1.5 - environment_height
+    frequency = 5.9
+    assert 4 * height**2 * frequency * 1e9 / 3e8 == pytest.approx(break_point, rel=0.01)
+    assert winner_b1(np.array([200.0]), frequency, height, height)[0] == pytest.approx(loss, abs=0.1)
+
+
+def test_winner_b1_is_never_below_free_space_and_flat_below_3_m() -> None:
+    distance = np.linspace(0.0, 1000.0, 400)
+    loss = winner_b1(distance, 5.9, 1.5, 1.5)
+    free = 20 * np.log10(np.maximum(distance, 3.0)) + 46.4 + 20 * math.log10(5.9 / 5)
+    assert np.all(loss >= free)
+    assert len(set(loss[distance < 3.0])) == 1
+
+
+def test_loss_by_vehicles_in_between() -> None:
+    """Below both antennas none; above both 9 dB; between them 5 dB; more from 541 m on (15 lg d > 41)."""
+    near, far = np.array([50.0]), np.array([1000.0])
+    one = np.ones(1)
+    assert [m[0] for m in blockage_moments(near, 2.0 * one, 3.0 * one, 1.6 * one)] == [0.0, 0.0]
+    assert [m[0] for m in blockage_moments(near, 1.6 * one, 1.6 * one, 3.0 * one)] == [9.0, 4.5]
+    assert [m[0] for m in blockage_moments(near, 1.6 * one, 5.0 * one, 3.0 * one)] == [5.0, 4.0]
+    assert blockage_moments(far, 1.6 * one, 1.6 * one, 3.0 * one)[0][0] == pytest.approx(9.0 + 45.0 - 41.0)
+
+
+@pytest.mark.parametrize("environment", ["urban", "highway"])
+def test_states_of_the_line_of_sight_differ_by_the_model_s_loss(environment: str) -> None:
+    model = Tr37885.model_validate({"environment": environment, "blockage": "mean"})
+    half = np.array([0.5])
+    clear, behind, hidden = (float(model.loss(between(s, 60.0), 5.9, half)[0]) for s in (LOS, NLOSV, NLOS))
+    assert behind - clear == pytest.approx(9.0)
+    assert hidden == pytest.approx(float(building_nlos(np.array([60.0]), 5.9)[0]))
+
+
+def test_the_loss_by_vehicles_has_the_report_s_mean_and_spread() -> None:
+    """Moments by the midpoint rule over the draws; the normal reading is cut at 0 dB, 2.3 % of it."""
+    draws = (np.arange(20000) + 0.5) / 20000
+    many = Between(*(np.full(20000, value) for value in (60.0, NLOSV, 1.6, 1.6, 3.0)), np.ones(20000, dtype=np.int64))
+    for blockage, tolerance in (("lognormal", 0.01), ("normal", 0.06)):
+        model = Tr37885.model_validate({"blockage": blockage})
+        extra = model.loss(many, 5.9, draws) - urban_los(many.distance, 5.9)
+        assert extra.mean() == pytest.approx(9.0, abs=tolerance * 9.0)
+        assert extra.std() == pytest.approx(4.5, abs=tolerance * 4.5)
+        assert extra.min() >= 0.0
+
+
+def test_winner_b1_adds_a_loss_for_each_vehicle() -> None:
+    model = WinnerB1(kind="winner_b1")
+    half = np.array([0.5])
+    clear, behind = (float(model.loss(between(s, 60.0), 5.9, half)[0]) for s in (LOS, NLOSV))
+    assert behind - clear == pytest.approx(6.9)
+    assert float(model.loss(between(NLOS, 60.0), 5.9, half)[0]) > behind
+
+
+def test_probability_of_a_line_of_sight() -> None:
+    distance = np.array([50.0, 100.0, 200.0, 300.0])
+    assert probability_of_los(distance, "urban") == pytest.approx([0.5938, 0.3358, 0.1074, 0.0343], abs=5e-5)
+    assert probability_of_los(distance, "highway") == pytest.approx([0.9246, 0.8403, 0.7034, 0.6084], abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("size", "milliseconds"), [(190, 0.304), (300, 0.448), (500, 0.712), (800, 1.112), (1100, 1.512), (1400, 1.912)]
+)
+def test_airtime_of_802_11p_at_6_mbit_s(size: int, milliseconds: float) -> None:
+    assert ieee80211p_airtime(size, 6.0, 1400) == pytest.approx(milliseconds * 1e-3, abs=1e-9)
+
+
+def test_a_message_above_the_mtu_goes_in_several_frames() -> None:
+    assert fragments(3000, 1400) == (1400, 1400, 200)
+    assert fragments(1400, 1400) == (1400,)
+    assert fragments(0, 1400) == (0,)
+    assert ieee80211p_airtime(2800, 6.0, 1400) == pytest.approx(2 * 1.912e-3)
+
+
+def test_reception_over_distance_without_interference() -> None:
+    """Mean over 4 dB of shadowing, TR 37.885 urban NLOS, 23 dBm with 3 dBi twice, -95 dBm noise, highway LOS curve."""
+    curve = CURVES["80211p_highway_los"]
+    shadow = np.linspace(-20.0, 20.0, 4001)
+    weight = np.exp(-0.5 * (shadow / 4.0) ** 2)
+    weight /= weight.sum()
+    ratios = {100: 0.996, 150: 0.924, 200: 0.714, 300: 0.252, 400: 0.061}
+    for distance, expected in ratios.items():
+        snr = 23.0 + 6.0 - building_nlos(np.array([float(distance)]), 5.9) + 95.0 + shadow
+        assert float(np.sum(weight * (1.0 - curve.at(snr, 350)))) == pytest.approx(expected, abs=0.001)
+
+
+def test_curves_of_packet_errors_fall_and_larger_packets_err_more() -> None:
+    ratios = np.linspace(-10.0, 40.0, 501)
+    for name, curve in CURVES.items():
+        errors = curve.at(ratios, 350)
+        assert np.all(np.diff(errors) <= 1e-12), name
+        assert errors[0] == 1.0
+        assert errors[-1] <= 0.002
+        if curve.size is not None:
+            assert np.all(curve.at(ratios, 2 * curve.size) >= curve.at(ratios, curve.size))
+            assert curve.at(np.array([3.0]), 2 * curve.size)[0] == pytest.approx(
+                1.0 - (1.0 - curve.at(np.array([3.0]), curve.size)[0]) ** 2
+            )

@@ -1,0 +1,319 @@
+"""The radio channel: causality, order, symmetry, and what bodies, distance and other stations do to a message."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.radio.budget import LinkBudget
+from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.radio.path_loss import Tr37885
+from eidrive_scenario.v2x.radio.profile import RadioProfile
+from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, SightLines, Surroundings
+
+DT = 0.05
+Place = tuple[float, float, float]
+QUIET: dict[str, object] = {
+    "shadowing_db": 0,
+    "path_loss": {"kind": "tr37885", "blockage": "mean"},
+    "line_of_sight": "clear",
+}
+
+
+def radio(seed: int = 0, **profile: Any) -> RadioChannel:
+    return RadioChannel(RadioProfile.model_validate(profile), seed)
+
+
+def message(sender: str, number: int, time: float, size: int = 300) -> Message:
+    return Message(sender, number, time, StationState(time, 0, 0, 0, 0, 0), Detections(time), size)
+
+
+def talk(
+    carrier: RadioChannel,
+    places: dict[str, Place],
+    ticks: int,
+    *,
+    speed: float = 0.0,
+    sizes: Sequence[int] = (300,),
+    sight: Any = None,
+    per_tick: int = 1,
+    dt: float = DT,
+) -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+    """Every station says something in each tick, in the order of `places`, which move along x."""
+    events: list[LinkEvent] = []
+    heard: list[tuple[str, float, Received]] = []
+    for tick in range(ticks):
+        now = tick * dt
+        at = {name: (x + speed * now * (index + 1), y, z) for index, (name, (x, y, z)) in enumerate(places.items())}
+        carrier.around(Surroundings(at, sight))
+        for receiver in places:
+            heard += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
+        outbox = [
+            (message(name, tick * per_tick + part, now, sizes[tick % len(sizes)]), [n for n in places if n != name])
+            for name in places
+            for part in range(per_tick)
+        ]
+        events += carrier.transmit(outbox, now)
+    return events, heard
+
+
+ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
+PROFILES: list[dict[str, object]] = [
+    {"technology": "80211p"},
+    {"technology": "80211p", "congestion": {"kind": "reactive"}, "queue": {"discipline": "lcfs"}},
+    {"technology": "80211p", "congestion": {"kind": "limeric"}, "queue": {"length": 2}},
+    {"technology": "80211p", "delay": {"kind": "lognormal", "mean": 0.05, "sd": 0.05}, "jitter": 0.0},
+    {"technology": "80211p", "loss": {"kind": "gilbert_elliott", "probability": 0.3, "burst": 4}},
+    {"technology": "80211p", "background": {"kind": "80211p", "density": 0.1}},
+    {"technology": "cv2x_mode4"},
+    {"technology": "cv2x_mode4", "sidelink": {"interval": 0.05}, "queue": {"discipline": "lcfs"}},
+    {"technology": "cv2x_mode4", "background": {"kind": "cv2x_mode4", "density": 0.2}, "line_of_sight": "random"},
+]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.sampled_from(PROFILES), st.integers(0, 5), st.sampled_from([(300,), (121, 3000)]), st.floats(0, 40))
+def test_nothing_is_heard_before_its_time_nor_twice_and_nothing_vanishes(
+    profile: dict[str, object], seed: int, sizes: tuple[int, ...], speed: float
+) -> None:
+    carrier = radio(seed, **profile)
+    events, heard = talk(carrier, ROW, 30, speed=speed, sizes=sizes)
+    now = 30 * DT
+    fates = {(event.sender, event.receiver, event.number): event for event in events}
+    assert len(fates) == len(events), "each fate is told once"
+    for receiver, time, received in heard:
+        event = fates.pop((received.message.sender, receiver, received.message.number))
+        assert event.outcome == "delivered"
+        assert event.arrives == received.arrived
+        assert event.sent < event.arrives <= time + 1e-9
+        assert event.path_loss_db is not None
+    carrier.around(Surroundings(ROW))
+    books = carrier.statistics(now).values()
+    assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
+    assert all(sum(book.lost_by.values()) == book.lost for book in books)
+    assert sum(book.sent for book in books) == 30 * 5 * 4
+    assert sum(book.received for book in books) == len(heard)
+    assert sum(book.lost for book in books) == sum(event.outcome == "lost" for event in events)
+    assert sum(book.in_flight for book in books) == carrier.in_flight()
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
+def test_the_order_of_the_stations_does_not_matter(profile: dict[str, object]) -> None:
+    def fates(places: dict[str, Place]) -> set[LinkEvent]:
+        return set(talk(radio(3, **profile), places, 30, sizes=(200, 800))[0])
+
+    forth = fates(ROW)
+    assert fates(dict(reversed(ROW.items()))) == forth
+    assert len(forth) > 300
+
+
+@pytest.mark.parametrize("profile", PROFILES[:7:6], ids=["80211p", "cv2x"])
+def test_a_turned_and_a_mirrored_scene_have_the_same_fates(profile: dict[str, object]) -> None:
+    def fates(turn: Any) -> list[tuple[object, ...]]:
+        places = {name: turn(*place) for name, place in ROW.items()}
+        return sorted(
+            (e.sender, e.receiver, e.number, e.outcome, e.reason) for e in talk(radio(2, **profile), places, 40)[0]
+        )
+
+    cos, sin = math.cos(0.7), math.sin(0.7)
+    straight = fates(lambda x, y, z: (x, y, z))
+    assert fates(lambda x, y, z: (cos * x - sin * y + 9.0, sin * x + cos * y, z)) == straight
+    assert fates(lambda x, y, z: (x, -y, z)) == straight
+
+
+def behind(state: int, top: float = 3.3) -> Any:
+    def sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
+        names = {ray: ("Firetruck",) for ray in range(len(pairs))} if state == NLOSV else {}
+        heights = np.full(len(pairs), top if state == NLOSV else -np.inf)
+        return SightLines(np.full(len(pairs), state), heights, names)
+
+    return sight
+
+
+@pytest.mark.parametrize(("rsu", "loss"), [(1.6, 9.0), (5.0, 5.0), (3.2, 9.0)])
+def test_a_truck_between_the_antennas_costs_the_model_s_loss(rsu: float, loss: float) -> None:
+    """TR 37.885 for a truck of 3.3 m: 9 dB where both antennas are lower, 5 dB where one looks over it."""
+    places = {"Ego": (0.0, 0.0, 1.5), "RSU": (60.0, 0.0, rsu)}
+    profile = {"shadowing_db": 0, "path_loss": {"kind": "tr37885", "blockage": "mean"}}
+    events = {state: talk(radio(1, **profile), places, 20, sight=behind(state))[0] for state in (LOS, NLOSV, NLOS)}
+    clear, blocked = (events[state][0] for state in (LOS, NLOSV))
+    assert (clear.los, clear.blockers) == ("los", ())
+    assert (blocked.los, blocked.blockers) == ("nlosv", ("Firetruck",))
+    assert events[NLOS][0].los == "nlos"
+    for first, second in zip(events[LOS], events[NLOSV], strict=True):
+        assert second.path_loss_db - first.path_loss_db == pytest.approx(loss)  # type: ignore[operator]
+        assert first.snr_db - second.snr_db == pytest.approx(loss)  # type: ignore[operator]
+    assert clear.snr_db == pytest.approx(29.0 - clear.path_loss_db + 95.0)  # type: ignore[operator]
+
+
+def test_reception_falls_with_distance_and_a_message_out_of_reach_is_not_sensed() -> None:
+    kept = []
+    for distance in (20.0, 1000.0, 2000.0, 4000.0, 30000.0):
+        places = {"A": (0.0, 0.0, 1.5), "B": (distance, 0.0, 1.5)}
+        events, _ = talk(radio(4, path_loss={"kind": "tr37885", "environment": "urban"}), places, 300, speed=10.0)
+        kept.append(np.mean([event.outcome == "delivered" for event in events]))
+    assert all(nearer >= farther for nearer, farther in pairwise(kept))
+    assert kept[0] == 1.0
+    assert kept[-1] == 0.0
+    assert {event.reason for event in events} <= {"sensing", "half_duplex"}
+
+
+def test_stations_that_hear_each_other_take_turns() -> None:
+    """Ten stations speak at once in each tick; only those that start within one slot of another are lost."""
+    places = {f"S{n}": (10.0 * n, 0.0, 1.5) for n in range(10)}
+    events, _ = talk(radio(1, **QUIET), places, 200)
+    lost = [event for event in events if event.outcome == "lost"]
+    assert {event.reason for event in lost} <= {"half_duplex", "collision", "busy"}
+    assert len(lost) / len(events) < 0.1
+    alone, _ = talk(radio(1, **QUIET), dict(list(places.items())[:1] + list(places.items())[-1:]), 200)
+    assert sum(event.outcome == "lost" for event in alone) <= 4
+
+
+def test_hidden_stations_collide_where_they_do_not_hear_each_other() -> None:
+    """A and C hear B but not each other; the middle one loses what overlaps, the longer the messages the more."""
+    sensing = {"sensing_dbm": -85.0}
+    reach = {"A": (0.0, 0.0, 1.5), "B": (4200.0, 0.0, 1.5), "C": (8400.0, 0.0, 1.5)}
+    shares = []
+    for size in (100, 1400):
+        events, _ = talk(radio(2, **{**QUIET, **sensing}), reach, 400, sizes=(size,))
+        at_middle = [event for event in events if event.receiver == "B" and event.sender != "B"]
+        assert {e.reason for e in events if {e.sender, e.receiver} == {"A", "C"}} <= {"sensing", "half_duplex"}
+        shares.append(np.mean([e.reason in ("busy", "collision", "half_duplex") for e in at_middle]))
+    assert shares[1] > 2 * shares[0] > 0.0
+
+
+def test_nobody_hears_while_it_talks_in_c_v2x() -> None:
+    """A resource of 100 ms and ten stations: some share a subframe, and lose each other's messages for a while."""
+    places = {f"S{n}": (5.0 * n, 0.0, 1.5) for n in range(10)}
+    events, _ = talk(radio(5, technology="cv2x_mode4", **QUIET), places, 400, dt=0.1)
+    reasons = {event.reason for event in events if event.outcome == "lost"}
+    assert reasons <= {"half_duplex", "propagation"}, "ten stations find ten free resources"
+    pairs = {frozenset((e.sender, e.receiver)) for e in events if e.reason == "half_duplex"}
+    assert all(any(e.sender == a and e.receiver == b for e in events if e.reason) for a, b in map(tuple, pairs)), (
+        "both lose"
+    )
+
+
+def test_the_newest_message_takes_the_place_of_one_that_waits() -> None:
+    """20 Hz into resources of 10 Hz: half of the messages are replaced, and the others are never old."""
+    places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
+    profile = {**QUIET, "technology": "cv2x_mode4", "sidelink": {"interval": 0.1}}
+    newest = talk(radio(1, queue={"discipline": "lcfs"}, **profile), places, 400)[0]
+    queued = talk(radio(1, queue={"discipline": "fifo", "length": 5}, **profile), places, 400)[0]
+    for events in (newest, queued):
+        assert np.mean([event.reason == "queue" for event in events]) == pytest.approx(0.5, abs=0.03)
+    delays = [
+        max(event.arrives - event.sent for event in events if event.arrives is not None) for events in (newest, queued)
+    ]
+    assert delays[0] < 0.16
+    assert delays[1] > 0.4
+
+
+def test_limeric_holds_a_saturated_channel_at_its_fixed_point() -> None:
+    """25 stations that always have something to say: the busy ratio settles at 0.4435 (docs of LIMERIC)."""
+    places = {f"S{n:02}": (4.0 * n, 0.0, 1.5) for n in range(25)}
+    profile = {**QUIET, "congestion": {"kind": "limeric"}, "queue": {"discipline": "lcfs"}, "jitter": 0.01}
+    carrier = radio(3, **profile)
+    times = {}
+    for tick in range(1200):
+        now = tick * 0.01
+        carrier.around(Surroundings(places))
+        carrier.transmit([(message(name, tick, now), []) for name in places], now)
+        if tick in (799, 1199):
+            times[tick] = np.mean([now * (carrier.busy_ratio(name) or 0.0) for name in places])
+    assert (times[1199] - times[799]) / 4.0 == pytest.approx(0.4435, rel=0.05)
+
+
+def test_shadowing_is_the_same_both_ways_and_correlated_over_the_way() -> None:
+    """Over 5 m with a decorrelation distance of 10 m, e^(-1/2) is left; over many links and steps."""
+    budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear", decorrelation=10.0)
+    names = [f"{n:02}" for n in range(30)]
+    series = []
+    for step in range(60):
+        places = {name: (100.0 * n, 5.0 * step if n == 0 else 0.0, 1.5) for n, name in enumerate(names)}
+        held = budget.at(Surroundings(places))
+        assert np.array_equal(held.loss, held.loss.T)
+        shadow = held.loss - held.mean_loss
+        series.append(shadow[0, 1:])
+        if step == 0:
+            still = shadow[1:, 1:]
+        assert np.array_equal(shadow[1:, 1:], still), "nothing moved between the others"
+    values = np.array(series)
+    assert values.std() == pytest.approx(3.0, abs=0.3)
+    lagged = np.mean(values[1:] * values[:-1]) / np.mean(values**2)
+    assert lagged == pytest.approx(math.exp(-0.5), abs=0.06)
+
+
+def test_a_pair_keeps_its_shadowing_when_others_come_and_go() -> None:
+    budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear")
+    two = {"B": (0.0, 0.0, 1.5), "D": (50.0, 0.0, 1.5)}
+    loss = budget.at(Surroundings(two)).loss[0, 1]
+    three = {"A": (10.0, 5.0, 1.5), **two}
+    assert budget.at(Surroundings(three)).loss[1, 2] == loss
+    assert budget.at(Surroundings(two)).loss[0, 1] == loss
+
+
+def test_stations_that_leave_take_their_messages_with_them() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5), "C": (90.0, 0.0, 1.5)}
+    carrier = radio(1, jitter=0.04)
+    carrier.around(Surroundings(places))
+    carrier.transmit([(message("A", 0, 0.0), ["B", "C"]), (message("B", 0, 0.0), ["A", "C"])], 0.0)
+    del places["B"]
+    carrier.around(Surroundings(places))
+    carrier.deliver("A", 0.05)
+    events = {(e.sender, e.receiver): e for e in carrier.transmit([], 0.05)}
+    assert {link: event.reason for link, event in events.items()} == {
+        ("A", "B"): "absent", ("A", "C"): "", ("B", "A"): "absent", ("B", "C"): "absent",
+    }  # fmt: skip
+    books = carrier.statistics(0.05)
+    assert all(book.sent == book.received + book.lost + book.in_flight == 1 for book in books.values())
+
+
+def test_a_radio_that_is_replaced_hands_over_what_waits() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
+    old = radio(1, jitter=0.04)
+    old.around(Surroundings(places))
+    old.transmit([(message("A", 0, 0.0), ["B"])], 0.0)
+    new = ComposedChannel(ComposedProfile.model_validate({"loss": {"kind": "bernoulli", "probability": 1.0}}), 1)
+    new.take_over(old)
+    told = new.transmit([(message("A", 1, 0.05), ["B"])], 0.05)
+    assert [(event.number, event.outcome) for event in told] == [(0, "delivered"), (1, "lost")]
+    assert [received.message.number for received in new.deliver("B", 0.1)] == [0]
+    book = new.statistics(0.1)["A", "B"]
+    assert (book.sent, book.received, book.lost, book.in_flight) == (2, 1, 1, 0)
+
+
+def test_background_traffic_costs_receptions_and_fills_the_channel() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (150.0, 0.0, 1.5)}
+    free = radio(1, **QUIET)
+    events, _ = talk(free, places, 1000)
+    full = radio(1, background={"kind": "80211p", "density": 0.12, "rate": 25, "size": 500}, **QUIET)
+    crowded, _ = talk(full, places, 1000)
+    assert {e.reason for e in crowded if e.outcome == "lost"} >= {"busy", "collision"}
+    kept = [{(e.sender, e.number) for e in told if e.outcome == "delivered"} for told in (events, crowded)]
+    assert kept[1] < kept[0]
+    assert (full.busy_ratio("B") or 0.0) - (free.busy_ratio("B") or 0.0) == pytest.approx(0.7737, abs=0.001)
+
+
+def test_a_message_without_listeners_still_takes_its_time_on_the_air() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
+    carrier = radio(1, **QUIET)
+    for tick in range(100):
+        carrier.around(Surroundings(places))
+        assert list(carrier.transmit([(message("A", tick, tick * DT), [])], tick * DT)) == []
+    assert carrier.busy_ratio("B") == pytest.approx(0.000448 / DT, rel=0.03)
+
+
+def test_who_was_never_placed_cannot_send() -> None:
+    with pytest.raises(ValueError, match="was not told where 'A' is"):
+        radio().transmit([(message("A", 0, 0.0), ["B"])], 0.0)
