@@ -42,13 +42,15 @@ class Rectangle(NamedTuple):
 
 @dataclass(frozen=True)
 class Fit:
-    """A box x y z l w h yaw in the level frame, its class, the covariance of its centre x y [m²], and how well the
-    points fit the class: the sum of squared deviations of its size from what is usual."""
+    """A box x y z l w h yaw in the level frame, its class, the covariance of its centre x y [m²], how well the points
+    fit the class: the sum of squared deviations of its size from what is usual; and whether something nearer hides its
+    left and its right end."""
 
     box: tuple[float, float, float, float, float, float, float]
     name: str
     covariance: Array
     deviation: float
+    hidden: tuple[bool, bool]
 
 
 def rectangle(plan: Array) -> Rectangle:
@@ -152,6 +154,7 @@ def fit_box(
         name,
         turn @ np.diag(variances) @ turn.T,
         cost + 2.0 * math.log(prior.share),
+        hidden,
     )
 
 

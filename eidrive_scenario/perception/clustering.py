@@ -22,8 +22,8 @@ COLUMNS = 2.0
 NEXT_COLUMN = 1.5
 GRAZING = math.radians(10.0)
 """Points of neighbouring columns belong together where a surface through both meets the ray at this angle or more."""
-DEEPEST = 2.5
-"""But not if one lies this much behind the other [m]."""
+DEEPEST = 3.5
+"""But not if one lies this much behind the other: less than the length of a car [m]."""
 
 
 def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> list[Integers]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import replace
 from typing import ClassVar
 
@@ -12,8 +13,6 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.perception.box_fit import Fit
-from eidrive_scenario.perception.clustering import Integers, clusters
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.lidar_geometry import (
     LevelFrame,
@@ -21,8 +20,8 @@ from eidrive_scenario.perception.lidar_geometry import (
     pattern_from_points,
     pattern_from_settings,
 )
+from eidrive_scenario.perception.lidar_objects import UNLIKELY, Found, objects
 from eidrive_scenario.perception.scan import Scan
-from eidrive_scenario.perception.size_priors import PRIORS
 from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
@@ -30,14 +29,9 @@ from eidrive_scenario.settings import Settings
 
 Array = NDArray[np.float64]
 
-FEW = 12
-"""A cluster of so few points may show no heading; then that of its lane is looked up."""
 HALF_SURE = 5.0
 """Points at which the score reaches half of what it can be."""
-UNLIKELY = 30.0
-"""Sum of squared deviations from the sizes of its class beyond which a cluster is no road user."""
-DOUBTFUL = 12.0
-"""Beyond this a cluster is looked at again, as it may be several objects close to each other."""
+TIME_TOLERANCE = 1e-6
 SAME = 0.1
 """Boxes of two sensors of one station that overlap this much show one object (intersection over union)."""
 
@@ -56,7 +50,7 @@ class LidarDetectorSettings(Settings):
 
 
 class LidarDetector(Detector):
-    """Ground removal, clustering, box fit, class by size; a sweep at a time.
+    """Ground removal, clustering, box fit, class by size; a revolution of each LiDAR at a time.
 
     The front of an object is that end that leads along its lane where a map tells, else the end that looks away.
     """
@@ -68,6 +62,7 @@ class LidarDetector(Detector):
         self.settings = settings or LidarDetectorSettings()
         self._surroundings = Surroundings(None)
         self._patterns: dict[str, Pattern] = {}
+        self._turns: dict[str, _Turn] = {}
 
     def install(self, installation: Installation) -> None:
         """Learn the map and the patterns of the sensors."""
@@ -75,60 +70,59 @@ class LidarDetector(Detector):
         for name, sensor in installation.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
+                self._turns[name] = _Turn(1.0 / sensor.rotation)
 
     def detect(self, readings: Readings) -> Detections:
         """The road users in the sweeps of all LiDARs of the station."""
         foot = float(readings.ego.position[2])
-        found = [
-            self._in_sweep(reading, self._patterns.get(name) or pattern_from_points(reading.points), foot)
-            for name, reading in readings.lidars.items()
-        ]
-        fits = [(fit, score, frame) for one in found for fit, score, frame in one]
-        if not fits:
+        restricted = self.settings.off_road is not None and self._surroundings.has_map
+        found: list[tuple[Found, LevelFrame]] = []
+        for name, reading in readings.lidars.items():
+            pattern = self._patterns.get(name) or pattern_from_points(reading.points)
+            turn = self._turns[name].add(readings.time, reading) if name in self._turns else reading
+            scan = Scan(turn, pattern, foot, self._surroundings.near_road if restricted else None)
+            found += [(one, scan.frame) for one in objects(scan, self._surroundings, self.settings.least_points)]
+        found = [(one, frame) for one, frame in found if _score(one) >= self.settings.least_score]
+        if not found:
             return Detections(readings.time)
-        boxes = np.concatenate([frame.boxes_to_world(np.array([fit.box])) for fit, _, frame in fits])
+        boxes = np.concatenate([frame.boxes_to_world(np.array([one.fit.box])) for one, frame in found])
         boxes[:, 6] = self._surroundings.facing(boxes)
         detections = Detections(
             readings.time,
             boxes,
-            np.array([score for _, score, _ in fits]),
-            tuple(fit.name for fit, _, _ in fits),
-            np.full((len(fits), 2), np.nan),
-            np.concatenate([frame.covariance_to_world(fit.covariance[None]) for fit, _, frame in fits]),
+            np.array([_score(one) for one, _ in found]),
+            tuple(one.fit.name for one, _ in found),
+            np.full((len(found), 2), np.nan),
+            np.concatenate([frame.covariance_to_world(one.fit.covariance[None]) for one, frame in found]),
         )
         return detections if len(readings.lidars) < 2 else _without_doubles(detections)
 
-    def _in_sweep(self, reading: LidarReading, pattern: Pattern, foot: float) -> list[tuple[Fit, float, LevelFrame]]:
-        restricted = self.settings.off_road is not None and self._surroundings.has_map
-        scan = Scan(reading, pattern, foot, self._surroundings.near_road if restricted else None)
-        found = []
-        for rows in clusters(scan.points, pattern.azimuth):
-            for fit, count in self._fits(scan, rows):
-                score = count / (count + HALF_SURE) * math.exp(-fit.deviation / UNLIKELY)
-                if fit.deviation <= UNLIKELY and score >= self.settings.least_score:
-                    found.append((fit, score, scan.frame))
-        return found
 
-    def _fits(self, scan: Scan, rows: Integers) -> list[tuple[Fit, int]]:
-        """The objects in a cluster with their points: one, or several where that fits better."""
-        if len(rows) < self.settings.least_points:
-            return []
-        whole = self._fit(scan, rows)
-        if whole is not None and whole.deviation <= DOUBTFUL:
-            return [(whole, len(rows))]
-        parts = clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)
-        if len(parts) > 1:
-            own = [rows[part] for part in parts if len(part) >= self.settings.least_points]
-            fits = [(self._fit(scan, part), len(part)) for part in own]
-            good = [(fit, count) for fit, count in fits if fit is not None and fit.deviation <= DOUBTFUL]
-            if good:
-                return good
-        return [(whole, len(rows))] if whole is not None else []
+class _Turn:
+    """The readings of one sensor that cover its last revolution, where each covers only a part of it."""
 
-    def _fit(self, scan: Scan, rows: Integers) -> Fit | None:
-        middle = scan.frame.to_world(scan.points[rows, :2].mean(axis=0)[None])
-        lane = float(self._surroundings.lane_heading(middle)[0]) if len(rows) < FEW else math.nan
-        return scan.fit(rows, tuple(PRIORS), lane - scan.frame.yaw if math.isfinite(lane) else None)
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._parts: deque[tuple[float, LidarReading]] = deque()
+
+    def add(self, time: float, reading: LidarReading) -> LidarReading:
+        """All of them, as seen from where the newest was taken."""
+        while self._parts and self._parts[0][0] <= time - self._period + TIME_TOLERANCE:
+            self._parts.popleft()
+        self._parts.append((time, reading))
+        if len(self._parts) == 1:
+            return reading
+        turn, place = reading.pose[:3, :3], reading.pose[:3, 3]
+        points = [
+            (old.points @ old.pose[:3, :3].T + old.pose[:3, 3] - place) @ turn for _, old in list(self._parts)[:-1]
+        ]
+        intensities = [old.intensity for _, old in self._parts]
+        return LidarReading(np.concatenate([*points, reading.points]), np.concatenate(intensities), reading.pose)
+
+
+def _score(found: Found) -> float:
+    """Half for five points that fit a class well; less where the size is unusual."""
+    return len(found.rows) / (len(found.rows) + HALF_SURE) * math.exp(-found.fit.deviation / UNLIKELY)
 
 
 def _without_doubles(detections: Detections) -> Detections:

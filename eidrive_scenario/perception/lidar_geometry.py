@@ -85,8 +85,9 @@ class Pattern(NamedTuple):
 def pattern_from_settings(settings: LidarSettings) -> Pattern:
     """The pattern of a sensor whose settings are known."""
     columns = max(1, round(settings.points_per_second / settings.channels / settings.rotation))
-    spread = math.radians(settings.upper_fov - settings.lower_fov)
-    return Pattern(2.0 * math.pi / columns, spread / max(settings.channels - 1, 1), math.radians(settings.upper_fov))
+    rings = settings.elevations or (settings.upper_fov, settings.lower_fov)
+    spread = math.radians(max(rings) - min(rings)) / max(settings.channels - 1, 1)
+    return Pattern(2.0 * math.pi / columns, spread or USUAL_STEP, math.radians(max(rings)))
 
 
 def pattern_from_points(points: Array) -> Pattern:
