@@ -77,7 +77,7 @@ class Fixture(NamedTuple):
 
 
 class SignalHead(NamedTuple):
-    """The part of a signal that one looks at: pose of the middle of its lower edge, facing the traffic.
+    """The part of a signal that one looks at: pose of the middle of its lower edge, facing the traffic before its post.
 
     carried   whether a post below carries it
     """
@@ -97,12 +97,10 @@ def fixtures(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Fixt
             yield found
     for head in signal_heads(roads):
         if head.carried:
-            foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t).z
-            behind = -POST - 0.02
-            x, y = head.pose.x + behind * math.cos(head.pose.h), head.pose.y + behind * math.sin(head.pose.h)
-            top = head.pose.z + head.height - foot
+            foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t)
+            top = head.pose.z + head.height - foot.z
             name = f"signal {head.signal.id}"
-            yield Fixture(name, "post", Pose(x, y, foot, head.pose.h, 0.0, 0.0), 0.0, 0.0, top, POST)
+            yield Fixture(name, "post", foot._replace(h=head.pose.h, p=0.0, r=0.0), 0.0, 0.0, top, POST)
 
 
 def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
@@ -134,7 +132,9 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
     else:
         low = pose.z - signal.z_offset + CLEARANCE
         height = signal.height if 0.3 <= signal.height <= 1.3 else height
-    return SignalHead(signal, pose._replace(z=low), width, height, carried)
+    ahead = POST + 0.03 + (0.5 * width if lamps else 0.0)
+    x, y = pose.x + ahead * math.cos(pose.h), pose.y + ahead * math.sin(pose.h)
+    return SignalHead(signal, pose._replace(x=x, y=y, z=low), width, height, carried)
 
 
 def _painted(signal: Signal) -> bool:
