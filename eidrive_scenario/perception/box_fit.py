@@ -120,8 +120,9 @@ def fit_box(
     x, y = points[:, :2].mean(axis=0).tolist()
     widest = max(shape.high[0] - shape.low[0], shape.high[1] - shape.low[1])
     shapeless = widest < SHAPELESS
+    axes: tuple[int, ...] = (0, 1)
     if heading is not None and widest < max(SHAPELESS, FEW_COLUMNS * pattern.azimuth * math.hypot(x, y)):
-        shape = bounds(points[:, :2], heading)
+        shape, axes = bounds(points[:, :2], heading), (0,)
     elif shapeless:
         shape = bounds(points[:, :2], math.atan2(y, x))
     top = float(points[:, 2].max()) - ground
@@ -130,7 +131,7 @@ def fit_box(
     cost, name, lengthwise = min(
         (_cost(prior_of(name), spans, lengthwise, top, highest), name, lengthwise)
         for name in classes
-        for lengthwise in (0, 1)
+        for lengthwise in axes
     )
     prior = prior_of(name)
     order = (0, 1) if lengthwise == 0 else (1, 0)

@@ -1,0 +1,93 @@
+"""Cars around a station in the world, from wherever and mirrored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.settings import SensorSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+
+Size = tuple[float, float, float]
+CAR: Size = (4.892, 1.837, 1.49)
+SIZES: Mapping[str, Size] = {
+    "car": CAR,
+    "truck": (8.468, 2.891, 3.827),
+    "van": (5.9, 2.0, 2.6),
+    "bus": (12.0, 2.6, 3.2),
+    "motorbike": (2.2, 0.8, 1.6),
+    "pedestrian": (0.5, 0.5, 1.75),
+}
+WHEELS = frozenset({"car", "truck", "van", "bus"})
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object by its box centre and heading."""
+
+    name: str
+    x: float
+    y: float
+    yaw: float = 0.0
+    kind: str = "car"
+
+    @property
+    def size(self) -> Size:
+        return SIZES[self.kind]
+
+    @property
+    def box(self) -> np.ndarray:
+        return np.array([self.x, self.y, self.size[2] / 2, *self.size, self.yaw])
+
+    def turned(self, angle: float) -> Thing:
+        """The same in a scene turned about the origin."""
+        cos, sin = math.cos(angle), math.sin(angle)
+        return Thing(self.name, cos * self.x - sin * self.y, sin * self.x + cos * self.y, self.yaw + angle, self.kind)
+
+    def mirrored(self) -> Thing:
+        """The same in a scene mirrored at the x axis."""
+        return Thing(self.name, self.x, -self.y, -self.yaw, self.kind)
+
+
+def spec_of(thing: Thing) -> ActorSpec:
+    height = thing.size[2] / 2
+    wheelbase = 0.6 * thing.size[0] if thing.kind in WHEELS else 0.0
+    return ActorSpec(thing.name, thing.kind, thing.kind, thing.size, (0.0, 0.0, height), wheelbase=wheelbase)
+
+
+MAST = ActorSpec("Mast", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+
+
+def readings(
+    things: list[Thing], sensors: Mapping[str, SensorSettings], *, mast: tuple[float, float, float] | None = None
+) -> Readings:
+    """What the first of the things sees at time 0, or a mast at x, y, yaw."""
+    with World(None, dt=0.05) as world:
+        station = spec_of(things[0]) if mast is None else MAST
+        if mast is not None:
+            world.add(MAST, Placement(mast[0], mast[1], yaw=mast[2]))
+        for thing in things:
+            world.add(spec_of(thing), Placement(thing.x, thing.y, yaw=thing.yaw))
+        return Rig(station, dict(sensors), seed=1).read(world, world.view())
+
+
+@dataclass(frozen=True)
+class Street:
+    """The tools of this folder's tests."""
+
+    thing = Thing
+    readings = staticmethod(readings)
+    spec = staticmethod(spec_of)
+    mast = MAST
+
+
+@pytest.fixture
+def street() -> Street:
+    return Street()

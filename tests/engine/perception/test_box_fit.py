@@ -1,0 +1,154 @@
+"""L-shapes, sizes and what is not seen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.perception.box_fit import Fit, fit_box, rectangle
+from eidrive_scenario.perception.lidar_geometry import Pattern
+
+PATTERN = Pattern(math.radians(1.0), math.radians(1.0), math.radians(15.0))
+CLASSES = ("car", "van", "truck", "bus", "motorbike", "bicycle", "pedestrian")
+
+
+def outline(x: float, y: float, length: float, width: float, yaw: float, step: float = 0.1) -> np.ndarray:
+    """Points on the sides of a rectangle that face the origin."""
+    along, across = (np.arange(-size / 2, size / 2 + 1e-9, step) for size in (length, width))
+    sides = [(np.column_stack([along, np.full(len(along), s * width / 2)]), (0.0, s)) for s in (1.0, -1.0)] + [
+        (np.column_stack([np.full(len(across), s * length / 2), across]), (s, 0.0)) for s in (1.0, -1.0)
+    ]
+    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    seen = []
+    for points, normal in sides:
+        placed = points @ turn.T + (x, y)
+        if (turn @ normal) @ placed.mean(axis=0) < 0.0:
+            seen.append(placed)
+    return np.concatenate(seen)
+
+
+def standing(plan: np.ndarray, height: float) -> np.ndarray:
+    """The same points at several heights up to a top."""
+    levels = np.linspace(0.3, height, 5)
+    return np.concatenate([np.column_stack([plan, np.full(len(plan), level)]) for level in levels])
+
+
+def fitted(points: np.ndarray, **options: object) -> Fit:
+    given = {"sensor_height": 1.9, "ground": 0.0, "pattern": PATTERN, "classes": CLASSES}
+    return fit_box(points, **{**given, **options})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("degrees", [0, 10, 25, 44, 46, 70, 89])
+def test_the_heading_of_an_l(degrees: int) -> None:
+    shape = rectangle(outline(12, 4, 4.6, 1.8, math.radians(degrees)))
+    off = math.degrees(shape.yaw) - degrees
+    assert (off + 45) % 90 - 45 == pytest.approx(0.0, abs=0.51)
+
+
+def test_noise_moves_the_heading_little() -> None:
+    rng = np.random.default_rng(5)
+    offs = []
+    for degrees in range(5, 85, 5):
+        plan = outline(12, 4, 4.6, 1.8, math.radians(degrees), step=0.3)
+        shape = rectangle(plan + rng.normal(0, 0.03, plan.shape))
+        offs.append((math.degrees(shape.yaw) - degrees + 45) % 90 - 45)
+    assert max(map(abs, offs)) < 5.0
+    assert np.std(offs) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("car", (4.6, 1.85, 1.5)),
+        ("van", (5.8, 2.1, 2.5)),
+        ("truck", (8.4, 2.7, 3.6)),
+        ("bus", (11.5, 2.7, 3.4)),
+        ("motorbike", (2.2, 0.8, 1.5)),
+        ("pedestrian", (0.5, 0.5, 1.75)),
+    ],
+)
+@pytest.mark.parametrize("degrees", [20, 60])
+def test_classes_and_boxes_of_whole_objects(name: str, size: tuple[float, float, float], degrees: int) -> None:
+    length, width, height = size
+    dense = Pattern(math.radians(0.1), math.radians(0.1), math.radians(15.0))
+    found = fitted(standing(outline(14, 3, length, width, math.radians(degrees)), height), pattern=dense)
+    assert found.name == name
+    assert math.dist(found.box[:2], (14, 3)) < 0.15
+    assert found.box[3:6] == pytest.approx(size, abs=0.2)
+    if name != "pedestrian":
+        off = math.degrees(found.box[6]) - degrees
+        assert (off + 90) % 180 - 90 == pytest.approx(0.0, abs=2.0)
+
+
+def test_a_rear_alone_is_completed_away_from_the_sensor() -> None:
+    """Only the rear of a car straight ahead, 1.85 m wide at x = 15: the centre lies half a usual length behind it."""
+    rear = np.column_stack([np.full(19, 15.0), np.linspace(-0.925, 0.925, 19)])
+    found = fitted(standing(rear, 1.5))
+    assert found.name == "car"
+    assert found.box[0] == pytest.approx(15.0 + 2.3, abs=0.05)
+    assert found.box[1] == pytest.approx(0.0, abs=0.02)
+    assert abs(found.box[6]) < 0.02
+    assert found.covariance[0, 0] == pytest.approx((0.35 / 2) ** 2, rel=0.1)
+    assert found.covariance[1, 1] < 0.01
+
+
+def test_what_is_hidden_is_completed_behind_what_hides_it() -> None:
+    """The front 2 m of a car that crosses from the left, its rest behind a truck: the hidden end is the left one."""
+    flank = np.column_stack([np.full(21, 20.0), np.linspace(-1.0, 1.0, 21)])
+    left, right, none = (
+        fitted(standing(flank, 1.5), hidden=flags, classes=("car",))
+        for flags in ((True, False), (False, True), (False, False))
+    )
+    assert left.box[1] == pytest.approx(-1.0 + 2.3, abs=0.1)
+    assert right.box[1] == pytest.approx(1.0 - 2.3, abs=0.1)
+    assert none.box[1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_few_points_take_the_heading_that_is_known() -> None:
+    """Three points above each other 40 m away, on a lane that leads north-east."""
+    column = np.array([[40.0, 0.0, z] for z in (0.4, 0.8, 1.2)])
+    known = fitted(column, heading=math.radians(45), classes=("car",))
+    unknown = fitted(column, classes=("car",))
+    assert math.degrees(known.box[6]) == pytest.approx(45.0)
+    assert unknown.box[6] == pytest.approx(0.0)
+    assert unknown.covariance[0, 0] > known.covariance[0, 0]
+
+
+def test_two_things_that_no_body_spans_do_not_fit() -> None:
+    """Cars 6 m apart, side by side, taken for one cluster: 8 m wide and 1.5 m high is nothing."""
+    both = np.concatenate([outline(20, y, 4.6, 1.85, 0.0) for y in (-3, 3)])
+    assert fitted(standing(both, 1.5)).deviation > 16.0
+    assert fitted(standing(outline(20, 3, 4.6, 1.85, 0.0), 1.5)).deviation < 3.0
+
+
+def test_a_mirrored_object_has_a_mirrored_box() -> None:
+    points = standing(outline(14, 3, 4.6, 1.85, 0.6), 1.5)
+    one, other = fitted(points), fitted(points * (1, -1, 1))
+    np.testing.assert_allclose(np.array(one.box) * (1, -1, 1, 1, 1, 1, -1), other.box, atol=1e-9)
+    np.testing.assert_allclose(one.covariance * [[1, -1], [-1, 1]], other.covariance, atol=1e-9)
+
+
+def test_its_uncertainty_covers_its_errors() -> None:
+    """Cars of usual, varied sizes seen from all sides with sparse rays: their squared Mahalanobis distances."""
+    rng = np.random.default_rng(8)
+    distances = []
+    for _ in range(150):
+        length, width = rng.normal(4.6, 0.35), rng.normal(1.85, 0.12)
+        bearing, reach, yaw = rng.uniform(-3, 3), rng.uniform(8, 30), rng.uniform(-3, 3)
+        x, y = reach * math.cos(bearing), reach * math.sin(bearing)
+        plan = outline(x, y, length, width, yaw, step=0.02)
+        step = math.radians(2.0)
+        column = np.floor(np.arctan2(plan[:, 1], plan[:, 0]) / step + rng.uniform())
+        _, first = np.unique(column, return_index=True)
+        plan = plan[first]
+        if len(plan) < 3:
+            continue
+        points = standing(plan + rng.normal(0, 0.02, plan.shape), 1.5)
+        found = fitted(points, pattern=Pattern(step, math.radians(1.3), math.radians(10)), classes=("car",))
+        off = np.array(found.box[:2]) - (x, y)
+        distances.append(float(off @ np.linalg.solve(found.covariance, off)))
+    assert len(distances) > 100
+    assert 0.5 < float(np.mean(np.minimum(distances, 30.0))) < 6.0
+    assert float(np.median(distances)) < 3.0
