@@ -36,22 +36,30 @@ class ConditionMonitor:
         """What the condition was when it was last asked, without edge and delay; None before the first time."""
         self.result = False
         """What it counted as then."""
+        self.triggering: tuple[str, ...] = ()
+        """The entities that made it so: those that fulfilled it or, where it counts as it ends, had fulfilled it."""
+        self._fulfilled: tuple[str, ...] = ()
         self._recorded = False
-        self._history: deque[tuple[float, bool, str]] = deque()
-        self._delayed = (False, "")
+        self._history: deque[tuple[float, bool, str, tuple[str, ...]]] = deque()
+        self._delayed: tuple[bool, str] = (False, "")
 
     def evaluate(self, stage: Stage) -> bool:
         """Ask the condition once and answer with edge and delay. Called at most once per tick."""
         result = self._edge(self.condition.holds(stage))
-        self.result = result if self.delay <= 0.0 else self._late(stage, result)
+        before, self._fulfilled = self._fulfilled, getattr(self.condition, "fulfilled", ())
+        who = self._fulfilled if self.value else before
+        if self.delay <= 0.0:
+            self.result, self.triggering = result, who
+        else:
+            self.result = self._late(stage, result, who)
         return self.result
 
-    def _late(self, stage: Stage, result: bool) -> bool:
+    def _late(self, stage: Stage, result: bool, who: tuple[str, ...]) -> bool:
         if result != self._recorded:
             self._recorded = result
-            self._history.append((stage.time, result, self.condition.explain(stage) if result else ""))
+            self._history.append((stage.time, result, self.condition.explain(stage) if result else "", who))
         while self._history and self._history[0][0] <= stage.time - self.delay + TINY:
-            _, value, text = self._history.popleft()
+            _, value, text, self.triggering = self._history.popleft()
             self._delayed = (value, text)
         return self._delayed[0]
 
@@ -114,7 +122,7 @@ class Trigger:
         if fired:
             monitors = fired[0].monitors
             self.why = " and ".join(monitor.why(stage) for monitor in monitors)
-            names = [name for monitor in monitors for name in getattr(monitor.condition, "fulfilled", ())]
+            names = [name for monitor in monitors for name in monitor.triggering]
             self.triggering = tuple(dict.fromkeys(names))
         if self.witness is not None:
             self.witness.saw(stage)

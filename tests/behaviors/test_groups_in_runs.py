@@ -77,11 +77,30 @@ def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
     assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(50)))).begun("event 0") == []
 
 
-def test_the_entities_that_triggered_act(group: Any) -> None:
-    """selectTriggeringEntities: Second and Third are slower than 15 m/s, and so they become actors."""
+def test_the_entities_that_triggered_act_beside_the_actors(group: Any) -> None:
+    """selectTriggeringEntities: Second and Third are slower than 15 m/s."""
     slower = by("all", '<SpeedCondition value="15" rule="lessThan"/>')
-    played = group(1, ("Ego", SPEED, slower))
-    assert [played.of(name, "speed")[-1] for name in CARS] == [5, 10, 10]
+    played = group(1, ("Ego", SPEED, slower), by_trigger=True)
+    assert [played.of(name, "speed")[-1] for name in CARS] == [5, 5, 5]
+    played = group(1, ("Second", SPEED, by("all", '<SpeedCondition value="15" rule="greaterThan"/>')), by_trigger=True)
+    assert [played.of(name, "speed")[-1] for name in CARS] == [5, 5, 10]
+    assert [group(1, ("Ego", SPEED, slower)).of(name, "speed")[-1] for name in CARS] == [5, 10, 10]
+
+
+def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
+    """Ego is faster than 15 m/s until 0.5 s, and no one is when the trigger fires."""
+    slow_down = ("Ego", SPEED, after(0.5))
+    fast = by("all", '<SpeedCondition value="15" rule="greaterThan"/>')
+    brighter = private(
+        '<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="lowBeam"/></LightType>'
+        '<LightState mode="on"/></LightStateAction></AppearanceAction>'
+    )
+    falling = group(2, slow_down[:2], ("Third", brighter, fast), by_trigger=True, edge="falling")
+    assert falling.begun("event 1") == pytest.approx([0.05])
+    assert set(falling.frames[-1].appearances) == {"Ego", "Third"}
+    late = group(2, (*slow_down[:2],), ("Third", brighter, fast), by_trigger=True, delay=0.8)
+    assert late.begun("event 1") == pytest.approx([0.8])
+    assert set(late.frames[-1].appearances) == {"Ego", "Third"}
 
 
 def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any) -> None:

@@ -73,6 +73,9 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
         during: Callable[[Simulation, Frame], None] | None = None,
         settings: RunSettings | None = None,
         seed: int = 0,
+        by_trigger: bool = False,
+        edge: str = "none",
+        delay: float = 0.0,
     ) -> Watched:
         (tmp_path / "street.xodr").write_text(street)
         groups = "".join(
@@ -80,10 +83,13 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
                 number=number,
                 actor=actor,
                 action=action,
-                trigger=TRIGGER.format(edge="none", condition=condition[0]) if condition else "",
+                trigger=TRIGGER.format(edge=edge, condition=condition[0]) if condition else "",
             )
             for number, (actor, action, *condition) in enumerate(steps)
         )
+        groups = groups.replace('delay="0"', f'delay="{delay}"')
+        if by_trigger:
+            groups = groups.replace('selectTriggeringEntities="false"', 'selectTriggeringEntities="true"')
         places = {"Ego": ego, **(others or {})}
         text = FILE.format(
             cars="".join(CAR.format(name=n, controller=OURS if driven and n == "Ego" else "") for n in places),
