@@ -95,6 +95,7 @@ class ActionElement(StoryElement):
         if self.by_trigger:
             actors = tuple(dict.fromkeys([*actors, *triggering]))
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
+        self.stand_by()
         self.executions += 1
         self._change(Transition.START, State.RUNNING)
         for behaviour in self.running:

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.errors import RegistryError
+from eidrive_scenario.errors import Problem, RegistryError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.storyboard.actor import Actor
+from eidrive_scenario.storyboard.actor import Actor, is_ours
 
 if TYPE_CHECKING:
     from eidrive_scenario.storyboard.stage import Stage
@@ -62,3 +62,18 @@ def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, st
                     raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
                 found.append(made)
     return found
+
+
+def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Problem]:
+    """Warnings of controllers that name no module of ours and for which nothing stands in."""
+    return [
+        Problem(
+            f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
+            "give it the property module=eidrive, or let something stand in for it",
+            controller.source,
+            controller.line,
+        )
+        for actor in actors.values()
+        for controller in actor.controllers
+        if not is_ours(controller) and controller.name not in wanted
+    ]

@@ -15,7 +15,7 @@ from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.stand_in import stand_ins
+from eidrive_scenario.storyboard.stand_in import left_alone, stand_ins
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind
 from eidrive_scenario.world.view import WorldView
@@ -51,6 +51,7 @@ class Storyboard:
         self._external = ExternalObjects(scenario, roads)
         self.stage.warnings += self._external.warnings
         self._stand_ins = stand_ins(self.stage.actors, self.stage, controllers or {}, registry("controllers"))
+        self.stage.warnings += left_alone(self.stage.actors, controllers or {})
         self.ended: str | None = None
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 

@@ -126,6 +126,18 @@ def task(stage: Stage) -> Callable[..., Task]:
 
 
 @pytest.fixture
+def fresh() -> Callable[[], tuple[Stage, Clock, type[Script], Callable[..., Task]]]:
+    """Makes a stage, its clock, and makers of conditions and actions on it; anew for each example of a property."""
+    scenario = load_scenario(SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB")).encode())
+
+    def made() -> tuple[Stage, Clock, type[Script], Callable[..., Task]]:
+        stage = Stage(scenario, None, dt=0.1, seed=0, nobody=empty_view(tick=-1))
+        return stage, Clock(stage, 0.1), Script, lambda ticks, **more: Task(stage, ticks, **more)
+
+    return made
+
+
+@pytest.fixture
 def street() -> RoadNetwork:
     """A straight street along x, 200 m: lane 1 (y = 2, towards -x), lanes -1 (y = -2) and -2 (y = -6, towards +x)."""
     return RoadNetwork.parse(ROAD.format(length=200, shape="<line/>"))

@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.storyboard.rendering import render
+from eidrive_scenario.storyboard.states import Transition
 
 TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
 AT = '<WorldPosition x="{x}" y="0"/>'
@@ -157,21 +157,46 @@ def test_a_reference_to_no_element_is_an_error_with_the_nearest_name(build: Any)
         build(STARTS, EVENT.format(name="go", action=action, trigger=trigger))
 
 
-def test_the_tree_in_words(build: Any) -> None:
-    trigger = AFTER.format(kind="Start", edge="rising", value=2)
-    event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=3, speed=20), trigger=trigger)
-    stop = AFTER.format(kind="Stop", edge="none", value=9)
-    assert render(build(STARTS, event, stop)).splitlines() == [
-        "storyboard",
-        "├─ Init",
-        "│  ├─ A: teleport to WorldPosition x 5 y 0",
-        "│  └─ A: speed to 10 m/s, at once",
-        "├─ story story",
-        "│  └─ act act",
-        "│     └─ group group",
-        "│        └─ maneuver maneuver",
-        "│           └─ event go (override)",
-        "│              ├─ when simulation time > 2 s becomes true",
-        "│              └─ action go action: A: speed to 20 m/s, linear in 3 s",
-        "└─ stop when simulation time > 9 s",
-    ]
+WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" conditionEdge="none"><ByValueCondition>
+  <StoryboardElementStateCondition storyboardElementType="{kind}" storyboardElementRef="{name}" state="{state}"/>
+  </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "state", "when"),
+    [
+        ("event", "first", "startTransition", 0.0),
+        ("action", "first", "startTransition", 0.0),
+        ("event", "first", "runningState", 0.0),
+        ("event", "first", "endTransition", 0.3),
+        ("action", "first", "endTransition", 0.3),
+        ("event", "first", "completeState", 0.3),
+    ],
+)
+def test_a_start_is_seen_at_once_and_an_end_at_the_next_instant(
+    build: Any, kind: Any, name: Any, state: Any, when: Any
+) -> None:
+    """The first event's action takes from 0 s to 0.3 s: it ends with its third step, whose end is the next view."""
+    events = EVENT.format(name="first", action=SPEED.format(shape="linear", value=0.3, speed=12), trigger="")
+    watch = WATCH.format(kind=kind, name=f"{name} action" if kind == "action" else name, state=state)
+    events += EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
+    storyboard = build(STARTS, events)
+    assert starts(storyboard, "second") == pytest.approx([when])
+
+
+def test_a_transition_is_seen_once(build: Any) -> None:
+    events = EVENT.format(name="first", action=SPEED.format(shape="step", value=0, speed=20), trigger="")
+    watch = WATCH.format(kind="event", name="first", state="endTransition")
+    second = EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)
+    storyboard = build(STARTS, events + second.replace("<Event ", '<Event maximumExecutionCount="3" ', 1))
+    assert len(starts(storyboard, "second")) == 1
+
+
+def starts(storyboard: Any, event: str) -> list[float]:
+    """When an event starts within 10 ticks [s]."""
+    placements, moments = dict(storyboard.initial().additions), []
+    for tick in range(10):
+        commands = storyboard.tick(view_of(placements, tick, storyboard.stage.view))
+        placements.update(commands.placements)
+        moments += [c.time for c in storyboard.changes if c.element == event and c.transition is Transition.START]
+    return moments

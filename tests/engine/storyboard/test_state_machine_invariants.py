@@ -1,0 +1,254 @@
+"""What the standard says of every storyboard, under random trees, priorities, counts and triggers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from eidrive_scenario.storyboard.domains import Domain
+from eidrive_scenario.storyboard.elements import (
+    ActElement,
+    ManeuverElement,
+    ManeuverGroupElement,
+    StoryboardElement,
+    StoryElement,
+    StoryNode,
+)
+from eidrive_scenario.storyboard.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+
+TICKS = 14
+LEGAL = {
+    Transition.START: {(State.STANDBY, State.RUNNING)},
+    Transition.END: {(State.RUNNING, State.COMPLETE), (State.RUNNING, State.STANDBY)},
+    Transition.STOP: {(State.STANDBY, State.COMPLETE), (State.RUNNING, State.COMPLETE)},
+    Transition.SKIP: {(State.STANDBY, State.STANDBY)},
+}
+
+
+@dataclass(frozen=True)
+class Condition:
+    values: list[bool]
+    edge: str
+    delay: float
+
+
+@dataclass(frozen=True)
+class Event:
+    priority: str
+    limit: int
+    start: list[list[Condition]] | None
+    tasks: list[tuple[int, str, Domain]]
+
+
+@dataclass(frozen=True)
+class Act:
+    start: list[list[Condition]] | None
+    stop: list[list[Condition]] | None
+    groups: list[tuple[int, list[list[Event]]]]
+
+
+CONDITIONS = st.builds(
+    Condition,
+    values=st.lists(st.booleans(), min_size=1, max_size=8),
+    edge=st.sampled_from(["none", "rising", "falling", "risingOrFalling"]),
+    delay=st.sampled_from([0.0, 0.0, 0.1, 0.25]),
+)
+TRIGGERS = st.none() | st.lists(st.lists(CONDITIONS, min_size=1, max_size=2), min_size=1, max_size=2)
+DOMAINS = st.sampled_from([Domain.LONGITUDINAL, Domain.LATERAL, Domain.LONGITUDINAL | Domain.LATERAL, Domain.NONE])
+EVENTS = st.builds(
+    Event,
+    priority=st.sampled_from(["override", "overwrite", "skip", "parallel"]),
+    limit=st.integers(1, 3),
+    start=TRIGGERS,
+    tasks=st.lists(st.tuples(st.integers(1, 4), st.sampled_from("AB"), DOMAINS), max_size=2),
+)
+MANEUVERS = st.lists(st.lists(EVENTS, min_size=1, max_size=3), min_size=1, max_size=2)
+GROUPS = st.lists(st.tuples(st.integers(1, 2), MANEUVERS), min_size=1, max_size=2)
+ACTS = st.lists(st.builds(Act, start=TRIGGERS, stop=TRIGGERS, groups=GROUPS), min_size=1, max_size=2)
+
+
+class Tree:
+    """A storyboard made from a plan, and its course."""
+
+    def __init__(
+        self, plan: list[Act], stop: list[list[Condition]] | None, stage: Stage, script: Any, task: Any
+    ) -> None:
+        self.stage, self._script, self._task = stage, script, task
+        self.scripts: list[Any] = []
+        acts = [self._act(act, f"act{number}") for number, act in enumerate(plan)]
+        self.root = StoryboardElement(
+            stage, ("storyboard",), [StoryNode(stage, ("story",), acts)], stop=self._wait(stop)
+        )
+        self.elements = {element.name: element for element in below(self.root)}
+
+    def _wait(self, groups: list[list[Condition]] | None) -> WaitFor | None:
+        if groups is None:
+            return None
+        made = []
+        for group in groups:
+            scripts = [self._script(one.values) for one in group]
+            self.scripts += scripts
+            monitors = (
+                ConditionMonitor(script, edge=one.edge, delay=one.delay)
+                for script, one in zip(scripts, group, strict=True)
+            )
+            made.append(ConditionGroup(tuple(monitors)))
+        return WaitFor("trigger", Trigger(made), self.stage)
+
+    def _act(self, act: Act, name: str) -> ActElement:
+        groups = []
+        for number, (limit, maneuvers) in enumerate(act.groups):
+            path = f"{name}.{number}"
+            children = [self._maneuver(events, f"{path}.{index}") for index, events in enumerate(maneuvers)]
+            groups.append(ManeuverGroupElement(self.stage, (path,), children, limit=limit))
+        return ActElement(self.stage, (name,), groups, start=self._wait(act.start), stop=self._wait(act.stop))
+
+    def _maneuver(self, plans: list[Event], name: str) -> ManeuverElement:
+        events = [self._event(plan, f"{name}.{number}") for number, plan in enumerate(plans)]
+        for event in events:
+            event.rivals = tuple(other for other in events if other is not event)
+        return ManeuverElement(self.stage, (name,), events)
+
+    def _event(self, plan: Event, name: str) -> EventElement:
+        actions = []
+        for number, (ticks, actor, domain) in enumerate(plan.tasks):
+            behaviour = self._task(ticks, actor=actor, domain=domain)
+            make = {actor: [behaviour]}.__getitem__
+            actions.append(ActionElement(self.stage, (f"{name}.{number}",), make, [actor]))
+        return EventElement(
+            self.stage, (name,), actions, priority=plan.priority, start=self._wait(plan.start), limit=plan.limit
+        )
+
+    def tick(self) -> list[StateChange]:
+        if self.root.state is None:
+            self.root.stand_by()
+            self.root.begin()
+        self.root.judge()
+        self.root.tick_once()
+        return list(self.stage.progress.changes)
+
+
+def below(element: StoryElement) -> Iterator[StoryElement]:
+    yield element
+    for child in element.elements:
+        yield from below(child)
+
+
+def play(plan: list[Act], stop: Any, fresh: Any) -> Iterator[tuple[Tree, list[StateChange]]]:
+    stage, clock, script, task = fresh()
+    tree = Tree(plan, stop, stage, script, task)
+    for _ in range(TICKS):
+        clock.step()
+        yield tree, tree.tick()
+
+
+RANDOM = settings(
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_every_change_is_a_legal_transition(plan: Any, stop: Any, fresh: Any) -> None:
+    for tree, changes in play(plan, stop, fresh):
+        for change in changes:
+            assert change.time == tree.stage.time
+            if change.transition is not None:
+                assert (change.before, change.after) in LEGAL[change.transition]
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_nothing_runs_or_waits_under_what_does_not_run(plan: Any, stop: Any, fresh: Any) -> None:
+    for tree, _ in play(plan, stop, fresh):
+        for element in tree.elements.values():
+            if element.state is not State.RUNNING:
+                assert all(child.state is not State.RUNNING for child in element.elements)
+            if element.state is State.COMPLETE:
+                assert all(child.state is not State.STANDBY for child in element.elements)
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_an_element_ends_when_all_below_has_come_to_its_end(plan: Any, stop: Any, fresh: Any) -> None:
+    states: dict[str, State] = {}
+    for tree, changes in play(plan, stop, fresh):
+        for change in changes:
+            if change.transition is Transition.END:
+                children = tree.elements[change.element].elements
+                assert all(states.get(child.name) is State.COMPLETE for child in children)
+            states[change.element] = change.after
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_nothing_is_executed_more_often_than_it_may(plan: Any, stop: Any, fresh: Any) -> None:
+    for tree, _ in play(plan, stop, fresh):
+        assert all(element.executions <= element.limit for element in tree.elements.values())
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_priorities_bind_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: Any) -> None:
+    states: dict[str, State] = {}
+    for tree, changes in play(plan, stop, fresh):
+        for change in changes:
+            event = tree.elements[change.element]
+            if isinstance(event, EventElement):
+                rivals = [states.get(rival.name) is State.RUNNING for rival in event.rivals]
+                if change.transition is Transition.START and event.priority != "parallel":
+                    assert not any(rivals)
+                if change.transition is Transition.SKIP:
+                    assert event.priority == "skip"
+                    assert any(rivals)
+            states[change.element] = change.after
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_no_two_actions_control_one_domain_of_an_actor(plan: Any, stop: Any, fresh: Any) -> None:
+    for tree, _ in play(plan, stop, fresh):
+        held: list[tuple[str | None, Domain]] = []
+        for element in tree.elements.values():
+            if isinstance(element, ActionElement) and element.state is State.RUNNING:
+                held += [(one.actor_name, domain) for one in element.running for domain in one.controls]
+        assert len(held) == len(set(held))
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_a_running_action_has_something_to_do(plan: Any, stop: Any, fresh: Any) -> None:
+    for tree, _ in play(plan, stop, fresh):
+        for element in tree.elements.values():
+            if isinstance(element, ActionElement):
+                assert (element.state is State.RUNNING) == bool(element.running)
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_conditions_are_asked_at_most_once_a_tick(plan: Any, stop: Any, fresh: Any) -> None:
+    for number, (tree, _) in enumerate(play(plan, stop, fresh), start=1):
+        assert all(script.asked <= number for script in tree.scripts)
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_a_stopped_storyboard_stays_as_it_is(plan: Any, stop: Any, fresh: Any) -> None:
+    over = False
+    for tree, changes in play(plan, stop, fresh):
+        assert not (over and changes)
+        over = over or tree.root.state is State.COMPLETE
+
+
+@RANDOM
+@given(plan=ACTS, stop=TRIGGERS)
+def test_the_same_plan_takes_the_same_course(plan: Any, stop: Any, fresh: Any) -> None:
+    first = [changes for _, changes in play(plan, stop, fresh)]
+    assert first == [changes for _, changes in play(plan, stop, fresh)]
