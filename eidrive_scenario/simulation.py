@@ -316,6 +316,11 @@ class Simulation:
             metrics.update(criterion.metrics())
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
+        unanswered = [
+            f"{by.source}:{by.line}: nobody gave the user-defined value {name!r}; use --user-value or set_user_value"
+            for name, by in self.storyboard.stage.wanted_values.items()
+            if name not in self._user_values
+        ]
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(
@@ -330,7 +335,7 @@ class Simulation:
             trace_hash=self._trace.hexdigest(),
             simulated_s=frame.view.time,
             wall_s=wall_s,
-            warnings=tuple(dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings)])),
+            warnings=tuple(dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings), *unanswered])),
             parameters=dict(self.scenario.parameters),
             links=dict(self.stations.link_statistics(frame.view.time)),
         )

@@ -88,6 +88,8 @@ class Stage:
         self.environment = Environment()
         self.user_values: Callable[[str], str | None] = lambda _: None
         """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
+        self.wanted_values: dict[str, model.Element] = {}
+        """The names of such values, and the first condition that asks for each."""
         self.commands = Commands()
         self.actors: dict[str, Actor] = {
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)

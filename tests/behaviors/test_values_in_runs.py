@@ -40,10 +40,13 @@ def test_a_value_from_outside_starts_an_event(run: Any) -> None:
         if frame.view.tick == 10:
             simulation.set_user_value("signal strength", "3.5")
 
-    assert run(1, ("Ego", NOTHING, condition)).begun("event 0") == []
+    alone = run(1, ("Ego", NOTHING, condition))
+    assert alone.begun("event 0") == []
+    assert any("nobody gave the user-defined value 'signal strength'" in warning for warning in alone.result.warnings)
     assert run(1, ("Ego", NOTHING, condition), during=during).begun("event 0") == pytest.approx([0.55])
     given = RunSettings(dt=0.05, user_values={"signal strength": "4"})
-    assert run(1, ("Ego", NOTHING, condition), settings=given).begun("event 0") == [0.0]
+    answered = run(1, ("Ego", NOTHING, condition), settings=given)
+    assert (answered.begun("event 0"), answered.result.warnings) == ([0.0], ())
 
 
 def test_a_monitor_is_seen_in_frames_metrics_and_a_verdict(run: Any) -> None:
@@ -138,3 +141,10 @@ def test_who_is_hidden_from_sensors_is_not_detected_and_is_there_all_the_same(ru
     seen = [len(frame.steps["Ego"].detections) for frame in played.frames]
     assert seen == [1] * 12 + [0] * 14 + [1] * 15
     assert all("Other" in frame.view for frame in played.frames)
+
+
+def test_a_time_of_day_that_nobody_states_is_told(run: Any) -> None:
+    noon = '<TimeOfDayCondition rule="greaterThan" dateTime="2024-06-01T12:00:00"/>'
+    played = run(0.5, ("Ego", NOTHING, f"<ByValueCondition>{noon}</ByValueCondition>"))
+    assert played.begun("event 0") == []
+    assert "TimeOfDayCondition never holds" in played.result.warnings[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
+from eidrive_scenario.api import Condition, Measure, Problem, Stage, compares, in_words, model
 
 
 class SimulationTimeCondition(Condition):
@@ -38,6 +38,15 @@ class TimeOfDayCondition(Condition):
     """
 
     element: model.TimeOfDayCondition
+
+    def bind(self, stage: Stage) -> None:
+        """Say so where nothing in the scenario states a time of day."""
+        scenario = stage.scenario
+        trees = (scenario.document, *scenario.entries.values())
+        if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
+            what = "TimeOfDayCondition never holds: no environment of the scenario has a TimeOfDay"
+            remedy = "give one by an EnvironmentAction in Init"
+            stage.warnings.append(Problem(what, remedy, self.element.source, self.element.line))
 
     def holds(self, stage: Stage) -> bool:
         """Compare the clock."""

@@ -92,6 +92,10 @@ class UserDefinedValueCondition(Condition):
 
     element: model.UserDefinedValueCondition
 
+    def bind(self, stage: Stage) -> None:
+        """Let the stage know that the value is wanted."""
+        stage.wanted_values.setdefault(self.element.name, self.element)
+
     def holds(self, stage: Stage) -> bool:
         """Compare it."""
         return agrees(stage.user_values(self.element.name), self.element.rule, self.element.value)
