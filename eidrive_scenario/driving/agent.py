@@ -6,12 +6,17 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
+from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.localization import Localizer, motion_noise
@@ -26,6 +31,8 @@ from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.v2x.message import Message, Received, StationState
 from eidrive_scenario.v2x.size import cpm_size
 from eidrive_scenario.world.actor import ActorSpec, Control
+
+Array = NDArray[np.float64]
 
 OWN_MARGIN = 0.9
 """A reported box whose centre lies this near to the own outline is the own body: half the width of a car, so that the
@@ -53,6 +60,7 @@ class Agent:
         sensors: int,
         dt: float,
         own_perception: bool = False,
+        points: SharedPoints | None = None,
     ) -> None:
         self.name = spec.name
         self.spec = spec
@@ -62,6 +70,7 @@ class Agent:
         self.planner = planner
         self.controller = controller
         self.own_perception = own_perception
+        self.points = points
         self._sensors = sensors
         self._detections = Detections(0.0)
         self._reports: dict[str, Report] = {}
@@ -82,8 +91,9 @@ class Agent:
         detections = self._detections
         self._listen(inbox, now)
         state = self._state(ego)
-        if fresh is not None and not self.own_perception:
-            self._take(Report(self.name, detections, now, state))
+        found = fresh if self.points is None else self.points.perceive(readings, fresh)
+        if found is not None and not self.own_perception:
+            self._take(Report(self.name, found, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
         plan = None
         if self.planner is not None:
@@ -115,6 +125,9 @@ class Agent:
                 if not self.own_perception:
                     continue
             elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
+                continue
+            if self.points is not None and message.points is not None and sender != self.name:
+                self.points.hear(sender, message.points, self._own_body(message.points.time))
                 continue
             detections = message.detections if sender == self.name else self._without_own_body(message.detections)
             self._take(Report(sender, detections, received.arrived, message.state, complete=message.objects is None))
@@ -151,6 +164,12 @@ class Agent:
         place = next((held for held in reversed(self._own_places) if held[0] <= time + TIME_TOLERANCE), None)
         return (place or self._own_places[0])[1:]
 
+    def _own_body(self, time: float) -> Array:
+        """The own outline with a margin, as high as anything on it, at that time."""
+        x, y, yaw = self._own_place(time)
+        length, width, height = self.spec.size
+        return np.array([x, y, 0.0, length + OWN_MARGIN, width + OWN_MARGIN, 4.0 * height, yaw])
+
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:
             return None
@@ -169,7 +188,10 @@ class Agent:
                 return ()
             self._periods = period
         size = cpm_size(len(detections), self._sensors)
-        message = Message(self.name, self._number, now, state, detections, size)
+        points = self.points.own if self.points is not None else None
+        if points is not None:
+            size += points.size
+        message = Message(self.name, self._number, now, state, detections, size, points=points)
         self._number += 1
         return (message,)
 
@@ -192,6 +214,24 @@ def build_detector(settings: AgentSettings, *, source: str = "", line: int | Non
     return kind()
 
 
+def build_fusion(
+    settings: AgentSettings, detector: Detector, *, source: str = "", line: int | None = None
+) -> FusionMethod:
+    """The fusion method that the settings name. Raises SettingError, with this place, if its own settings are wrong,
+    or if it joins points and the detector looks at none."""
+    kind: type[FusionMethod] = registry("fusion").load(settings.fusion)
+    given = settings.fusion_settings
+    if given and kind.settings_type is None:
+        message = f"fusion {settings.fusion!r} has no settings of its own"
+        raise SettingError(Problem(message, "remove the property 'fusion_settings'", source, line))
+    if issubclass(kind, EarlyFusion) and "lidar" not in detector.needs:
+        message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
+        raise SettingError(Problem(message, "give it a detector for LiDAR: lidar", source, line))
+    if kind.settings_type is None:
+        return kind()
+    return kind(parse_settings(kind.settings_type, given, source=source, line=line))  # type: ignore[call-arg]
+
+
 def build_agent(
     settings: AgentSettings,
     spec: ActorSpec,
@@ -203,7 +243,8 @@ def build_agent(
     detector: Detector | None = None,
 ) -> Agent:
     """The agent of the station on this body. Extensions are built as `Detector()` or `Detector(detector_settings)`,
-    `FusionMethod()` and `Planner(settings, spec, roads, dt=dt, seed=seed)`; `detector` gives one that is built already.
+    `FusionMethod()` or `FusionMethod(fusion_settings)`, and `Planner(settings, spec, roads, dt=dt, seed=seed)`;
+    `detector` gives one that is built already.
 
     A body with wheels follows a route if the settings name no planner; one without drives never.
     Raises SettingError if a planner is asked of a body without wheels.
@@ -214,7 +255,12 @@ def build_agent(
         raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
     detector = detector or build_detector(settings)
     sensors = settings.rig_sensors(detector.needs)
-    detector.install(Installation(spec, sensors, roads, seed))
+    installation = Installation(spec, sensors, roads, seed)
+    detector.install(installation)
+    fusion = build_fusion(settings, detector)
+    points = None
+    if isinstance(fusion, EarlyFusion):
+        points = SharedPoints(fusion, _joint(settings, installation) if planner != NO_PLANNER else None)
     return Agent(
         spec,
         settings,
@@ -224,7 +270,7 @@ def build_agent(
             localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
             latency=settings.detector_latency,
         ),
-        fusion=registry("fusion").load(settings.fusion)(),
+        fusion=fusion,
         planner=None
         if planner == NO_PLANNER
         else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
@@ -232,7 +278,15 @@ def build_agent(
         sensors=len(sensors),
         dt=dt,
         own_perception=own_perception,
+        points=points,
     )
+
+
+def _joint(settings: AgentSettings, installation: Installation) -> Perception:
+    """What looks for objects in the points of all stations: as the station's own, on readings that are located."""
+    detector = build_detector(settings)
+    detector.install(installation)
+    return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:

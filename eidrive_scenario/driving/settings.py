@@ -112,6 +112,7 @@ class AgentSettings(Settings):
     detector_settings  what the detector itself may be told
     detector_latency   how long the detector computes: what it saw at t is known from t + latency on
     tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
+    fusion_settings    what the fusion method itself may be told
     localization    `oracle`, or `ekf`: the station finds out by GNSS and IMU where it is
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the detector needs
@@ -134,7 +135,8 @@ class AgentSettings(Settings):
     tracker: Annotated[TrackerSettings | None, BeforeValidator(tracker_setting)] = None
     localization: Literal["oracle", "ekf"] = "oracle"
     obey_signals: bool = False
-    fusion: str = "average"
+    fusion: str = "covariance_intersection"
+    fusion_settings: dict[str, Any] = Field(default_factory=dict)
     planner: str | None = None
     sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
     range: PositiveFloat | None = None

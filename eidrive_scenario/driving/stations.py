@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.driving.agent import Agent, build_agent, build_detector, build_rig
+from eidrive_scenario.driving.agent import Agent, build_agent, build_detector, build_fusion, build_rig
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
 from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
@@ -237,7 +237,8 @@ def _own(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
 def _all_detectors(
     scenario: Scenario, settings: Mapping[str, AgentSettings], option: str | None
 ) -> dict[str, Detector]:
-    """The detector of every station. Raises SettingError with all that is wrong with any of them or their sensors."""
+    """The detector of every station. Raises SettingError with all that is wrong with any of them, their sensors or
+    their methods of fusion."""
     problems: list[Problem] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
@@ -249,6 +250,8 @@ def _all_detectors(
             found[name] = build_detector(station, source=source, line=line)
             source, line = controller.source, _line(controller, "sensors")
             station.rig_sensors(found[name].needs)
+            line = _line(controller, "fusion_settings", "fusion")
+            build_fusion(station, found[name], source=controller.source, line=line)
         except SettingError as error:
             problems += [
                 problem if problem.source else replace(problem, source=source, line=line) for problem in error.problems

@@ -57,6 +57,8 @@ def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Ar
     # (u + v t) - limit (d + s t + p t²).
     limit = (1.0 + SLACK) * (u + v * best) / (d + best * (s + best * p))
     excess, slope = u - limit * d, v - limit * s
+    if not (excess > 0.0).any():
+        return np.full_like(excess, 0.5)
     turn = slope + np.copysign(np.sqrt(np.maximum(slope * slope + 4.0 * limit * p * excess, 0.0)), slope)
     return np.where(excess > 0.0, 0.5 - 2.0 * excess / np.where(turn == 0.0, 1.0, turn), 0.5)
 

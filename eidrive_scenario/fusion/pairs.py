@@ -65,8 +65,9 @@ def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool)
     if same_station:
         stations = first["station"][:, None] == second["station"][None, :]
         near &= stations
-        numbered = stations & (first["number"][:, None] == second["number"][None, :]) & (second["number"] >= 0)
-        near |= numbered
+        if second["number"].max(initial=-1) >= 0:
+            numbered = stations & (first["number"][:, None] == second["number"][None, :]) & (second["number"] >= 0)
+            near |= numbered
     else:
         near &= first["station"][:, None] < second["station"][None, :]
     rows, columns = np.nonzero(near)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,34 +58,36 @@ def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
     """
     lists = [report.detections for report in reports]
     boxes = np.concatenate([found.boxes for found in lists])
-    counts = [len(found) for found in lists]
+    scores = np.concatenate([found.scores for found in lists])
+    velocity = np.concatenate([found.velocity for found in lists])
     table = np.zeros(len(boxes), TRACK)
-    table["station"] = np.repeat(stations, counts)
-    table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
-    table["number"] = [number for found in lists for number in (found.tracks or (-1,) * len(found))]
+    covariance = table["covariance"]
+    covariance[:, :2, :2] = np.concatenate([found.covariance for found in lists])
+    table["vague"] = _make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
-    scores = np.clip(np.concatenate([found.scores for found in lists]), 0.0, 1.0)
-    table["score"] = table["weight"] = table["existence"] = scores
-    velocity = np.concatenate([found.velocity for found in lists])
+    table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
-    covariance = table["covariance"]
-    table["vague"], covariance[:, :2, :2] = _position_noise(np.concatenate([found.covariance for found in lists]))
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
     table["heading"], table["heading_covariance"] = first_heading(boxes[:, 6])
     table["facing"] = 1.0
-    names = [_ROW_OF_CLASS.get(name, _MISC) for found in lists for name in found.classes]
-    table["votes"][np.arange(len(table)), names] = scores
     start = 0
-    for report, count in zip(reports, counts, strict=True):
-        if count and report.state is not None and report.state.pose_covariance is not None:
-            rows = table[start : start + count]
+    for station, report in zip(stations, reports, strict=True):
+        found = report.detections
+        rows = table[start : start + len(found)]
+        start += len(found)
+        rows["station"] = station
+        rows["time"] = rows["seen"] = found.time
+        rows["number"] = found.tracks or -1
+        rows["votes"][np.arange(len(found)), [_ROW_OF_CLASS.get(name, _MISC) for name in found.classes]] = rows["score"]
+        if report.state is not None and report.state.pose_covariance is not None:
             rows["pose"] = pose_part(rows["mean"][:, :2], report.state.x, report.state.y, report.state.pose_covariance)
-        start += count
-    usable = np.isfinite(boxes).all(axis=1) & (boxes[:, 3:6] > 0.0).all(axis=1) & np.isfinite(scores)
-    return table if usable.all() else table[usable]
+    if not len(boxes) or (math.isfinite(boxes.sum() + scores.sum()) and boxes[:, 3:6].min() > 0.0):
+        return table
+    usable: Table = table[np.isfinite(boxes).all(axis=1) & (boxes[:, 3:6] > 0.0).all(axis=1) & np.isfinite(scores)]
+    return usable
 
 
 def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
@@ -120,26 +123,31 @@ def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], 
     again would count its past twice. Positions alone go through a Kalman filter.
     """
     born = first_seen(stations, reports)
-    time_of = {station: report.detections.time for station, report in zip(stations, reports, strict=True)}
-    times = np.array([time_of.get(station, np.nan) for station in tracks["station"].tolist()])
+    time_of = np.full(max(stations, default=0) + 1 + int(tracks["station"].max(initial=0)), np.nan)
+    time_of[stations] = [report.detections.time for report in reports]
+    times = time_of[tracks["station"]]
     concerned = np.isfinite(times)
-    recent = concerned & (times - tracks["seen"] <= max_age)
+    recent = times - tracks["seen"] <= max_age
     old = predicted_to(tracks[recent], times[recent])
     pairs = matched_pairs(likely_pairs(old, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
-    missed = np.ones(len(old), dtype=bool)
-    missed[rows] = False
-    fresh = np.ones(len(born), dtype=bool)
-    fresh[columns] = False
     old[rows] = _updated(old[rows], born[columns])
-    if missed.any():
+    if len(rows) < len(old):
+        missed = np.ones(len(old), dtype=bool)
+        missed[rows] = False
         tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
         silent = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
         _miss(old, missed, tracked, silent)
         old = old[old["existence"] >= LEAST_EXISTENCE]
-    parts = [part for part in (tracks[~concerned], old, born[fresh]) if len(part)]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else tracks[:0]
+    parts = [old]
+    if not concerned.all():
+        parts.insert(0, tracks[~concerned])
+    if len(columns) < len(born):
+        fresh = np.ones(len(born), dtype=bool)
+        fresh[columns] = False
+        parts.append(born[fresh])
+    return old if len(parts) == 1 else np.concatenate(parts)
 
 
 def _updated(old: Table, new: Table) -> Table:
@@ -186,11 +194,15 @@ def _miss(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: s
         tracks["score"][row] *= after / before if before > 0.0 else 0.0
 
 
-def _position_noise(covariance: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Which covariances (N, 2, 2) are unknown, and all of them with a value for those, and for those that are too small
-    to be true."""
-    vague: NDArray[np.bool_] = ~np.isfinite(covariance.sum(axis=(1, 2)))
-    noise = np.where(vague[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
-    thin = np.minimum(noise[:, 0, 0], noise[:, 1, 1]) < LEAST_DEVIATION**2
-    noise[thin] += LEAST_DEVIATION**2 * np.eye(2)
-    return vague, noise
+def _make_plausible(covariance: Array) -> NDArray[np.bool_]:
+    """Fill in the positions of covariances (N, 4, 4) that are unknown, raise those too small to be true; which (N,)
+    were unknown."""
+    xx, yy = covariance[:, 0, 0], covariance[:, 1, 1]
+    vague: NDArray[np.bool_] = ~np.isfinite(xx + yy + covariance[:, 0, 1])
+    if vague.any():
+        covariance[vague, :2, :2] = UNKNOWN_DEVIATION**2 * np.eye(2)
+    least = LEAST_DEVIATION**2
+    more = np.where(np.minimum(xx, yy) < least, least, 0.0)
+    xx += more
+    yy += more
+    return vague

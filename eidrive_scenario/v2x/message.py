@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.point_cloud import PointCloud
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """Between two antennas: nothing, vehicles only, or a building or the ground (3GPP TR 37.885, 6.2.1)."""
@@ -51,6 +52,8 @@ class Message:
     """[bytes]"""
     kind: Literal["cpm", "cam"] = "cpm"
     objects: tuple[int, ...] | None = None
+    points: PointCloud | None = None
+    """What the sender's LiDARs measured, where it shares that; `size` contains it."""
 
 
 @dataclass(frozen=True)

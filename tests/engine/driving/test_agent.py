@@ -34,7 +34,7 @@ def readings(time: float, at: Place, *objects: Place, speed: float = 0.0, due: b
 
 
 def agent(spec: ActorSpec, *, own_perception: bool = False, **settings: object) -> Agent:
-    parsed = AgentSettings.model_validate(settings)
+    parsed = AgentSettings.model_validate({"fusion": "average", **settings})
     return build_agent(parsed, spec, None, seed=0, dt=DT, own_perception=own_perception)
 
 

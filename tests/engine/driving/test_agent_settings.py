@@ -26,7 +26,8 @@ def settings(*entries: tuple[str, str]) -> AgentSettings:
 
 def test_the_defaults() -> None:
     found = settings()
-    assert (found.detector, found.fusion, found.planner, found.cooperates_with) == ("oracle", "average", None, None)
+    assert (found.detector, found.planner, found.cooperates_with) == ("oracle", None, None)
+    assert found.fusion == "covariance_intersection"
     assert (found.report_timeout, found.conflict_brake, found.conflict_hold) == (1.0, 5.0, 1.05)
     assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}

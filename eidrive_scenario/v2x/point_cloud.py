@@ -1,0 +1,78 @@
+"""Points of a LiDAR in a message: rounded to a grid, sorted, and told as steps from one to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+HEADER_BYTES = 32
+"""Time (8), corner (3 x 4), cell (2), cells along each axis (3 x 2) and number of points (4)."""
+_SEVEN_BITS = 7
+_MOST_BYTES = 9
+"""Of one step: 63 bits."""
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points measured at `time` [s], in the world as their sender knows it.
+
+    corner  (3,) of the grid [m]
+    cell    edge of its cells [m]
+    shape   how many cells along x, y and z
+    steps   from one occupied cell to the next, in the order of x, y, z: numbers to the base 128, the least significant
+            digit first, the highest bit set in all bytes of a number but the last (LEB128, as in protobuf)
+    """
+
+    time: float
+    corner: tuple[float, float, float]
+    cell: float
+    shape: tuple[int, int, int]
+    steps: Bytes
+
+    @property
+    def size(self) -> int:
+        """[bytes]"""
+        return HEADER_BYTES + len(self.steps)
+
+    def points(self) -> Array:
+        """(N, 3) the middles of the occupied cells [m]."""
+        _, along, up = self.shape
+        cells = np.cumsum(_numbers(self.steps))
+        indices = np.stack([cells // (along * up), cells // up % along, cells % up], axis=1)
+        return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
+
+
+def compressed(points: Array, time: float, cell: float) -> PointCloud:
+    """Points (N, 3) in the world on a grid of this cell [m]; those of one cell are one. Off by half a cell at most."""
+    if not len(points):
+        return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
+    low = np.floor(points.min(axis=0) / cell).astype(np.int64)
+    indices = np.floor(points / cell).astype(np.int64) - low
+    wide, along, up = (indices.max(axis=0) + 1).tolist()
+    occupied = np.unique((indices[:, 0] * along + indices[:, 1]) * up + indices[:, 2])
+    x, y, z = (low * cell).tolist()
+    return PointCloud(time, (x, y, z), cell, (wide, along, up), _bytes(np.diff(occupied, prepend=0)))
+
+
+def _bytes(numbers: NDArray[np.int64]) -> Bytes:
+    groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MOST_BYTES)) & 127
+    later = np.cumsum(groups[:, ::-1], axis=1)[:, ::-1] - groups
+    needed = (later > 0) | (groups > 0)
+    needed[:, 0] = True
+    last = later == 0
+    digits: Bytes = np.where(last, groups, groups + 128)[needed].astype(np.uint8)
+    return digits
+
+
+def _numbers(data: Bytes) -> NDArray[np.int64]:
+    if not len(data):
+        return np.empty(0, dtype=np.int64)
+    ends = np.flatnonzero(data < 128)
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    place = np.arange(len(data)) - np.repeat(starts, ends - starts + 1)
+    return np.asarray(np.add.reduceat((data.astype(np.int64) & 127) << (_SEVEN_BITS * place), starts), dtype=np.int64)
