@@ -116,3 +116,37 @@ def test_a_slippery_road_takes_grip(run: Any) -> None:
     assert slope(played.of("Ego", "speed"), 1.0, 2.5) == pytest.approx(-0.95 * 0.2 * 9.81, abs=0.35)
     environment = played.frames[0].environment
     assert (environment.friction, environment.wetness, environment.name) == (0.2, "moist", "ice")
+
+
+def other(name: str, **activate: str) -> str:
+    """Assigns a controller of another tool."""
+    given = " ".join(f'activate{domain}="{on}"' for domain, on in activate.items())
+    return private(
+        f"<ControllerAction><AssignControllerAction {given}><ObjectController>"
+        f'<Controller name="{name}" controllerType="movement"><Properties/></Controller></ObjectController>'
+        "</AssignControllerAction></ControllerAction>"
+    )
+
+
+def by_name(name: str, on: str) -> str:
+    return private(
+        f'<ControllerAction><ActivateControllerAction objectControllerRef="{name}" lateral="{on}" longitudinal="{on}"/>'
+        "</ControllerAction>"
+    )
+
+
+def test_another_tool_s_controller_takes_over_when_it_is_activated(run: Any) -> None:
+    """Scripted speed stays as it is to the last bit; driven speed does not."""
+
+    def scripted(*steps: tuple[str, ...]) -> list[bool]:
+        speed = run(2, *steps).of("Ego", "speed")
+        return [speed[tick] == speed[tick + 1] for tick in (10, 25, 35)]
+
+    assert scripted(("Ego", other("foreign"), after(0.0))) == [False, False, False]
+    assert scripted(("Ego", other("foreign", Lateral="true", Longitudinal="true"), after(1.0))) == [False, True, True]
+    assigned = ("Ego", other("foreign"), after(0.0))
+    assert scripted(assigned, ("Ego", by_name("foreign", "true"), after(1.0))) == [False, True, True]
+    assert scripted(assigned, ("Ego", by_name("foreign", "false"), after(1.0))) == [False, False, False]
+    assert scripted(("Ego", by_name("c", "false"), after(1.0)), ("Ego", by_name("c", "true"), after(1.5))) == [
+        *(False, True, False)
+    ]

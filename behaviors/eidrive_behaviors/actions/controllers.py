@@ -18,15 +18,31 @@ class ActivateControllerAction(ActionBehaviour):
     """Turns the actor's controller on or off per domain; a domain that is left out stays as it is.
 
     An eidrive controller drives where both domains are on. Where it lets go, the actor keeps lane and speed; where it
-    takes over, it goes on from there. Controllers of other tools leave the actor to the scripted motion.
+    takes over, it goes on from there. Controllers of other tools leave the actor to the scripted motion: to activate
+    one by its name takes the domain from ours, to deactivate it changes nothing.
     """
 
     action: model.ActivateControllerAction
 
     def update(self) -> Status:
         """Switch."""
-        switch(self, self.action.lateral, self.action.longitudinal)
+        lateral, longitudinal = self.action.lateral, self.action.longitudinal
+        if self._means_another():
+            lateral, longitudinal = _left_to_ours(lateral, longitudinal)
+        switch(self, lateral, longitudinal)
         return Status.SUCCESS
+
+    def _means_another(self) -> bool:
+        """Whether the action names a controller of the actor that is none of ours."""
+        name = self.action.object_controller_ref or self.action.controller_ref
+        if name is None:
+            return False
+        entities = self.stage.scenario.document.entities
+        objects = entities.scenario_object if entities is not None else ()
+        held = next((one.object_controller for one in objects if one.name == self.actor.name), ())
+        named = {one.name: controller for one, controller in zip(held, self.actor.controllers, strict=False)}
+        named |= {controller.name: controller for controller in self.actor.controllers}
+        return name in named and not is_ours(named[name])
 
     def describe(self) -> str:
         """Which domains."""
@@ -61,10 +77,10 @@ class AssignControllerAction(ActionBehaviour):
             )
 
     def update(self) -> Status:
-        """Assign it, and switch the domains that the action names."""
+        """Assign it; domains in which it is activated are no longer those of a controller of ours."""
         if self._controller is not None and self._controller not in self.actor.controllers:
             self.actor.controllers.append(self._controller)
-        switch(self, self.action.activate_lateral, self.action.activate_longitudinal)
+        switch(self, *_left_to_ours(self.action.activate_lateral, self.action.activate_longitudinal))
         return Status.SUCCESS
 
     def _found(self) -> model.Controller | None:
@@ -144,6 +160,11 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         actor.motion.land()
     if actor.driven and not before and actor.present:
         actor.goal = Goal(speed=actor.motion.speed, path=_rest_of_route(actor))
+
+
+def _left_to_ours(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:
+    """What the switching of another tool's controller means for ours: what that one takes, ours lose."""
+    return False if lateral else None, False if longitudinal else None
 
 
 def _rest_of_route(actor: Actor) -> np.ndarray[tuple[int, int], np.dtype[np.float64]] | None:
