@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from eidrive_scenario.errors import Problem, RegistryError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry
 from eidrive_scenario.storyboard.actor import Actor, is_ours
-
-if TYPE_CHECKING:
-    from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.stage import Stage
 
 
 class StandIn(ABC):
