@@ -10,34 +10,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.perception.l_shape import Rectangle, bounds, rectangles
 from eidrive_scenario.perception.lidar_geometry import Pattern
 from eidrive_scenario.perception.size_priors import SizePrior, prior_of
 
 Array = NDArray[np.float64]
 
-HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
-CLOSEST = 0.03
-"""Points nearer to an edge than this are on it [m]."""
-MOST_POINTS = 300
-"""In the search for the heading; the extent counts all."""
 RANGE_NOISE = 0.03
 """Of the points on a surface, standard deviation [m]."""
 SHAPELESS = 0.4
 """Points within so small a rectangle have no heading of their own [m]."""
 FEW_COLUMNS = 1.6
 """A rectangle of fewer gaps between columns of rays has one that is worse than that of the lane."""
+LANE_DEVIATION = math.radians(25.0)
+"""How much an object's heading differs from the expected one [rad]."""
 HEADING_DEVIATION = 0.4
 """Of a heading that is a guess [rad]."""
 ABOVE_TOP = 0.3
 """A sensor this much above an object sees its top [m]."""
-
-
-class Rectangle(NamedTuple):
-    """A rectangle seen from above: the heading of its first axis [rad], and its bounds along both axes [m]."""
-
-    yaw: float
-    low: tuple[float, float]
-    high: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -51,35 +41,6 @@ class Fit:
     covariance: Array
     deviation: float
     hidden: tuple[bool, bool]
-
-
-def rectangle(plan: Array) -> Rectangle:
-    """The rectangle around points (N, 2) whose edges lie closest to them.
-
-    Search by the closeness criterion: Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using
-    laser scanners, IV 2017, algorithm 4.
-    """
-    chosen = plan if len(plan) <= MOST_POINTS else plan[:: math.ceil(len(plan) / MOST_POINTS)]
-    cos, sin = np.cos(HEADINGS)[:, None], np.sin(HEADINGS)[:, None]
-    along, across = cos * chosen[:, 0] + sin * chosen[:, 1], cos * chosen[:, 1] - sin * chosen[:, 0]
-    nearest = np.minimum(_to_edge(along), _to_edge(across))
-    best = int(np.argmax(np.sum(1.0 / np.maximum(nearest, CLOSEST), axis=1)))
-    return bounds(plan, float(HEADINGS[best]))
-
-
-def bounds(plan: Array, yaw: float) -> Rectangle:
-    """The rectangle of a heading around points (N, 2)."""
-    along = math.cos(yaw) * plan[:, 0] + math.sin(yaw) * plan[:, 1]
-    across = math.cos(yaw) * plan[:, 1] - math.sin(yaw) * plan[:, 0]
-    return Rectangle(yaw, (float(along.min()), float(across.min())), (float(along.max()), float(across.max())))
-
-
-def _to_edge(values: Array) -> Array:
-    """(H, N) distance of each value from the end of its row's range to which the row as a whole lies nearer."""
-    to_high, to_low = values.max(axis=1, keepdims=True) - values, values - values.min(axis=1, keepdims=True)
-    nearer_high = np.einsum("hn,hn->h", to_high, to_high) < np.einsum("hn,hn->h", to_low, to_low)
-    nearest: Array = np.where(nearer_high[:, None], to_high, to_low)
-    return nearest
 
 
 class _Span(NamedTuple):
@@ -96,6 +57,17 @@ class _Span(NamedTuple):
     """Whether something stands before one of the ends."""
 
 
+class _Choice(NamedTuple):
+    """A way to see the points: its costs, by size and by heading, and what it takes them for."""
+
+    cost: float
+    astray: float
+    name: str
+    lengthwise: int
+    shape: Rectangle
+    spans: tuple[_Span, _Span]
+
+
 def fit_box(
     points: Array,
     *,
@@ -110,29 +82,34 @@ def fit_box(
 
     ground   height of the ground below the object [m]; the box stands on it
     hidden   whether something nearer ends the object's points at its left and its right end, as the sensor sees it
-    heading  of its length, where it is known; taken if the points lie so close together that they show none [rad]
+    heading  of its length, where one is to be expected; taken if the points are too few to show one [rad]
 
     Extents that the points show are believed as far as the gaps between the rays allow; sides that face away or are
     hidden are completed to the usual size of the class, towards the end that is not seen. The axis of the length
     follows from the fit; its direction leads away from the sensor, as points do not tell front from back.
     """
-    shape = rectangle(points[:, :2])
     x, y = points[:, :2].mean(axis=0).tolist()
-    widest = max(shape.high[0] - shape.low[0], shape.high[1] - shape.low[1])
-    shapeless = widest < SHAPELESS
-    axes: tuple[int, ...] = (0, 1)
-    if heading is not None and widest < max(SHAPELESS, FEW_COLUMNS * pattern.azimuth * math.hypot(x, y)):
-        shape, axes = bounds(points[:, :2], heading), (0,)
-    elif shapeless:
-        shape = bounds(points[:, :2], math.atan2(y, x))
     top = float(points[:, 2].max()) - ground
-    spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden)
     highest = _highest(points, sensor_height, top, ground, pattern)
-    cost, name, lengthwise = min(
-        (_cost(prior_of(name), spans, lengthwise, top, highest), name, lengthwise)
-        for name in classes
-        for lengthwise in axes
-    )
+    shapes = rectangles(points[:, :2])
+    shapeless = shapes[0].widest < SHAPELESS
+    axes: tuple[int, ...] = (0, 1)
+    if heading is not None and shapes[0].widest < max(SHAPELESS, FEW_COLUMNS * pattern.azimuth * math.hypot(x, y)):
+        shapes, axes = [bounds(points[:, :2], heading)], (0,)
+    elif shapeless:
+        shapes = [bounds(points[:, :2], math.atan2(y, x))]
+    best: _Choice | None = None
+    for shape in shapes:
+        spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden)
+        for lengthwise in axes:
+            turned = 0.0 if heading is None else _astray(shape.yaw + lengthwise * math.pi / 2.0 - heading)
+            for name in classes:
+                cost = _cost(prior_of(name), spans, lengthwise, top, highest)
+                if best is None or cost + turned < best.cost + best.astray - 1e-9:
+                    best = _Choice(cost, turned, name, lengthwise, shape, spans)
+    if best is None:
+        raise ValueError("a box needs a class to fit")
+    _, _, name, lengthwise, shape, spans = best
     prior = prior_of(name)
     order = (0, 1) if lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
@@ -141,8 +118,8 @@ def fit_box(
             spans[axis], prior.mean[place], prior.deviation[place]
         )
     if shapeless:
-        turned = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
-        variances = [variance + turned for variance in variances]
+        swing = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
+        variances = [variance + swing for variance in variances]
     cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
     x, y = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
     yaw = shape.yaw + lengthwise * math.pi / 2.0
@@ -154,9 +131,15 @@ def fit_box(
         (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
         name,
         turn @ np.diag(variances) @ turn.T,
-        cost + 2.0 * math.log(prior.share),
+        best.cost + 2.0 * math.log(prior.share),
         hidden,
     )
+
+
+def _astray(angle: float) -> float:
+    """The squared deviation of an axis from where it should lead."""
+    off = (angle + math.pi / 2.0) % math.pi - math.pi / 2.0
+    return (off / LANE_DEVIATION) ** 2
 
 
 def _spans(

@@ -22,7 +22,7 @@ COLUMNS = 2.0
 NEXT_COLUMN = 1.5
 GRAZING = math.radians(10.0)
 """Points of neighbouring columns belong together where a surface through both meets the ray at this angle or more."""
-DEEPEST = 3.5
+DEEPEST = 4.5
 """But not if one lies this much behind the other: less than the length of a car [m]."""
 
 

@@ -1,8 +1,9 @@
-"""The road users among the points of a scan."""
+"""The road users among the points of a scan; poles are none."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -25,6 +26,10 @@ DOUBTFUL = 9.0
 """Beyond this a cluster is looked at again, as it may be several objects close to each other."""
 FEW = 12
 """A cluster of so few points may show no heading; then that of its lane is looked up."""
+
+
+TOUCHING = 0.2
+"""Boxes this near to each other are taken to touch [m]."""
 
 
 class Found(NamedTuple):
@@ -51,7 +56,7 @@ def objects(scan: Scan, surroundings: Surroundings, least_points: int) -> list[F
             if one.fit.deviation <= DOUBTFUL
         ]
         whole += good or [doubtful]
-    return [one for one in _joined(scan, whole) if one.fit.deviation <= UNLIKELY]
+    return [one for one in _joined(scan, whole) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
 
 
 def _fitted(scan: Scan, surroundings: Surroundings, groups: list[Integers], least_points: int) -> list[Found]:
@@ -81,15 +86,15 @@ def _taken_apart(scan: Scan, rows: Integers, least_points: int) -> list[Found]:
 def _joined(scan: Scan, found: list[Found]) -> list[Found]:
     """The same objects, two boxes of which overlap put together where one box fits the points of both.
 
-    Two bodies cannot be in one place: overlapping boxes are pieces of one that something nearer cuts in two, or that
-    the rays graze so that its points lie far apart.
+    Two bodies cannot be in one place, and hardly ever touch: such boxes are pieces of one that something nearer cuts in
+    two, or that the rays graze so that its points lie far apart.
     """
     whole = list(found)
     again = True
     while again:
         again = False
         for one, other in combinations(whole, 2):
-            if overlap(one.fit.box, other.fit.box):
+            if overlap(_grown(one.fit.box), other.fit.box):
                 rows = np.concatenate([one.rows, other.rows])
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= DOUBTFUL:
@@ -98,3 +103,8 @@ def _joined(scan: Scan, found: list[Found]) -> list[Found]:
                     again = True
                     break
     return whole
+
+
+def _grown(box: Sequence[float]) -> Sequence[float]:
+    x, y, z, length, width, height, yaw = box
+    return x, y, z, length + 2.0 * TOUCHING, width + 2.0 * TOUCHING, height, yaw

@@ -22,8 +22,10 @@ PRIORS: Mapping[str, SizePrior] = {
     "motorbike": SizePrior((2.2, 0.8, 1.5), (0.2, 0.15, 0.2), 0.03),
     "bicycle": SizePrior((1.8, 0.6, 1.65), (0.15, 0.12, 0.2), 0.05),
     "pedestrian": SizePrior((0.55, 0.55, 1.72), (0.15, 0.15, 0.15), 0.10),
+    "pole": SizePrior((0.3, 0.3, 3.5), (0.15, 0.15, 1.5), 0.03),
 }
-"""Round figures for European traffic; two-wheelers with their riders."""
+"""Round figures for European traffic; two-wheelers with their riders. Poles and masts are what a scan shows beside road
+users, lest it takes them for such."""
 
 UNKNOWN = SizePrior((1.0, 1.0, 1.2), (0.6, 0.6, 0.6), 0.01)
 """For a class that the table does not have."""

@@ -1,0 +1,249 @@
+"""The detector from LiDAR alone, on sweeps of the simulated world."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.geometry import iou_bev
+from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.lidar_detector import LidarDetector, LidarDetectorSettings
+from eidrive_scenario.perception.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
+from eidrive_scenario.perception.oracle import OracleDetector
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.settings import LidarSettings, TruthSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import Placement
+
+CLEAN = LidarSettings(range_noise=0.0)
+
+
+def detected(readings: Readings, **settings: Any) -> Detections:
+    return LidarDetector(LidarDetectorSettings(**settings)).detect(readings)
+
+
+def nearest(found: Detections, box: np.ndarray) -> int:
+    assert len(found)
+    row = int(np.argmin(np.hypot(*(found.boxes[:, :2] - box[:2]).T)))
+    assert math.dist(found.boxes[row, :2], box[:2]) < 2.0
+    return row
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_what_stands_around_is_found(street: Any, noise: float) -> None:
+    """A car ahead, an oncoming one, one that crosses, a truck, a pedestrian: all found where they are, nothing else."""
+    things = [
+        street.thing("Ego", 0, 0),
+        street.thing("Ahead", 15, 0),
+        street.thing("Oncoming", 16, 4.5, math.pi),
+        street.thing("Crossing", 12, -9, math.pi / 2),
+        street.thing("Truck", -14, 5, 0.3, "truck"),
+        street.thing("Walker", 7, 5, 0, "pedestrian"),
+    ]
+    found = detected(street.readings(things, {"roof": LidarSettings(range_noise=noise)}))
+    assert len(found) == 5
+    for thing in things[1:]:
+        row = nearest(found, thing.box)
+        assert found.classes[row] == thing.kind
+        assert math.dist(found.boxes[row, :2], thing.box[:2]) < 0.5
+        if thing.kind != "pedestrian":
+            assert iou_bev(found.boxes[row : row + 1], thing.box[None])[0, 0] > 0.6
+            off = math.remainder(float(found.boxes[row, 6]) - thing.yaw, math.pi)
+            assert abs(off) < math.radians(8)
+    assert np.isnan(found.velocity).all()
+    assert np.all((found.scores > 0.05) & (found.scores <= 1.0))
+    assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
+
+
+@pytest.mark.parametrize("distance", [8.0, 16.0, 24.0, 32.0])
+@pytest.mark.parametrize("degrees", [0, 35, 90])
+def test_a_car_is_found_at_all_distances(street: Any, distance: float, degrees: float) -> None:
+    car = street.thing("Car", distance, 2.0, math.radians(degrees))
+    found = detected(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))
+    row = nearest(found, car.box)
+    assert math.dist(found.boxes[row, :2], car.box[:2]) < (0.5 if distance < 20 else 1.5)
+
+
+def test_an_empty_street_is_empty(street: Any) -> None:
+    assert len(detected(street.readings([street.thing("Ego", 0, 0)], {"roof": LidarSettings()}))) == 0
+
+
+def test_a_mast_is_no_road_user(street: Any) -> None:
+    """5 m high and 0.3 m wide, 12 m ahead."""
+    ego = street.thing("Ego", 0, 0)
+    with World(None, dt=0.05) as world:
+        world.add(street.spec(ego), Placement(0, 0))
+        world.add(street.mast, Placement(12, 2))
+        readings = Rig(street.spec(ego), {"roof": LidarSettings()}, seed=1).read(world, world.view())
+    assert np.count_nonzero(readings.lidars["roof"].points[:, 2] > -1.0) > 5
+    assert len(detected(readings)) == 0
+
+
+def test_a_mast_sees_the_ground_at_its_foot_and_cars_from_above(street: Any) -> None:
+    cars = [street.thing("A", 12, 3, 0.4), street.thing("B", -8, -15, 2.0)]
+    readings = street.readings(cars, {"roof": LidarSettings()}, mast=(0.0, 0.0, 1.0))
+    sweep = readings.lidars["roof"]
+    ground = (sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3])[:, 2]
+    assert np.count_nonzero(np.abs(ground) < 0.1) > 1000
+    found = detected(readings)
+    assert len(found) == 2
+    for car in cars:
+        row = nearest(found, car.box)
+        assert iou_bev(found.boxes[row : row + 1], car.box[None])[0, 0] > 0.6
+
+
+def test_a_car_that_comes_out_from_behind_a_truck_is_completed_behind_it(street: Any) -> None:
+    """Only its front half is in sight: the box reaches behind the truck, and does not end where the sight ends."""
+    things = [
+        street.thing("Ego", 0, 0),
+        street.thing("Truck", 12, 6.0, math.pi / 2, "truck"),
+        street.thing("Car", 20, 1.4, -math.pi / 2),
+    ]
+    found = detected(street.readings(things, {"roof": CLEAN}))
+    row = nearest(found, things[2].box)
+    assert found.classes[row] == "car"
+    assert math.dist(found.boxes[row, :2], things[2].box[:2]) < 0.8
+
+
+SCENE = [
+    ("Ahead", 15.3, 0.7, 0.2, "car"),
+    ("Oncoming", 24.1, 4.6, 3.0, "car"),
+    ("Truck", -13.2, 6.1, 0.5, "truck"),
+    ("Crossing", 9.7, -8.4, 1.3, "car"),
+]
+
+
+def sorted_rows(boxes: np.ndarray) -> np.ndarray:
+    return boxes[np.lexsort(np.round(boxes[:, :2], 1).T)]
+
+
+def same_boxes(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    """Equal as rectangles; a heading may point either way."""
+    assert found.shape == expected.shape
+    found, expected = sorted_rows(found), sorted_rows(expected)
+    np.testing.assert_allclose(found[:, :6], expected[:, :6], atol=tolerance)
+    off = found[:, 6] - expected[:, 6]
+    np.testing.assert_allclose(np.abs(np.sin(off)), 0.0, atol=tolerance)
+
+
+@pytest.mark.parametrize("detector", [LidarDetector, OracleDetector])
+@pytest.mark.parametrize("degrees", [30.0, 137.0, -90.0])
+def test_a_turned_scene_has_turned_detections(street: Any, detector: Any, degrees: float) -> None:
+    """The whole scene turned about the origin, station and all."""
+    angle = math.radians(degrees)
+    things = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
+    sensors = {"roof": CLEAN, "truth": TruthSettings()}
+    before = detector().detect(street.readings(things, sensors))
+    after = detector().detect(street.readings([thing.turned(angle) for thing in things], sensors))
+    assert len(before) == 4
+    expected = before.boxes.copy()
+    expected[:, 0] = math.cos(angle) * before.boxes[:, 0] - math.sin(angle) * before.boxes[:, 1]
+    expected[:, 1] = math.sin(angle) * before.boxes[:, 0] + math.cos(angle) * before.boxes[:, 1]
+    expected[:, 6] += angle
+    same_boxes(after.boxes, expected, 0.02)
+    assert sorted(after.classes) == sorted(before.classes)
+
+
+@pytest.mark.parametrize("detector", [LidarDetector, OracleDetector])
+def test_a_mirrored_scene_has_mirrored_detections(street: Any, detector: Any) -> None:
+    things = [street.thing("Ego", 1.0, 2.0, 0.1), *(street.thing(*entry) for entry in SCENE)]
+    sensors = {"roof": CLEAN, "truth": TruthSettings()}
+    before = detector().detect(street.readings(things, sensors))
+    after = detector().detect(street.readings([thing.mirrored() for thing in things], sensors))
+    assert len(before) == 4
+    same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 0.02)
+    assert sorted(after.classes) == sorted(before.classes)
+
+
+ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="100" id="1" junction="-1">
+<planView><geometry s="0" x="-50" y="0" hdg="0" length="100"><line/></geometry></planView>
+<lanes><laneSection s="0"><left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></left>
+<center><lane id="0" type="none"/></center>
+<right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
+</road></OpenDRIVE>"""
+
+
+def test_with_a_map_only_what_is_on_roads_counts_and_lanes_tell_front_from_back(street: Any) -> None:
+    """A road along x with a lane each way, a car on each, and one 10 m beside it."""
+    things = [
+        street.thing("Ego", -20, -1.75),
+        street.thing("Lead", -2, -1.75),
+        street.thing("Oncoming", 4, 1.75, math.pi),
+        street.thing("Beside", -5, 11),
+    ]
+    readings = street.readings(things, {"roof": CLEAN})
+    detector = LidarDetector()
+    detector.install(Installation(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    found = detector.detect(readings)
+    assert len(found) == 2
+    assert math.cos(found.boxes[nearest(found, things[1].box), 6]) > 0.99
+    assert math.cos(found.boxes[nearest(found, things[2].box), 6]) < -0.99
+    everywhere = LidarDetector(LidarDetectorSettings(off_road=None))
+    everywhere.install(Installation(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    assert len(everywhere.detect(readings)) == 3
+
+
+def test_two_sensors_of_one_station_do_not_count_twice(street: Any) -> None:
+    things = [street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)]
+    one = street.readings(things, {"roof": CLEAN})
+    both = street.readings(things, {"roof": CLEAN, "front": replace_mount(CLEAN)})
+    assert len(detected(one)) == len(detected(both)) == 1
+
+
+def replace_mount(settings: LidarSettings) -> LidarSettings:
+    return settings.model_copy(update={"mount": "front"})
+
+
+def test_parts_of_a_revolution_are_put_together(street: Any) -> None:
+    """Half a revolution each tick: the car behind is seen in the other half, and known in both ticks."""
+    half = LidarSettings(range_noise=0.0, rotation=10.0)
+    things = [street.thing("Ego", 0, 0), street.thing("Ahead", 12, 0), street.thing("Behind", -12, 0)]
+    readings = street.readings(things, {"roof": half})
+    sweep = readings.lidars["roof"]
+    ahead = sweep.points[:, 0] > 0
+    halves = [
+        replace(
+            sweep,
+            points=sweep.points[side],
+            intensity=sweep.intensity[side],
+            ring=sweep.ring[side],
+            azimuth=sweep.azimuth[side],
+        )
+        for side in (ahead, ~ahead)
+    ]
+    detector = LidarDetector()
+    detector.install(Installation(street.spec(things[0]), {"roof": half}))
+    counts = [
+        len(detector.detect(replace(readings, time=tick * 0.05, lidars={"roof": halves[tick % 2]})))
+        for tick in range(4)
+    ]
+    assert counts == [1, 2, 2, 2]
+
+
+def test_the_pattern_can_be_read_from_the_points(street: Any) -> None:
+    settings = LidarSettings(range_noise=0.0)
+    sweep = street.readings([street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)], {"roof": settings}).lidars[
+        "roof"
+    ]
+    known, read = pattern_from_settings(settings), pattern_from_points(sweep.points)
+    assert read.azimuth == pytest.approx(known.azimuth, rel=0.01)
+    assert read.elevation == pytest.approx(known.elevation, rel=0.01)
+    assert known.azimuth == pytest.approx(2 * math.pi / 156)
+    assert known.elevation == pytest.approx(math.radians(40 / 31))
+
+
+def test_level_frames_there_and_back() -> None:
+    frame = LevelFrame(3.0, -2.0, 1.9, 0.7)
+    plan = np.array([[5.0, 1.0], [-4.0, 8.0]])
+    np.testing.assert_allclose(frame.to_local(frame.to_world(plan)), plan)
+    np.testing.assert_allclose(frame.to_world(np.zeros((1, 2))), [[3.0, -2.0]])
+    turned = frame.covariance_to_world(np.array([[[4.0, 0.0], [0.0, 1.0]]]))
+    along = np.array([math.cos(0.7), math.sin(0.7)])
+    assert along @ turned[0] @ along == pytest.approx(4.0)
