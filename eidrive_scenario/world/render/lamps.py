@@ -14,8 +14,8 @@ REACH = 70.0
 """Where the light of a lamp is forgotten [m]."""
 _WIDTH, _HEIGHT = 1.2, 0.6
 """Tangents of the angles to the axis beyond which it is forgotten."""
-_STRIDE = 5
-"""Of so many points one is looked at first, to find where the light goes."""
+_STRIDE = 4
+"""Of so many lines and columns one is looked at first, to find where the light goes."""
 _FINE = 200
 """Steps of the table of intensities per unit of the tangent sideways; twice as many upwards."""
 _COLUMNS = round(2 * _WIDTH * _FINE) + 1
@@ -42,30 +42,63 @@ class Beam(NamedTuple):
     high: bool = False
 
 
-def shine(
-    beam: Beam, eye: Array, x: Floats, y: Floats, z: Floats, normals: tuple[Floats, Floats, Floats], margin: int
-) -> tuple[NDArray[np.intp], Floats, Floats] | None:
-    """Illuminance of points before a pair of lamps.
+class Canvas(NamedTuple):
+    """Points (n,) relative to the camera [m] with the normals of their surfaces; where each pixel's point is: the index
+    (H, W) among them, or -1."""
 
-    x, y, z   points relative to the camera at `eye` (3,) [m], line by line of a picture;  normals  of their surfaces
-    margin    points in a few of these lines: where the light ends is looked for only so closely
-    Returns the rows of the points that get any, their illuminance, and that across the beam [lx].
-    """
+    x: Floats
+    y: Floats
+    z: Floats
+    normals: tuple[Floats, Floats, Floats]
+    where: NDArray[np.int32]
+
+
+def numbered(shown: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """(H, W) the numbers of the pixels that show something, line by line from 0 on; -1 for the rest."""
+    found = np.full(shown.shape, -1, dtype=np.int32)
+    found[shown] = np.arange(int(shown.sum()), dtype=np.int32)
+    return found
+
+
+class Sample(NamedTuple):
+    """Every few pixels' points of a canvas, and the lines and columns of these pixels."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    line: NDArray[np.intp]
+    column: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, canvas: Canvas) -> Sample:
+        """Every _STRIDE-th pixel both ways."""
+        some = canvas.where[::_STRIDE, ::_STRIDE]
+        line, column = np.nonzero(some >= 0)
+        rows = some[line, column]
+        return cls(canvas.x[rows], canvas.y[rows], canvas.z[rows], line, column)
+
+
+def shine(beam: Beam, eye: Array, canvas: Canvas, sample: Sample) -> tuple[NDArray[np.intp], Floats, Floats] | None:
+    """Illuminance of points before a pair of lamps, seen from `eye` (3,): the rows of the points that get any, their
+    illuminance, and that across the beam [lx]. Where the light ends is looked for in the sample first."""
     place = (beam.position - eye).astype(np.float32)
     axes = beam.axes.astype(np.float32)
-    some = _within(place, axes, x[::_STRIDE], y[::_STRIDE], z[::_STRIDE])[0]
+    some = _within(place, axes, sample.x, sample.y, sample.z)[0]
     if not len(some):
         return None
-    first = max(int(some[0]) * _STRIDE - margin, 0)
-    part = slice(first, int(some[-1]) * _STRIDE + margin)
-    rows, dx, dy, dz, _, aside, above = _within(place, axes, x[part], y[part], z[part])
-    rows = rows + first
+    line, column = sample.line[some], sample.column[some]
+    top, bottom = max(int(line.min()) - 1, 0) * _STRIDE, (int(line.max()) + 1) * _STRIDE
+    left, right = max(int(column.min()) - 1, 0) * _STRIDE, (int(column.max()) + 1) * _STRIDE
+    window = canvas.where[top:bottom, left:right].ravel()
+    window = window[window >= 0]
+    rows, dx, dy, dz, _, aside, above = _within(place, axes, canvas.x[window], canvas.y[window], canvas.z[window])
+    rows = window[rows].astype(np.intp)
     column = (aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE)).astype(np.int32)
     line = (above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)).astype(np.int32)
     intensity = _table(beam.high)[line * np.int32(_COLUMNS) + column] * np.float32(2.0 * beam.brightness)
     square = dx * dx + dy * dy + dz * dz
     across = intensity / square
-    nx, ny, nz = normals
+    nx, ny, nz = canvas.normals
     cosine = -(dx * nx[rows] + dy * ny[rows] + dz * nz[rows]) / np.sqrt(square)
     return rows, across * np.maximum(cosine, np.float32(0.0)), across
 

@@ -48,6 +48,13 @@ class Model:
 
     cells: Cells | None = None
 
+    @cached_property
+    def is_coarse(self) -> NDArray[np.bool_]:
+        """(K,) whether a triangle is among the coarse ones."""
+        marks = np.zeros(len(self.triangles), dtype=bool)
+        marks[self.coarse] = True
+        return marks
+
 
 class Cells(NamedTuple):
     """The squares of a grid on the ground by which a large model is sorted: the first triangle of each, their numbers,

@@ -14,14 +14,14 @@ from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
 from eidrive_scenario.world.render.contact import Ground, dimmed
 from eidrive_scenario.world.render.daylight import daylight
-from eidrive_scenario.world.render.lamps import Beam
+from eidrive_scenario.world.render.lamps import Beam, numbered
 from eidrive_scenario.world.render.materials import SOAKS
 from eidrive_scenario.world.render.model import Array, Floats, Instance
 from eidrive_scenario.world.render.rasterise import rasterise
 from eidrive_scenario.world.render.shading import Points, shade
 from eidrive_scenario.world.render.shadows import shadow_map
 from eidrive_scenario.world.render.sky import dome, horizon, sample
-from eidrive_scenario.world.render.staging import stage
+from eidrive_scenario.world.render.staging import Stage, Surfaces, stage
 from eidrive_scenario.world.render.surfaces import hollows
 from eidrive_scenario.world.weather import Weather
 
@@ -48,42 +48,50 @@ def render(
     rx, ry, rz, length = _rays(pinhole, pose)
     rays = (rx / length, ry / length, rz / length)
     shape = (pinhole.height, pinhole.width)
-    picture = sample(heaven, *(part.reshape(shape) for part in rays)).reshape(-1, 3)
+    picture = [np.ravel(plane) for plane in cv2.split(sample(heaven, *(part.reshape(shape) for part in rays)))]
     shown = np.flatnonzero(cover.triangle >= 0)
     depth = np.full(len(cover.triangle), np.inf, dtype=np.float32)
     label = np.full(len(cover.triangle), -1, dtype=np.int32)
     if len(shown):
-        nearness = cover.nearness[shown]
-        far = np.float32(1.0) / nearness
+        far = np.float32(1.0) / cover.nearness[shown]
+        triangle, surfaces = _seen_surfaces(staged, cover.triangle[shown])
         points = Points(
-            cover.triangle[shown],
+            triangle,
             rx[shown] * far,
             ry[shown] * far,
             rz[shown] * far,
             (rays[0][shown], rays[1][shown], rays[2][shown]),
             length[shown] * far,
-            pinhole.width,
+            numbered((cover.triangle >= 0).reshape(shape)),
         )
         shadows = shadow_map(casters, light.towards, pose, pinhole) if light.sun.any() else None
-        where = np.full(len(cover.triangle), -1, dtype=np.int32)
-        where[shown] = np.arange(len(shown), dtype=np.int32)
-        upright = staged.normal[:, 2][points.triangle] > 0.9
-        ground_points = Ground(points.x, points.y, points.z, upright, where.reshape(shape))
+        upright = surfaces.normal[2][triangle] > 0.9
+        ground_points = Ground(points.x, points.y, points.z, upright, points.where)
         open_sky = dimmed([each for each in instances if each.label >= 0], ground_points, pose, pinhole)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
-        luminance = shade(points, staged, eye, light, weather, heaven, shadows, felt, open_sky)
+        luminance = shade(points, surfaces, eye, light, weather, heaven, shadows, felt, open_sky)
         if weather.wetness > 0.0:
-            _wet(luminance, shown, points, staged.finish, cover.nearness, open_sky, weather, pose, pinhole, ground)
-        through = np.exp(np.float32(-weather.extinction) * points.distance)[:, None]
-        air = horizon(weather).astype(np.float32)
-        picture[shown] = luminance * through + air * (np.float32(1.0) - through)
-        near = far <= pinhole.far
+            _wet(luminance, shown, points, surfaces.finish, open_sky, weather, pose, pinhole, ground)
+        through = np.exp(np.float32(-weather.extinction) * points.distance)
+        for plane, own, air in zip(picture, luminance, horizon(weather).tolist(), strict=True):
+            plane[shown] = (own - np.float32(air)) * through + np.float32(air)
+        near = np.flatnonzero(far <= pinhole.far)
         depth[shown[near]] = far[near]
-        label[shown[near]] = staged.label[points.triangle[near]]
-    whole: Floats = picture.reshape(*shape, 3)
+        label[shown[near]] = surfaces.label[triangle[near]]
+    whole: Floats = np.asarray(cv2.merge([plane.reshape(shape) for plane in picture]), dtype=np.float32)
     if weather.lamps_on:
         whole = _with_glare(whole)
     return Radiance(whole, depth.reshape(shape), label.reshape(shape))
+
+
+def _seen_surfaces(staged: Stage, triangle: NDArray[np.int32]) -> tuple[NDArray[np.int32], Surfaces]:
+    """The triangles that the picture shows, and their numbers among these."""
+    marks = np.zeros(staged.x.shape[1], dtype=bool)
+    marks[triangle] = True
+    seen = np.flatnonzero(marks)
+    number = np.empty(len(marks), dtype=np.int32)
+    number[seen] = np.arange(len(seen), dtype=np.int32)
+    return number[triangle], staged.surfaces(seen)
 
 
 @lru_cache(maxsize=32)
@@ -108,42 +116,32 @@ def _wet(
     shown: NDArray[np.int64],
     points: Points,
     finish: NDArray[np.uint8],
-    nearness: Floats,
     open_sky: Floats,
     weather: Weather,
     pose: Array,
     pinhole: Pinhole,
     ground: float,
 ) -> None:
-    """Add to luminance (n, 3) what a wet road mirrors, from a picture of half as many lines and columns."""
+    """Add to luminance (3, n) what a wet road mirrors, from a picture of half as many lines and columns."""
     on_road = np.flatnonzero(SOAKS[finish[points.triangle]])
     if not len(on_road):
         return
     shape = (pinhole.height, pinhole.width)
-    whole = np.zeros((pinhole.height * pinhole.width, 6), dtype=np.float32)
-    whole[shown, :3] = luminance
-    whole[shown, 3], whole[shown, 4], whole[shown, 5] = points.x, points.y, points.z
-    small = np.ascontiguousarray(whole.reshape(*shape, 6)[::2, ::2])
-    lines, columns = small.shape[:2]
-    small = small.reshape(-1, 6)
+    some = points.where[::2, ::2]
+    small = replace(pinhole.finer(0.5), width=some.shape[1], height=some.shape[0])
     rx, ry, rz, length = (part.reshape(shape)[::2, ::2] for part in _rays(pinhole, pose))
-    reflected = sample(dome(weather), rx / length, ry / length, np.abs(rz / length)).reshape(-1, 3)
-    image = wet_road.mirrored(
-        small[:, :3],
-        reflected,
-        nearness.reshape(shape)[::2, ::2].ravel(),
-        (small[:, 3], small[:, 4], small[:, 5]),
-        ground - float(pose[2, 3]),
-        pose,
-        replace(pinhole.finer(0.5), width=columns, height=lines),
-    )
-    image = wet_road.blurred(image, lines, columns)
-    image = np.asarray(cv2.resize(image.reshape(lines, columns, 3), shape[::-1], interpolation=cv2.INTER_LINEAR))
+    sky = sample(dome(weather), rx / length, ry / length, np.abs(rz / length))
+    rows = some[some >= 0]
+    places = (points.x[rows], points.y[rows], points.z[rows])
+    image = wet_road.mirrored(luminance[:, rows], places, sky, ground - float(pose[2, 3]), pose, small)
+    image = np.asarray(cv2.resize(wet_road.blurred(image), shape[::-1], interpolation=cv2.INTER_LINEAR))
     x, y = points.x[on_road] + np.float32(pose[0, 3] % 4096.0), points.y[on_road] + np.float32(pose[1, 3] % 4096.0)
     share = wet_road.reflectance(np.abs(points.ray[2][on_road]))
     share *= wet_road.puddles(x, y, weather.wetness, hollows())
-    seen = image.reshape(-1, 3)[shown[on_road]] * open_sky[on_road][:, None]
-    luminance[on_road] += share[:, None] * (seen - luminance[on_road])
+    dim = open_sky[on_road]
+    for own, plane in zip(luminance, cv2.split(image), strict=True):
+        before = own[on_road]
+        own[on_road] = before + share * (np.ravel(plane)[shown[on_road]] * dim - before)
 
 
 def _with_glare(picture: Floats) -> Floats:

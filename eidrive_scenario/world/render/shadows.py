@@ -82,10 +82,9 @@ def shadow_map(casters: Sequence[Instance], towards: Array, pose: Array, pinhole
     if not found:
         return None
     corners = np.concatenate(found)
-    level = corners @ towards
+    across, up, level = (np.ascontiguousarray((corners @ axis).reshape(-1, 3).T) for axis in (*axes, towards))
     base = float(level.min()) - 1.0
-    places = (corners @ axes.T - low) * scale
-    cover = rasterise(places[..., 0], places[..., 1], level - base, width, height)
+    cover = rasterise((across - low[0]) * scale, (up - low[1]) * scale, level - base, width, height)
     return ShadowMap(
         np.where(cover.triangle >= 0, cover.nearness, np.float32(-np.inf)),
         width,
@@ -120,7 +119,7 @@ def _seen_ground(pose: Array, pinhole: Pinhole) -> Array:
 
 
 def _away(caster: Instance, towards: Array, axes: Array, eye: Array, low: Array, high: Array) -> Array | None:
-    """Corners (K, 3, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
+    """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
     them can shade the grid."""
     model = caster.model
     centre = caster.rotation @ model.centre + caster.position - eye
@@ -133,10 +132,11 @@ def _away(caster: Instance, towards: Array, axes: Array, eye: Array, low: Array,
         radius = model.cells.radius[:, None]
         within = (flat + radius >= low) & (flat - radius <= high)
         rows = model.cells.rows(within[:, 0] & within[:, 1])
+        rows = rows[model.is_coarse[rows]]
     else:
         rows = model.coarse
     rows = rows[model.normals[rows] @ sun < 0.0]
     if not len(rows):
         return None
-    corners: NDArray[np.float64] = model.triangles[rows] @ caster.rotation.T + (caster.position - eye)
+    corners: NDArray[np.float64] = model.triangles[rows].reshape(-1, 3) @ caster.rotation.T + (caster.position - eye)
     return corners

@@ -15,18 +15,41 @@ _COARSE_PIXELS = 14.0
 """A model whose diameter covers fewer pixels is drawn coarsely."""
 
 
-class Stage(NamedTuple):
-    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (N, 3) at their corners, and of each the normal in
-    the world (N, 3), albedo (N, 3), finish (N,), label (N,) and what it emits (N, 3) [cd/m²]."""
+class Surfaces(NamedTuple):
+    """What N triangles are: normal in the world (3, N), albedo (3, N), finish (N,), label (N,) and what they emit
+    (3, N) [cd/m²]."""
 
-    x: Array
-    y: Array
-    nearness: Array
     normal: Floats
     albedo: Floats
     finish: NDArray[np.uint8]
     label: NDArray[np.int32]
     glow: Floats
+
+
+class Stage(NamedTuple):
+    """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners; of each the row among the
+    M that were not cut (N,), and what those are: normal, albedo (M, 3), finish, label (M,) and glow (M, 3)."""
+
+    x: Array
+    y: Array
+    nearness: Array
+    whose: NDArray[np.int64]
+    normal: Floats
+    albedo: Floats
+    finish: NDArray[np.uint8]
+    label: NDArray[np.int32]
+    glow: Floats
+
+    def surfaces(self, triangles: NDArray[np.int64]) -> Surfaces:
+        """Of some of the triangles."""
+        rows = self.whose[triangles]
+        return Surfaces(
+            np.ascontiguousarray(self.normal[rows].T),
+            np.ascontiguousarray(self.albedo[rows].T),
+            self.finish[rows],
+            self.label[rows],
+            np.ascontiguousarray(self.glow[rows].T),
+        )
 
 
 class _Chosen(NamedTuple):
@@ -47,25 +70,25 @@ def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage
         if found is not None:
             chosen.append(found)
     if not chosen:
-        chosen = [_Chosen(*(np.empty((0, *shape), dtype=kind) for shape, kind in _EMPTY))]
-    corners = np.concatenate([part.corners for part in chosen]).astype(np.float64)
-    normal, albedo, finish, label, glow = (
-        np.concatenate([part[column] for part in chosen]) for column in range(1, len(_Chosen._fields))
+        chosen = [_NOTHING]
+    corners, normal, albedo, finish, label, glow = (
+        np.concatenate([part[column] for part in chosen]) for column in range(len(_Chosen._fields))
     )
-    corners, inside = _cut(corners, pinhole.near)
-    nearness = 1.0 / corners[..., 2]
-    x = pinhole.focal * corners[..., 0] * nearness + pinhole.centre_x
-    y = pinhole.focal * corners[..., 1] * nearness + pinhole.centre_y
-    return Stage(x, y, nearness, normal[inside], albedo[inside], finish[inside], label[inside], glow[inside])
+    # Corner by corner, axis by axis: (3, 3, N).
+    (x, y, depth), whose = _cut(np.ascontiguousarray(corners.transpose(2, 1, 0), dtype=np.float64), pinhole.near)
+    nearness = 1.0 / depth
+    x = pinhole.focal * x * nearness + pinhole.centre_x
+    y = pinhole.focal * y * nearness + pinhole.centre_y
+    return Stage(x, y, nearness, whose, normal, albedo, finish, label, glow)
 
 
-_EMPTY = (
-    ((3, 3), np.float32),
-    ((3,), np.float32),
-    ((3,), np.float32),
-    ((), np.uint8),
-    ((), np.int32),
-    ((3,), np.float32),
+_NOTHING = _Chosen(
+    np.empty((0, 3, 3), dtype=np.float32),
+    np.empty((0, 3), dtype=np.float32),
+    np.empty((0, 3), dtype=np.float32),
+    np.empty(0, dtype=np.uint8),
+    np.empty(0, dtype=np.int32),
+    np.empty((0, 3), dtype=np.float32),
 )
 
 
@@ -110,13 +133,14 @@ def _facing(instance: Instance, pose: Array, pinhole: Pinhole, sides: Array, pix
         rows = np.flatnonzero(model.normals @ eye > model.plane)
     if not len(rows):
         return None
-    corners = model.triangles[rows] @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
+    # As one table of corners: numpy multiplies a stack of small matrices one by one.
+    corners = model.triangles[rows].reshape(-1, 3) @ to_camera.T.astype(np.float32) + shift.astype(np.float32)
     glow = np.zeros((len(rows), 3), dtype=np.float32)
     if instance.glow:
         by_material = np.array([instance.glow.get(name, (0.0, 0.0, 0.0)) for name in model.materials], dtype=np.float32)
         glow = by_material[model.material[rows]]
     return _Chosen(
-        corners,
+        corners.reshape(-1, 3, 3),
         model.normals[rows] @ instance.rotation.T.astype(np.float32),
         model.albedo[rows],
         model.finish[rows],
@@ -126,20 +150,22 @@ def _facing(instance: Instance, pose: Array, pinhole: Pinhole, sides: Array, pix
 
 
 def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
-    """Triangles (N, 3, 3) without what is nearer than the near plane, and of each the row that it came from.
+    """Triangles, (3, 3, N) by axis and corner, without what is nearer than the near plane, and the rows they had.
 
     Of one with one corner behind the plane two are left, of one with two corners behind it one.
     """
-    behind = corners[..., 2] < near
-    count = behind.sum(axis=1)
+    behind = corners[2] < near
+    count = behind[0].astype(np.int8) + behind[1] + behind[2]
     whole = np.flatnonzero(count == 0)
-    parts, whose = [corners[whole]], [whole]
+    if len(whole) == corners.shape[2]:
+        return corners, whole
+    parts, whose = [corners[:, :, whole]], [whole]
     for number in (1, 2):
         rows = np.flatnonzero(count == number)
         if not len(rows):
             continue
-        odd = np.argmax(behind[rows] if number == 1 else ~behind[rows], axis=1)
-        a, b, c = (corners[rows, (odd + k) % 3] for k in range(3))
+        odd = np.argmax(behind[:, rows] if number == 1 else ~behind[:, rows], axis=0)
+        a, b, c = (corners[:, (odd + k) % 3, rows] for k in range(3))
         ab, ac = _crossing(a, b, near), _crossing(a, c, near)
         if number == 1:
             parts += [np.stack([ab, b, c], axis=1), np.stack([ab, c, ac], axis=1)]
@@ -147,10 +173,11 @@ def _cut(corners: Array, near: float) -> tuple[Array, NDArray[np.int64]]:
         else:
             parts.append(np.stack([a, ab, ac], axis=1))
             whose.append(rows)
-    return np.concatenate(parts), np.concatenate(whose)
+    return np.concatenate(parts, axis=2), np.concatenate(whose)
 
 
 def _crossing(first: Array, second: Array, near: float) -> Array:
-    share = (near - first[:, 2]) / (second[:, 2] - first[:, 2])
-    found: Array = first + share[:, None] * (second - first)
+    """Where edges between corners (3, N) meet the near plane."""
+    share = (near - first[2]) / (second[2] - first[2])
+    found: Array = first + share * (second - first)
     return found

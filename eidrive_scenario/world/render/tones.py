@@ -27,9 +27,16 @@ def white_level(luminance: Floats) -> float:
     The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
     1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
-    mean = math.exp(float(np.log(np.maximum(luminance[::2, ::2] @ LUMA, np.float32(BLACK))).mean()))
+    mean = math.exp(float(np.log(np.maximum(_luma(luminance[::2, ::2]), np.float32(BLACK))).mean()))
     key = max(BRIGHTNESS * (1.03 - 2.0 / (2.0 + math.log10(mean + 1.0))), DARKEST)
     return HEADROOM * mean / key
+
+
+def _luma(luminance: Floats) -> Floats:
+    """Luminance (H, W) of a picture (H, W, 3)."""
+    red, green, blue = (np.float32(part) for part in LUMA)
+    found: Floats = luminance[..., 0] * red + luminance[..., 1] * green + luminance[..., 2] * blue
+    return found
 
 
 def toned(signal: Floats) -> NDArray[np.uint8]:

@@ -18,52 +18,42 @@ _HEIGHT = 0.15
 
 
 def mirrored(
-    light: Floats,
-    sky: Floats,
-    nearness: Floats,
-    places: tuple[Floats, Floats, Floats],
-    ground: float,
-    pose: Array,
-    pinhole: Pinhole,
+    light: Floats, places: tuple[Floats, Floats, Floats], sky: Floats, ground: float, pose: Array, pinhole: Pinhole
 ) -> Floats:
-    """(H · W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
+    """(H, W, 3) what a mirror in the plane z = ground [m, relative to the camera] would show in each pixel.
 
-    light (H · W, 3), nearness and places (x, y, z relative to the camera) of what the picture shows; `sky` is what the
-    mirror shows where it has nothing else. Only what the picture shows is mirrored.
+    light (3, n) of the points that the picture shows, at places x, y, z (n,) relative to the camera; sky (H, W, 3) is
+    what the mirror shows where it has nothing else. Only what the picture shows is mirrored.
     """
-    x, y, z = places
-    standing = np.flatnonzero((z > ground + _HEIGHT) & (nearness > 0.0))
-    image = sky.copy()
+    standing = np.flatnonzero(places[2] > ground + _HEIGHT)
     if not len(standing):
-        return image
-    mx, my, mz = x[standing], y[standing], np.float32(2.0 * ground) - z[standing]
+        return sky
+    x, y, z = (part[standing] for part in places)
+    z = np.float32(2.0 * ground) - z
     right, down, forward = (pose[:3, k].astype(np.float32) for k in range(3))
-    depth = mx * forward[0] + my * forward[1] + mz * forward[2]
-    depth = np.maximum(depth, np.float32(1e-3))
-    u = (mx * right[0] + my * right[1] + mz * right[2]) / depth * np.float32(pinhole.focal) + np.float32(
-        pinhole.centre_x
-    )
-    v = (mx * down[0] + my * down[1] + mz * down[2]) / depth * np.float32(pinhole.focal) + np.float32(pinhole.centre_y)
+    depth = np.maximum(x * forward[0] + y * forward[1] + z * forward[2], np.float32(1e-3))
+    scale = np.float32(pinhole.focal) / depth
+    u = (x * right[0] + y * right[1] + z * right[2]) * scale + np.float32(pinhole.centre_x)
+    v = (x * down[0] + y * down[1] + z * down[2]) * scale + np.float32(pinhole.centre_y)
     inside = np.flatnonzero((u >= 0) & (u < pinhole.width) & (v >= 0) & (v < pinhole.height) & (depth > 0.3))
     target = v[inside].astype(np.int64) * pinhole.width + u[inside].astype(np.int64)
     key = (np.float32(1.0) / depth[inside]).view(np.uint32).astype(np.uint64) << np.uint64(32)
     key |= (inside + 1).astype(np.uint64)
-    held = np.zeros(len(image), dtype=np.uint64)
+    held = np.zeros(pinhole.width * pinhole.height, dtype=np.uint64)
     np.maximum.at(held, target, key)
     source = (held & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
     found = np.flatnonzero(source >= 0)
-    image[found] = light[standing[source[found]]]
-    return image
+    image = sky.reshape(-1, 3).copy()
+    image[found] = light[:, standing[source[found]]].T
+    return image.reshape(sky.shape)
 
 
-def blurred(image: Floats, height: int, width: int) -> Floats:
-    """The same in a rough surface: drawn out up and down, a little sideways."""
+def blurred(image: Floats) -> Floats:
+    """The same picture (H, W, 3) in a rough surface: drawn out up and down, a little sideways."""
+    height, width = image.shape[:2]
     tall = max(3, round(height / 24)) | 1
     wide = max(1, round(width / 160)) | 1
-    picture = cv2.blur(image.reshape(height, width, 3), (wide, tall))
-    picture = cv2.blur(picture, (1, tall))
-    found: Floats = np.asarray(picture, dtype=np.float32).reshape(-1, 3)
-    return found
+    return np.asarray(cv2.blur(cv2.blur(image, (wide, tall)), (1, tall)), dtype=np.float32)
 
 
 def reflectance(cosine: Floats) -> Floats:
