@@ -1,0 +1,210 @@
+"""Points of others among the own ones."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.driving.agent import Agent, build_agent
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.registry import registry
+from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
+from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.v2x.message import Received
+from eidrive_scenario.v2x.point_cloud import HEADER_BYTES
+from eidrive_scenario.world.actor import ActorSpec
+
+EGO = ActorSpec("Ego", "car", "car", (4.6, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.85, max_steering=0.6)
+RSU = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+HIGH = 1.9
+CAR = (20.0, 4.0)
+
+
+def pose(x: float, y: float, yaw: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    matrix[:3, 3] = x, y, HIGH
+    return matrix
+
+
+def ground() -> np.ndarray:
+    x, y = np.meshgrid(np.arange(-8.0, 40.0, 0.8), np.arange(-12.0, 12.0, 0.8))
+    return np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+
+
+def car(x: float, y: float, sides: str, length: float = 4.5) -> np.ndarray:
+    """Points on the sides of a car, 1.8 m wide and 1.5 m high, that heads along x: f, b, l, r."""
+    end = length / 2.0
+    along, across, up = np.arange(-end, end + 0.01, 0.15), np.arange(-0.9, 0.91, 0.15), np.arange(0.2, 1.5, 0.15)
+    faces = {
+        "l": [(a, 0.9, z) for a in along for z in up],
+        "r": [(a, -0.9, z) for a in along for z in up],
+        "f": [(end, a, z) for a in across for z in up],
+        "b": [(-end, a, z) for a in across for z in up],
+    }
+    points: np.ndarray = np.concatenate([np.array(faces[side]) for side in sides])
+    return points + np.array([x, y, 0.0])
+
+
+def readings(time: float, at: tuple[float, float, float], *objects: np.ndarray) -> Readings:
+    """A station at x, y, yaw whose LiDAR gets these points of the world, and those of the ground."""
+    sensor = pose(*at)
+    points = (np.concatenate([ground(), *objects]) - sensor[:3, 3]) @ sensor[:3, :3]
+    lidar = LidarReading(points, np.ones(len(points)), sensor)
+    ego = EgoState(time, np.array([at[0], at[1], 0.0]), at[2], 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Readings(time, ego, lidars={"lidar": lidar})
+
+
+def agent(spec: ActorSpec, **more: object) -> Agent:
+    settings = {"fusion": "early", "detector": "lidar", "tracker": "none", **more}
+    return build_agent(AgentSettings.model_validate(settings), spec, None, seed=0, dt=0.05)
+
+
+def test_it_comes_through_its_entry_point() -> None:
+    assert registry("fusion").load("early") is EarlyFusion
+
+
+def test_points_of_others_stand_where_they_were_measured() -> None:
+    fusion = EarlyFusion(EarlyFusionSettings(cell=0.05))
+    other = readings(0.0, (40.0, -5.0, 2.5), car(*CAR, "f"))
+    cloud = fusion.cloud(other)
+    assert cloud is not None
+    own = readings(0.0, (1.0, 2.0, 0.3))
+    joined = fusion.joined(own, [cloud.points()]).lidars["lidar"]
+    world = joined.points @ joined.pose[:3, :3].T + joined.pose[:3, 3]
+    count = len(own.lidars["lidar"].points)
+    np.testing.assert_array_equal(joined.points[:count], own.lidars["lidar"].points)
+    np.testing.assert_allclose(world[count:], cloud.points(), atol=1e-9)
+    assert len(joined.intensity) == len(joined.points)
+    assert fusion.cloud(Readings(0.0, own.ego)) is None
+
+
+def test_a_car_that_only_the_other_can_see_is_found_and_passed_to_nobody() -> None:
+    ego, rsu = agent(EGO), agent(RSU)
+    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox
+    assert told[0].points is not None
+    assert told[0].size == 121 + 35 * (1 + len(told[0].detections)) + told[0].points.size > 1000
+    step = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [Received(told[0], 0.05)], 0.05, None)
+    assert len(step.detections) == 0
+    assert len(step.outbox[0].detections) == 0, "what the ego sees itself"
+    assert len(step.fused) == 1
+    assert math.dist(step.fused.boxes[0, :2], CAR) < 0.5
+
+
+def test_both_sides_of_a_car_give_a_better_box_than_either() -> None:
+    """The ego sees the rear, the unit the front and the left of a car that is longer than most."""
+    ego, rsu = agent(EGO), agent(RSU)
+    rear = car(*CAR, "b", 5.4)
+    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl", 5.4)), (), 0.0, None).outbox
+    alone = agent(EGO).act(readings(0.05, (0.0, 4.0, 0.0), rear), (), 0.05, None).fused
+    both = ego.act(readings(0.05, (0.0, 4.0, 0.0), rear), [Received(told[0], 0.05)], 0.05, None).fused
+    assert len(alone) == len(both) == 1
+    assert math.dist(both.boxes[0, :2], CAR) < 0.1 < math.dist(alone.boxes[0, :2], CAR)
+    assert both.boxes[0, 3] == pytest.approx(5.4, abs=0.1)
+
+
+def test_the_own_body_in_the_points_of_others_is_no_obstacle() -> None:
+    """The ego drives at 15 m/s, and the cloud is 0.3 s old."""
+    ego, rsu = agent(EGO), agent(RSU)
+    here = [readings(0.05 * tick, (0.75 * tick, 0.0, 0.0)) for tick in range(8)]
+    body = car(EGO.offset[0], 0.0, "fblr")
+    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body), (), 0.0, None).outbox[0]
+    for tick, given in enumerate(here[:-1]):
+        ego.act(given, (), 0.05 * tick, None)
+    assert len(ego.act(here[-1], [Received(told, 0.35)], 0.35, None).fused) == 0
+
+
+def test_old_points_are_not_joined_and_late_ones_do_not_replace_newer() -> None:
+    ego, rsu = agent(EGO, fusion_settings={"max_lateness": 0.2}), agent(RSU)
+    old = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    new = rsu.act(readings(0.1, (40.0, 12.0, math.pi)), (), 0.1, None).outbox[0]
+    assert len(ego.act(readings(0.2, (0.0, 0.0, 0.0)), [Received(old, 0.2)], 0.2, None).fused) == 1
+    assert len(ego.act(readings(0.25, (0.0, 0.0, 0.0)), (), 0.25, None).outbox) == 1
+    fresh = agent(EGO)
+    step = fresh.act(readings(0.2, (0.0, 0.0, 0.0)), [Received(new, 0.15), Received(old, 0.2)], 0.2, None)
+    assert len(step.fused) == 0
+
+
+def test_stations_that_share_no_points_are_heard_too() -> None:
+    ego, plain = agent(EGO), agent(RSU, fusion="covariance_intersection")
+    told = plain.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    assert told.points is None
+    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [Received(told, 0.05)], 0.05, None).fused
+    assert len(fused) == 1
+
+
+def test_it_takes_a_detector_for_lidar() -> None:
+    with pytest.raises(SettingError, match=r"fusion 'early' joins points, and detector 'oracle' looks at none"):
+        agent(EGO, detector="oracle")
+
+
+def edited(tmp_path: Path, *replacements: tuple[str, str]) -> Path:
+    """Scenario 1 with other words, its references still leading to the library."""
+    source = resolve_scenario("coop/scenario_1")
+    text = source.read_text().replace('"../', f'"{source.parent.parent}/')
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "edited.xosc"
+    path.write_text(text)
+    return path
+
+
+EARLY = ('name="fusion" value="average"/>', 'name="fusion" value="early"/>')
+
+
+@pytest.mark.parametrize(
+    ("replacement", "expected"),
+    [
+        (EARLY, "detector 'oracle' looks at none"),
+        ((EARLY[0], 'name="fusion" value="erly"/>'), "did you mean 'early'"),
+        (
+            (EARLY[0], EARLY[1].replace("early", "covariance_intersection") + '<Property name="fusion_settings" '
+             'value="{gaet: 0.9}"/>'),
+            "did you mean 'gate'",
+        ),
+        (
+            (EARLY[0], EARLY[1].replace("early", "covariance_intersection") + '<Property name="fusion_settings" '
+             'value="{gate: 1.3}"/>'),
+            "less than 1",
+        ),
+        ((EARLY[0], EARLY[0] + '<Property name="fusion_settings" value="{gate: 0.9}"/>'), "has no settings of its own"),
+    ],
+)  # fmt: skip
+def test_wrong_settings_are_told_with_file_and_line(
+    replacement: tuple[str, str], expected: str, tmp_path: Path
+) -> None:
+    path = edited(tmp_path, replacement)
+    with pytest.raises(InputError, match=expected) as caught:
+        Simulation(load_scenario(path), seed=1)
+    problem = caught.value.problems[0]
+    assert problem.source == str(path)
+    assert "fusion" in path.read_text().splitlines()[(problem.line or 0) - 1]
+
+
+def test_a_run_with_lidars(tmp_path: Path) -> None:
+    """The points travel with their size, and the car behind the truck is known."""
+    frames: list[Frame] = []
+
+    class Watch:
+        def observe(self, frame: Frame) -> None:
+            frames.append(frame)
+
+        def close(self) -> None:
+            pass
+
+    path = edited(tmp_path, EARLY)
+    run_file(path, seed=1, settings=RunSettings(channel="ideal", detector="lidar", time_limit=1.0), observers=[Watch()])
+    sizes = [link.size for frame in frames for link in frame.links]
+    assert min(sizes) > HEADER_BYTES + 3000
+    last = frames[-1]
+    truth = last.view.boxes[last.view.rows["Incoming"], :2]
+    assert np.linalg.norm(last.steps["Ego"].fused.boxes[:, :2] - truth, axis=1).min() < 1.0
