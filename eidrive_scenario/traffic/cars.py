@@ -39,7 +39,7 @@ class Cars:
     shift         offset at the start of a lane change [m];  shift_done, shift_length  of its way [m]
     plan          rows of the lanes that the car takes, its own first, -1 beyond the end
     granted       which of them, in junctions, it may enter
-    asked         tick since which it has been asking for a junction, 0 while it does not
+    asked         since when it has been asking for a junction [s], NaN while it does not
     turns         forks that it has decided;  number  running number, the same for its whole life
     walks         True for who walks, on sidewalks
     """
@@ -57,7 +57,7 @@ class Cars:
     shift: Array = field(default_factory=_floats)
     shift_done: Array = field(default_factory=_floats)
     shift_length: Array = field(default_factory=_floats)
-    asked: Integers = field(default_factory=_integers)
+    asked: Array = field(default_factory=_floats)
     turns: Integers = field(default_factory=_integers)
     number: Integers = field(default_factory=_integers)
     walks: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.crossings import Crossings
@@ -17,7 +16,6 @@ from eidrive_scenario.traffic.lane_changes import DECIDE_EACH, LaneChanges
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
 from eidrive_scenario.traffic.leaders import (
     FIXED,
-    LOOK_AHEAD,
     Leaders,
     Occupants,
     find_leaders,
@@ -26,18 +24,13 @@ from eidrive_scenario.traffic.leaders import (
     together,
 )
 from eidrive_scenario.traffic.mobil import LaneChanger
+from eidrive_scenario.traffic.plans import Plans
+from eidrive_scenario.traffic.right_of_way import RightOfWay
 from eidrive_scenario.traffic.stop_lines import MustStop, StopLines
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
-
-STOP_LINE = 1.0
-"""A car that waits for a junction stops this far before it [m]."""
-PATIENCE = 20.0
-"""A car that has waited so long before a junction is not overtaken by others any more [s]."""
-TOO_LATE = 4.0
-"""A car that would have to brake harder than this passes a light that has just turned [m/s²]."""
 
 
 class Fleet:
@@ -61,8 +54,9 @@ class Fleet:
         self.driver = driver or IntelligentDriver()
         self.departed: frozenset[str] = frozenset()
         self.lanes = TrafficLanes(roads)
-        self._seed = seed
-        self._crossings = Crossings(self.lanes)
+        crossings = Crossings(self.lanes)
+        self._right_of_way = RightOfWay(self.lanes, crossings)
+        self._plans = Plans(self.lanes, crossings, seed)
         self._changes = LaneChanges(self.lanes, changer or LaneChanger(), self.driver)
         self._lines = None if must_stop is None else StopLines(self.lanes, must_stop)
         self._cars = Cars()
@@ -168,6 +162,7 @@ class Fleet:
             factor=factor,
             top_speed=spec.max_speed,
             fallback=fallback,
+            asked=math.nan,
             number=self._made,
             walks=bool(self.lanes.walkable[row]),
         )
@@ -176,15 +171,14 @@ class Fleet:
         self._cars.plan[index, 0] = row
         self._poses = None
         if self.lanes.in_junction[row] and not self.lanes.walkable[row]:
-            self._crossings.take(row, spec.name)
-            self._cars.granted[index, 0] = True
-        self._extend(index)
+            self._right_of_way.take(self._cars, index)
+        self._plans.extend(self._cars, index)
         return self._placement(index, teleport=True)
 
     def remove(self, name: str) -> None:
         """Take a car out."""
         index = self._index[name]
-        self._crossings.forget(name)
+        self._right_of_way.forget(name)
         self._cars.delete(index)
         self._poses = None
         self._index = {spec.name: n for n, spec in enumerate(self._cars.specs)}
@@ -231,10 +225,10 @@ class Fleet:
         begins = np.cumsum(row_lengths, axis=1) - row_lengths - cars.progress[:, None]
         occupants = self.occupants()
         leaders = self._leaders(occupants)
-        lights = self._lights()
-        self._update_crossings(leaders.or_nearer(lights), lights, begins, dt)
-        desired = self._desired_speeds(begins)
-        halted = leaders.or_nearer(lights).or_nearer(self._waits(begins))
+        lights = Leaders.none(len(cars)) if self._lines is None else self._lines.ahead(cars)
+        self._right_of_way.hand_out(cars, leaders.or_nearer(lights), lights, begins, self._moving, self._ticks * dt)
+        desired = self._plans.desired_speeds(cars, begins)
+        halted = leaders.or_nearer(lights).or_nearer(self._right_of_way.waits(cars, begins))
         acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
         self._change_lanes(dt, leaders, desired, occupants, begins)
         covered, cars.speed = ballistic(cars.speed, acceleration, dt)
@@ -277,101 +271,6 @@ class Fleet:
             leaders = Leaders(gap, speed)
         return Leaders(leaders.gap * self.lanes.stretch(cars.row, cars.progress), leaders.speed)
 
-    def _lights(self) -> Leaders:
-        """The stop lines before lights that tell cars to stop, for those that still can."""
-        cars = self._cars
-        closed = nobody() if self._lines is None else self._lines.closed()
-        none = np.zeros(len(cars))
-        lights = find_leaders(self.lanes, cars.plan, cars.progress + cars.front, none, closed)
-        with np.errstate(divide="ignore"):
-            late = cars.speed**2 / (2.0 * np.maximum(lights.gap, 0.0)) > TOO_LATE
-        binding = (lights.gap >= 0.0) & ~(late & (cars.speed > 0.0)) & ~cars.walks
-        return Leaders(np.where(binding, np.maximum(lights.gap - STOP_LINE, 1e-3), np.inf), lights.speed)
-
-    def _waiting_lane(self) -> NDArray[np.bool_]:
-        """(N, D) for each lane of the plans beyond the first, whether the car has to wait before it."""
-        cars = self._cars
-        ahead: NDArray[np.bool_] = (cars.plan >= 0) & self.lanes.in_junction[cars.plan]
-        ahead &= ~cars.granted & ~cars.walks[:, None]
-        ahead[:, 0] = False
-        return ahead
-
-    def _distances_to_wait(self, begins: Array) -> Array:
-        """(N,) metres to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
-        distance = np.where(self._waiting_lane(), begins, np.inf).min(axis=1)
-        return np.where(distance > LOOK_AHEAD, np.inf, distance)
-
-    def _waits(self, begins: Array) -> Leaders:
-        """The stop lines of junctions that cars may not enter yet."""
-        wait = self._distances_to_wait(begins) - self._cars.front - STOP_LINE
-        return Leaders(np.maximum(wait, 1e-3), np.zeros(len(self)))
-
-    def _update_crossings(self, leaders: Leaders, lights: Leaders, begins: Array, dt: float) -> None:
-        """Hand passages through junctions to the cars that come near and may have them: first come, first served.
-
-        Lanes that meet one beneath a foreign actor on the move are not handed out, nor what would hold up a car that
-        has lost its patience. Who is stopped by a light before the junction gives back what it got.
-        """
-        cars = self._cars
-        names = list(self._index)
-        for index in np.flatnonzero(cars.granted[:, 0]).tolist():
-            held = self._crossings.holders[int(cars.plan[index, 0])]
-            held[names[index]] = float(cars.progress[index] + cars.rear[index])
-        ahead = cars.granted.any(axis=1) & ~cars.granted[:, 0] & np.isfinite(lights.gap)
-        for index in np.flatnonzero(ahead).tolist():
-            if lights.gap[index] + cars.front[index] < begins[index, np.argmax(cars.granted[index])]:
-                self._crossings.forget(names[index])
-                cars.granted[index] = False
-        distance = self._distances_to_wait(begins)
-        v = cars.speed
-        close = distance <= v * v / (2.0 * cars.drivers.deceleration) + cars.front + 4.0 * STOP_LINE + v
-        gap = leaders.gap + cars.front
-        asking = []
-        for index in np.flatnonzero(close & (gap > distance)).tolist():
-            passage = self._passage(index)
-            behind = distance[index] + self.lanes.length[passage].sum() - cars.rear[index]
-            if gap[index] > behind + cars.drivers.standstill_gap[index]:
-                since = int(cars.asked[index]) or self._ticks
-                cars.asked[index] = since
-                asking.append((since, float(distance[index]), names[index], index, passage))
-        kept_free: set[int] = set()
-        for since, _, name, index, passage in sorted(asking):
-            if all(self._crossings.free(row, name, self._moving | kept_free) for row in passage):
-                for row in passage:
-                    self._crossings.take(row, name)
-                cars.granted[index] |= np.isin(cars.plan[index], passage)
-                cars.asked[index] = 0
-            elif (self._ticks - since) * dt > PATIENCE:
-                kept_free.update(passage)
-
-    def _passage(self, index: int) -> list[int]:
-        """The lanes through the next junction that a car may not enter yet, to the end of its last connecting road."""
-        cars, lanes = self._cars, self.lanes
-        found: list[int] = []
-        for row, granted in zip(cars.plan[index, 1:].tolist(), cars.granted[index, 1:].tolist(), strict=True):
-            if row >= 0 and lanes.in_junction[row] and not granted:
-                found.append(row)
-            elif found:
-                return found
-        while (ways := lanes.following(found[-1])) and lanes.road[ways[0]] == lanes.road[found[-1]]:
-            found.append(ways[0])
-        return found
-
-    def _desired_speeds(self, begins: Array) -> Array:
-        """Each car's own speed or the limit, less before bends so that comfortable braking suffices."""
-        cars = self._cars
-        limit = self.lanes.limits(cars.row, cars.progress) * cars.factor
-        wanted = np.where(
-            np.isfinite(limit), limit, np.where(np.isinf(limit), np.maximum(FREE, cars.fallback), cars.fallback)
-        )
-        wanted = np.minimum(np.where(np.isnan(cars.own_speed), wanted, cars.own_speed), cars.top_speed)
-        seen = (cars.plan >= 0) & (begins <= LOOK_AHEAD)
-        bend = self.lanes.tightest(np.where(seen, cars.plan, cars.row[:, None]))
-        square = cars.drivers.lateral_acceleration[:, None] / np.maximum(bend, 1e-6)
-        square = square + 2.0 * cars.drivers.deceleration[:, None] * np.maximum(begins, 0.0)
-        slowest = np.sqrt(np.where(seen, square, np.inf).min(axis=1))
-        return np.asarray(np.minimum(wanted, slowest))
-
     def _change_lanes(self, dt: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array) -> None:
         """Let the drivers whose turn it is think of another lane."""
         cars = self._cars
@@ -386,46 +285,11 @@ class Fleet:
             cars.plan[index] = -1
             cars.plan[index, 0] = target
             cars.granted[index] = False
-            self._extend(index)
+            self._plans.extend(cars, index)
 
     def _pass_ends(self) -> None:
         """Cars that have come to the end of their lane go on in the next one, or leave."""
-        cars, lanes = self._cars, self.lanes
-        gone = []
-        for index in np.flatnonzero(cars.progress >= lanes.length[cars.row]).tolist():
-            name = cars.specs[index].name
-            while cars.progress[index] >= lanes.length[cars.plan[index, 0]]:
-                if cars.plan[index, 1] < 0:
-                    gone.append(name)
-                    break
-                left, entered = int(cars.plan[index, 0]), int(cars.plan[index, 1])
-                beyond = float(cars.progress[index] - lanes.length[left])
-                scale = lanes.stretch(np.array([left, entered]), np.array([lanes.lengths[left], 0.0]))
-                cars.progress[index] = beyond * float(scale[0] / scale[1])
-                if cars.granted[index, 0]:
-                    self._crossings.release(name, left)
-                cars.plan[index] = np.append(cars.plan[index, 1:], -1)
-                cars.granted[index] = np.append(cars.granted[index, 1:], False)
-                self._extend(index)
+        gone = self._plans.pass_ends(self._cars)
         for name in gone:
             self.remove(name)
         self.departed = frozenset(gone)
-
-    def _extend(self, index: int) -> None:
-        """Plan further lanes until they reach as far as a leader counts; forks by the car's own random numbers."""
-        cars, lengths = self._cars, self.lanes.lengths
-        plan = [row for row in cars.plan[index].tolist() if row >= 0]
-        ahead = sum(lengths[row] for row in plan[1:])
-        while ahead < LOOK_AHEAD and len(plan) <= PLANNED:
-            choices = self.lanes.following(plan[-1])
-            if not choices:
-                break
-            pick = 0
-            if len(choices) > 1:
-                name, turn = cars.specs[index].name, int(cars.turns[index])
-                pick = int(generator(self._seed, "traffic", name, turn).integers(len(choices)))
-                cars.turns[index] += 1
-            cars.plan[index, len(plan)] = choices[pick]
-            cars.granted[index, len(plan)] = self._crossings.holds(cars.specs[index].name, choices[pick])
-            plan.append(choices[pick])
-            ahead += lengths[choices[pick]]

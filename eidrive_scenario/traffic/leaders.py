@@ -67,6 +67,11 @@ class Leaders:
     gap: Array
     speed: Array
 
+    @classmethod
+    def none(cls, count: int) -> Leaders:
+        """Nobody ahead of anybody."""
+        return cls(np.full(count, np.inf), np.zeros(count))
+
     def or_nearer(self, other: Leaders) -> Leaders:
         """The nearer one of two, for each car."""
         nearer = other.gap < self.gap

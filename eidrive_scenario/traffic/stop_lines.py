@@ -8,9 +8,14 @@ import numpy as np
 
 from eidrive_scenario.roads.location import LaneKey
 from eidrive_scenario.roads.model import SignalPlace
+from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import FIXED, Occupants, nobody
+from eidrive_scenario.traffic.leaders import FIXED, Leaders, Occupants, find_leaders, nobody
 
+STOP_LINE = 1.0
+"""Cars wait this far before a line [m]."""
+TOO_LATE = 4.0
+"""A car that would have to brake harder than this passes a light that has just turned [m/s²]."""
 MustStop = Callable[[str], bool]
 """Whether the traffic light of this id tells traffic to stop now."""
 
@@ -64,3 +69,12 @@ class StopLines:
             still = np.zeros(len(row))
             self._closed = Occupants(row, progress, progress, progress, still, np.full(len(row), FIXED))
         return self._closed
+
+    def ahead(self, cars: Cars) -> Leaders:
+        """The lines at which cars have to stop, those left out that would have to brake too hard."""
+        none = np.zeros(len(cars))
+        lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
+        with np.errstate(divide="ignore"):
+            late = (cars.speed > 0.0) & (cars.speed**2 / (2.0 * np.maximum(lines.gap, 0.0)) > TOO_LATE)
+        binding = (lines.gap >= 0.0) & ~late & ~cars.walks
+        return Leaders(np.where(binding, np.maximum(lines.gap - STOP_LINE, 1e-3), np.inf), lines.speed)
