@@ -52,7 +52,7 @@ def develop(
 ) -> NDArray[np.uint8]:
     """The picture (H, W, 3) that a sensor makes of luminance (H, W, 3) [cd/m²]; clips what overfills its wells.
 
-    Noise is the linear model of EMVA 1288 (release 4.0, section 2): of a mean of n electrons, their number varies by
+    Noise is the linear model of EMVA 1288 (release 4.0): of a mean of n electrons, their number varies by
     n + read noise²; gain shows fewer electrons as full scale. Electrons are drawn as normal numbers, one per channel.
     """
     signal = luminance * np.float32(1.0 / exposure.saturation)

@@ -21,9 +21,9 @@ EXTINCTION_AT_RANGE = -math.log(CONTRAST_THRESHOLD)
 DECIBEL_PER_KM = math.log(10.0) / 10.0 / 1000.0
 """One dB/km as a coefficient of extinction [1/m]."""
 RAIN_LAW = (1.076, 0.67)
-"""Attenuation of light by rain of R mm/h: k R^a [dB/km] (ITU-R P.1814, section 4.3, measured in France)."""
+"""Attenuation of light by rain of R mm/h: k R^a [dB/km] (ITU-R P.1814, measured in France)."""
 SNOW_LAW = (5.5253, 1.38)
-"""The same for dry snow at 550 nm (ITU-R P.1814, section 4.4)."""
+"""The same for dry snow at 550 nm (ITU-R P.1814)."""
 WET_GRIP_LOSS = 0.41
 """Peak adhesion on asphalt is 0.85 where dry and down to 0.5 where wet (Wong, Theory of Ground Vehicles, table of road
 adhesion after Taborek 1957): 0.5 / 0.85 = 0.59 of the dry grip is left on standing water."""

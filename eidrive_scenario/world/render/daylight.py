@@ -20,7 +20,7 @@ RAYLEIGH = 0.008735 * np.array([0.610, 0.550, 0.465]) ** -4.08
 HAZE = 0.05 * np.array([0.610, 0.550, 0.465]) ** -1.3
 """The same of a clear day's aerosol (Ångström, turbidity 0.05)."""
 TWILIGHT = ((0.0, 800.0), (-6.0, 3.4), (-12.0, 0.0083), (-18.0, 0.00065))
-"""Illuminance on the ground [lx] by the sun's elevation [degrees] (RCA Electro-Optics Handbook, 1974, section 6)."""
+"""Illuminance on the ground [lx] by the sun's elevation [degrees] (RCA Electro-Optics Handbook, 1974)."""
 NIGHT_GLOW = 0.02
 """Of a town's sky at night [lx]: 18 mag/arcsec², a bright suburb."""
 GROUND_ALBEDO = 0.12
@@ -53,8 +53,8 @@ class Daylight(NamedTuple):
 
 @lru_cache(maxsize=64)
 def daylight(weather: Weather) -> Daylight:
-    """Clear days by the formulas of the IESNA Lighting Handbook (8th ed., ch. 8: sun 127.5 klx exp(-0.21 / sin h), sky
-    0.8 + 15.5 sin½ h klx); under clouds the light of both falls to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), the sun's
+    """Clear days by IES, Calculation of daylight availability (1984): sun 127.5 klx exp(-0.21 / sin h), sky
+    0.8 + 15.5 sin½ h klx. Under clouds the light of both falls to 1 - 0.75 c^3.4 (Kasten and Czeplak 1980), the sun's
     share with the clear part of the sky. In fog the rest of the sun's beam is scattered, half of it downwards.
     """
     towards = np.array(weather.sun_direction)

@@ -129,7 +129,7 @@ def test_the_receiver_s_limit_is_the_stated_range() -> None:
 
 
 def test_fog_takes_its_share_twice_and_hides_what_is_far() -> None:
-    """Kruse with Kim's exponent at 60 m: 0.585 · 0.06^(1/3) = 0.229, so that 905 nm is dimmed 0.892 times as much as
+    """Kruse's exponent at 60 m: 0.585 · 0.06^(1/3) = 0.229, so that 905 nm is dimmed 0.892 times as much as
     what the eye sees; the light goes there and back."""
     assert extinction(FOG) == pytest.approx(3.912 / 60.0 * (0.905 / 0.55) ** -0.229, rel=1e-3)
     draws = np.random.default_rng(3)
