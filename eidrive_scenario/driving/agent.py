@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.received_objects import ReceivedObjects
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
+from eidrive_scenario.driving.speaker import Speaker
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion
@@ -28,8 +31,8 @@ from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.settings import parse_settings
+from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.message import Message, Received, StationState
-from eidrive_scenario.v2x.size import cpm_size
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 Array = NDArray[np.float64]
@@ -38,6 +41,9 @@ OWN_MARGIN = 0.9
 """A reported box whose centre lies this near to the own outline is the own body: half the width of a car, so that the
 centre of another car can come as near only after a collision [m]."""
 TIME_TOLERANCE = 1e-9
+
+ITSELF = " itself"
+"""What a station says of itself counts as the report of one more station: it is not among the objects that it sees."""
 
 
 class Agent:
@@ -57,7 +63,7 @@ class Agent:
         fusion: FusionMethod,
         planner: Planner | None,
         controller: Controller | None,
-        sensors: int,
+        speaker: Speaker,
         dt: float,
         own_perception: bool = False,
         points: SharedPoints | None = None,
@@ -71,14 +77,14 @@ class Agent:
         self.controller = controller
         self.own_perception = own_perception
         self.points = points
-        self._sensors = sensors
+        self._speaker = speaker
+        self._clock = settings.clock
+        self._partial: dict[str, ReceivedObjects] = {}
         self._detections = Detections(0.0)
         self._reports: dict[str, Report] = {}
         self._own_places: deque[tuple[float, float, float, float]] = deque(
             maxlen=math.ceil(settings.report_timeout / dt) + 2
         )
-        self._number = 0
-        self._periods = -1
 
     def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
         """One tick at `now` [s]."""
@@ -106,7 +112,7 @@ class Agent:
             fused=fused,
             plan=plan,
             control=self._control(ego, plan),
-            outbox=self._speak(state, detections, now),
+            outbox=self._speaker.speak(state, detections, now, self.points.own if self.points is not None else None),
             estimate=ego if self.settings.localization != "oracle" else None,
         )
 
@@ -119,7 +125,7 @@ class Agent:
     def _listen(self, inbox: Sequence[Received], now: float) -> None:
         """Keep the newest report of each sender that counts, and forget the old ones."""
         for received in inbox:
-            message = received.message
+            message = self._clock.understood(received.message, now)
             sender = message.sender
             if sender == self.name:
                 if not self.own_perception:
@@ -130,14 +136,28 @@ class Agent:
                 self.points.hear(sender, message.points, self._own_body(message.points.time))
                 continue
             detections = message.detections if sender == self.name else self._without_own_body(message.detections)
-            self._take(Report(sender, detections, received.arrived, message.state, complete=message.objects is None))
+            station = sender if message.kind == "cpm" else sender + ITSELF
+            report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
+            self._take(report, None if report.complete else self._all_said(message))
         oldest = now - self.settings.report_timeout - TIME_TOLERANCE
         for sender in [sender for sender, held in self._reports.items() if held.detections.time < oldest]:
             del self._reports[sender]
 
-    def _take(self, report: Report) -> None:
-        """Fusion hears every report; a late one does not replace a newer one."""
+    def _all_said(self, message: Message) -> Detections:
+        """What the sender of a message that does not list all its objects has said of them by now."""
+        memory = self._partial.get(message.sender)
+        if memory is None:
+            memory = self._partial[message.sender] = ReceivedObjects(self.settings.report_timeout)
+        return self._without_own_body(memory.take(message))
+
+    def _take(self, report: Report, completed: Detections | None = None) -> None:
+        """Fusion hears every report; a late one does not replace a newer one.
+
+        A report that does not say all is kept together with what its station said before, `completed`.
+        """
         self.fusion.hear(report)
+        if completed is not None:
+            report = replace(report, detections=completed, complete=True)
         held = self._reports.get(report.station)
         if held is None or report.detections.time >= held.detections.time:
             self._reports[report.station] = report
@@ -178,22 +198,6 @@ class Agent:
     def _state(self, ego: EgoState) -> StationState:
         x, y, z = ego.position.tolist()
         return StationState(ego.time, x, y, z, ego.yaw, ego.speed, self.perception.pose_covariance)
-
-    def _speak(self, state: StationState, detections: Detections, now: float) -> tuple[Message, ...]:
-        """The message of this tick, if it is time for one; also where nothing is in sight, as that is news too."""
-        rate = self.settings.message_rate
-        if rate is not None:
-            period = math.floor(now * rate + 1e-6)
-            if period <= self._periods:
-                return ()
-            self._periods = period
-        size = cpm_size(len(detections), self._sensors)
-        points = self.points.own if self.points is not None else None
-        if points is not None:
-            size += points.size
-        message = Message(self.name, self._number, now, state, detections, size, points=points)
-        self._number += 1
-        return (message,)
 
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
@@ -241,6 +245,7 @@ def build_agent(
     dt: float,
     own_perception: bool = False,
     detector: Detector | None = None,
+    encoder: Asn1Encoder | None = None,
 ) -> Agent:
     """The agent of the station on this body. Extensions are built as `Detector()` or `Detector(detector_settings)`,
     `FusionMethod()` or `FusionMethod(fusion_settings)`, and `Planner(settings, spec, roads, dt=dt, seed=seed)`;
@@ -275,7 +280,7 @@ def build_agent(
         if planner == NO_PLANNER
         else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
         controller=Controller(spec, dt) if wheels else None,
-        sensors=len(sensors),
+        speaker=Speaker(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
         own_perception=own_perception,
         points=points,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, get_args
 
 import yaml
-from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
@@ -19,6 +19,7 @@ from eidrive_scenario.sensing.settings import (
     TruthSettings,
 )
 from eidrive_scenario.settings import Settings, parse_settings
+from eidrive_scenario.v2x.clock import StationClock
 
 MODULE = "eidrive"
 """The value of the property `module` by which a controller is one of ours."""
@@ -111,8 +112,8 @@ class AgentSettings(Settings):
     detector, fusion, planner   names of extensions; planner `none` parks a vehicle, and is all that a mast can have
     detector_settings  what the detector itself may be told
     detector_latency   how long the detector computes: what it saw at t is known from t + latency on
-    tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
     fusion_settings    what the fusion method itself may be told
+    tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
     localization    `oracle`, or `ekf`: the station finds out by GNSS and IMU where it is
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the detector needs
@@ -122,6 +123,12 @@ class AgentSettings(Settings):
     report_timeout  a report older than this is forgotten: 1 s, the longest interval between two collective perception
                     messages (ETSI TS 103 324, T_GenCpmMax)
     antenna_height  over the reference point; None is the roof
+    messages        what it sends: `cpm` (the objects that it perceives), `cam` (itself)
+    generation      `each_tick`, `rate` (message_rate), or `etsi`: by the triggers of EN 302 637-2 and TS 103 324; None
+                    is one of the first two
+    mtu             largest message by the rules of ETSI [bytes];  security_bytes  of the envelope, in every CPM
+    clock_offset    how much the station's clock is ahead;  clock_drift  how fast it gains [parts per million]
+    asn1_files      ASN.1 modules that say how large a message is, relative to the scenario file
     target_speed    where the storyboard asks for none; None keeps the first one
     conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
     conflict_brake  [m/s²], until
@@ -147,6 +154,13 @@ class AgentSettings(Settings):
     message_rate: PositiveFloat | None = None
     report_timeout: PositiveFloat = 1.0
     antenna_height: PositiveFloat | None = None
+    messages: Annotated[tuple[Literal["cpm", "cam"], ...], BeforeValidator(_names)] = ("cpm",)
+    generation: Literal["each_tick", "rate", "etsi"] | None = None
+    mtu: Annotated[int, Field(ge=200)] = 1400
+    security_bytes: NonNegativeInt = 0
+    clock_offset: float = 0.0
+    clock_drift: float = 0.0
+    asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
     target_speed: NonNegativeFloat | None = None
     conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
     conflict_brake: PositiveFloat = 5.0
@@ -160,6 +174,14 @@ class AgentSettings(Settings):
         return self
 
     @model_validator(mode="after")
+    def _one_way_to_generate(self) -> AgentSettings:
+        if self.generation == "rate" and self.message_rate is None:
+            raise ValueError("generation 'rate' needs a message_rate")
+        if self.generation in ("each_tick", "etsi") and self.message_rate is not None:
+            raise ValueError(f"generation {self.generation!r} and a message_rate exclude each other")
+        return self
+
+    @model_validator(mode="after")
     def _in_time(self) -> AgentSettings:
         if self.detector_latency >= self.report_timeout:
             raise ValueError(
@@ -167,6 +189,11 @@ class AgentSettings(Settings):
                 f"report_timeout is {self.report_timeout:g} s"
             )
         return self
+
+    @property
+    def clock(self) -> StationClock:
+        """The station's own."""
+        return StationClock(self.clock_offset, self.clock_drift * 1e-6)
 
     def rig_sensors(self, needs: frozenset[str]) -> dict[str, AnySensorSettings]:
         """The sensors of this station, for a detector that reads these kinds; those to localize by are added.

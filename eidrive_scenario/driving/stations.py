@@ -22,6 +22,7 @@ from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SignalLookout
+from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.message import LinkEvent, Received
@@ -72,6 +73,7 @@ class Stations:
         self._settings = _all_settings(scenario, detector, cooperate)
         self._detectors = _all_detectors(scenario, self._settings, detector)
         """Built beforehand, as what they cannot work with shall be told before the run."""
+        self._encoders = _all_encoders(scenario, self._settings)
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None)
 
@@ -94,6 +96,7 @@ class Stations:
             dt=self._dt,
             own_perception=self._own_perception,
             detector=self._detectors.pop(spec.name, None),
+            encoder=self._encoders.get(spec.name),
         )
         if settings.obey_signals and not self._agents[spec.name].perception.detector.sees_signals:
             self._lookouts[spec.name] = SignalLookout(spec, self._roads)
@@ -258,6 +261,19 @@ def _all_detectors(
             ]
     if problems:
         raise SettingError(list(dict.fromkeys(problems)))
+    return found
+
+
+def _all_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:
+    """The encoder of every station that has ASN.1 modules. Raises SettingError, with the place of the property."""
+    found = {}
+    folder = Path(scenario.path).parent if scenario.path is not None else Path()
+    for name, station in settings.items():
+        if station.asn1_files:
+            controller = list(filter(is_agent, scenario.controllers[name]))[-1]
+            files = [folder / file for file in station.asn1_files]
+            line = _line(controller, "asn1_files")
+            found[name] = Asn1Encoder(files, station.messages, source=controller.source, line=line)
     return found
 
 

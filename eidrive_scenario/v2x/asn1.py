@@ -1,0 +1,222 @@
+"""Messages in unaligned packed encoding rules, with ASN.1 modules that the user supplies.
+
+The values are laid out as in ETSI EN 302 637-2 V1.4.1 (CAM) and ETSI TR 103 562 V2.1.1 (CPM). A module may have fewer
+components than those; a component that it asks for beyond them is an error. TS 103 324 wraps the containers of a CPM in
+open types, which is not supported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.v2x.message import Message, StationState
+
+TYPES = {"cam": "CAM", "cpm": "CPM"}
+"""The type of the whole message, by kind."""
+
+_STATION_TYPES = {"pedestrian": 1, "bicycle": 2, "motorbike": 4, "car": 5, "bus": 6, "van": 7, "truck": 8, "misc": 15}
+_SUBCLASSES = {"car": 3, "motorbike": 2, "bus": 4, "van": 5, "truck": 6}
+_METRES_PER_DEGREE = 111_319.49
+"""Along the equator, about which the plane of the world is put."""
+
+
+class Asn1Encoder:
+    """Writes messages with the modules in these files.
+
+    Raises SettingError, naming the file or the missing type, if asn1tools is not installed, a file cannot be read, or a
+    module has no such type.
+    """
+
+    def __init__(
+        self, files: Sequence[Path], kinds: Sequence[str], *, source: str = "", line: int | None = None
+    ) -> None:
+        try:
+            import asn1tools
+        except ImportError as error:
+            remedy = "install it: pip install 'eidrive-scenario[asn1]'"
+            raise SettingError(Problem("asn1_files needs the package asn1tools", remedy, source, line)) from error
+        for file in files:
+            if not file.is_file():
+                problem = Problem(f"no ASN.1 module {str(file)!r}", "give the path of a file", source, line)
+                raise SettingError(problem)
+        try:
+            self._modules = asn1tools.compile_files([str(file) for file in files], "uper")
+        except (asn1tools.CompileError, asn1tools.ParseError, UnicodeDecodeError) as error:
+            names = ", ".join(str(file) for file in files)
+            raise SettingError(Problem(f"{names}: {error}", "correct the module", source, line)) from error
+        self._error: type[Exception] = asn1tools.EncodeError
+        for kind in kinds:
+            if TYPES[kind] not in self._modules.types:
+                message = f"the ASN.1 modules have no type {TYPES[kind]!r}, which a {kind} needs"
+                raise SettingError(Problem(message, "add the file that defines it", source, line))
+
+    def encode(self, message: Message, *, sensors: int = 0, low_frequency: bool = False) -> bytes:
+        """The message; a CPM with so many sensors, a CAM with or without the low-frequency container.
+
+        Raises SettingError if the module does not take it.
+        """
+        value = cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors)
+        try:
+            encoded: bytes = self._modules.encode(TYPES[message.kind], value)
+        except self._error as error:
+            problem = Problem(f"the ASN.1 module takes no {message.kind} of {message.sender!r}: {error}")
+            raise SettingError(problem) from error
+        return encoded
+
+    def decode(self, kind: str, data: bytes) -> Any:
+        """What such a message says, as asn1tools has it."""
+        return self._modules.decode(TYPES[kind], data)
+
+
+def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
+    """A cooperative awareness message after EN 302 637-2, annex A."""
+    state = message.state
+    *_, length, width, _, _ = message.detections.boxes[0].tolist()
+    parameters: dict[str, Any] = {
+        "basicContainer": {
+            "stationType": _STATION_TYPES[message.detections.classes[0]],
+            "referencePosition": _position(state),
+        },
+        "highFrequencyContainer": (
+            "basicVehicleContainerHighFrequency",
+            {
+                "heading": _heading(state.yaw),
+                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+                "vehicleLength": {
+                    "vehicleLengthValue": _within(length * 10.0, 1, 1022),
+                    "vehicleLengthConfidenceIndication": "unavailable",
+                },
+                "vehicleWidth": _within(width * 10.0, 1, 61),
+                "longitudinalAcceleration": {
+                    "longitudinalAccelerationValue": 161,
+                    "longitudinalAccelerationConfidence": 102,
+                },
+                "curvature": {"curvatureValue": 1023, "curvatureConfidence": "unavailable"},
+                "curvatureCalculationMode": "unavailable",
+                "yawRate": {"yawRateValue": 32767, "yawRateConfidence": "unavailable"},
+            },
+        ),
+    }
+    if low_frequency:
+        parameters["lowFrequencyContainer"] = (
+            "basicVehicleContainerLowFrequency",
+            {"vehicleRole": "default", "exteriorLights": (b"\x00", 8), "pathHistory": []},
+        )
+    return {
+        "header": _header(2, message.sender),
+        "cam": {"generationDeltaTime": _milliseconds(state.time), "camParameters": parameters},
+    }
+
+
+def cpm_value(message: Message, sensors: int) -> dict[str, Any]:
+    """A collective perception message after TR 103 562, annex A: objects in the frame of the sender."""
+    state, detections = message.state, message.detections
+    parameters: dict[str, Any] = {
+        "managementContainer": {"stationType": 5, "referencePosition": _position(state)},
+        "stationDataContainer": (
+            "originatingVehicleContainer",
+            {
+                "heading": _heading(state.yaw),
+                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+            },
+        ),
+        "numberOfPerceivedObjects": min(len(detections), 255),
+    }
+    if sensors:
+        parameters["sensorInformationContainer"] = [_sensor(number) for number in range(sensors)]
+    if len(detections):
+        delay = _within((state.time - detections.time) * 1e3, -1500, 1500)
+        parameters["perceivedObjectContainer"] = [
+            _object(message, row, delay) for row in range(min(len(detections), 128))
+        ]
+    return {
+        "header": _header(14, message.sender),
+        "cpm": {"generationDeltaTime": _milliseconds(state.time), "cpmParameters": parameters},
+    }
+
+
+def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
+    state, detections = message.state, message.detections
+    x, y, z, length, width, height, yaw = detections.boxes[row].tolist()
+    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    east, north = x - state.x, y - state.y
+    vx, vy = detections.velocity[row].tolist()
+    speeds = [16383, 16383]
+    if not math.isnan(vx + vy):
+        speeds = [_within(100.0 * v, -16382, 16382) for v in (cos * vx + sin * vy, cos * vy - sin * vx)]
+    number = row if message.objects is None else message.objects[row]
+    name = detections.classes[row]
+    kind: tuple[str, dict[str, int]] = ("other", {"type": 0, "confidence": 0})
+    if name in _SUBCLASSES:
+        kind = ("vehicle", {"type": _SUBCLASSES[name], "confidence": 0})
+    elif name in ("pedestrian", "bicycle"):
+        kind = ("person", {"type": 1 if name == "pedestrian" else 3, "confidence": 0})
+    return {
+        "objectID": number % 256,
+        "timeOfMeasurement": delay,
+        "objectConfidence": _within(100.0 * float(detections.scores[row]), 0, 100),
+        "xDistance": _distance(cos * east + sin * north),
+        "yDistance": _distance(cos * north - sin * east),
+        "zDistance": _distance(z - state.z),
+        "xSpeed": {"value": speeds[0], "confidence": 127},
+        "ySpeed": {"value": speeds[1], "confidence": 127},
+        "yawAngle": {"value": _tenths_of_degrees(yaw - state.yaw), "confidence": 127},
+        "planarObjectDimension1": {"value": _within(10.0 * length, 0, 1023), "confidence": 102},
+        "planarObjectDimension2": {"value": _within(10.0 * width, 0, 1023), "confidence": 102},
+        "verticalObjectDimension": {"value": _within(10.0 * height, 0, 1023), "confidence": 102},
+        "objectRefPoint": 0,
+        "classification": [{"confidence": 101, "class": kind}],
+    }
+
+
+def _sensor(number: int) -> dict[str, Any]:
+    """A sensor of which only is said that it is there."""
+    properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
+    area = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0, "vehicleSensorPropertyList": [properties]}
+    return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
+
+
+def _header(number: int, sender: str) -> dict[str, int]:
+    station = sum(byte << (8 * place) for place, byte in enumerate(sender.encode()[-4:]))
+    return {"protocolVersion": 2, "messageID": number, "stationID": station}
+
+
+def _position(state: StationState) -> dict[str, Any]:
+    """The plane of the world about latitude and longitude 0."""
+    return {
+        "latitude": _within(state.y / _METRES_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
+        "longitude": _within(state.x / _METRES_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
+        "positionConfidenceEllipse": {
+            "semiMajorConfidence": 4095,
+            "semiMinorConfidence": 4095,
+            "semiMajorOrientation": 3601,
+        },
+        "altitude": {"altitudeValue": _within(100.0 * state.z, -100_000, 800_000), "altitudeConfidence": "unavailable"},
+    }
+
+
+def _heading(yaw: float) -> dict[str, int]:
+    """Clockwise from north, where y points."""
+    return {"headingValue": _tenths_of_degrees(math.pi / 2.0 - yaw), "headingConfidence": 127}
+
+
+def _distance(metres: float) -> dict[str, int]:
+    return {"value": _within(100.0 * metres, -132768, 132767), "confidence": 102}
+
+
+def _tenths_of_degrees(angle: float) -> int:
+    return round(math.degrees(angle) * 10.0) % 3600
+
+
+def _milliseconds(time: float) -> int:
+    return round(time * 1e3) % 65536
+
+
+def _within(value: float, low: int, high: int) -> int:
+    return min(max(round(value), low), high)

@@ -1,0 +1,54 @@
+"""Numbers by which a station tells its objects apart from message to message."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from eidrive_scenario.detections import Detections
+
+GATE = 3.0
+"""An object farther than this from where one was expected is another one [m]."""
+KEPT = 2.0
+"""So long an object keeps its number while nobody sees it [s]."""
+
+
+class Numbering:
+    """The numbers of the tracker where there is one; else of the nearest that was seen before, moved on."""
+
+    def __init__(self) -> None:
+        self._next = 0
+        self._known: dict[int, tuple[float, float, float, float, float]] = {}
+
+    def numbers(self, detections: Detections) -> Sequence[int]:
+        """One per row."""
+        if detections.tracks or not len(detections):
+            return detections.tracks
+        now = detections.time
+        self._known = {number: last for number, last in self._known.items() if now - last[0] <= KEPT}
+        places = detections.boxes[:, :2]
+        found: list[int | None] = [None] * len(detections)
+        known = list(self._known)
+        if known:
+            expected = np.array([self._expected(number, now) for number in known])
+            apart = np.linalg.norm(places[:, None] - expected[None, :], axis=2)
+            rows, columns = linear_sum_assignment(np.minimum(apart, 10.0 * GATE))
+            for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+                if apart[row, column] <= GATE:
+                    found[row] = known[column]
+        numbers = []
+        for row, number in enumerate(found):
+            if number is None:
+                number, self._next = self._next, self._next + 1
+            x, y = places[row].tolist()
+            vx, vy = (0.0 if math.isnan(v) else v for v in detections.velocity[row].tolist())
+            self._known[number] = (now, x, y, vx, vy)
+            numbers.append(number)
+        return tuple(numbers)
+
+    def _expected(self, number: int, now: float) -> tuple[float, float]:
+        time, x, y, vx, vy = self._known[number]
+        return x + vx * (now - time), y + vy * (now - time)

@@ -1,0 +1,83 @@
+"""Encoded messages, with a tiny module of our own."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.v2x.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.message import Message, StationState
+
+pytest.importorskip("asn1tools", reason="asn1tools is not installed (pip install 'eidrive-scenario[asn1]')")
+
+TINY = Path(__file__).parents[2] / "data" / "tiny_messages.asn1"
+
+
+def message(kind: str, count: int, x: float = 10.0) -> Message:
+    boxes = np.array([[x + 5.0 * n, 20.0, 0.75, 4.5, 1.8, 1.5, 0.0] for n in range(count)]).reshape(-1, 7)
+    velocity = np.tile([0.0, 3.0], (count, 1))
+    seen = Detections(1.9, boxes, np.ones(count), ("car",) * count, velocity, np.full((count, 2, 2), np.nan))
+    state = StationState(2.0, 10.0, 5.0, 0.0, math.pi / 2, 8.0)
+    return Message("Ego", 4, 2.0, state, seen, 0, kind, tuple(range(7, 7 + count)))  # type: ignore[arg-type]
+
+
+def test_a_cpm_says_what_is_in_it_in_the_frame_of_the_sender() -> None:
+    """Heading along y: an object 15 m further along y is 15 m ahead, and moves ahead with 3 m/s."""
+    encoder = Asn1Encoder([TINY], ["cpm"])
+    decoded = encoder.decode("cpm", encoder.encode(message("cpm", 2)))
+    assert decoded["header"]["messageID"] == 14
+    parameters = decoded["cpm"]["cpmParameters"]
+    assert parameters["numberOfPerceivedObjects"] == 2
+    first, second = parameters["perceivedObjectContainer"]
+    assert (first["objectID"], second["objectID"]) == (7, 8)
+    assert first["timeOfMeasurement"] == 100
+    assert (first["xDistance"]["value"], first["yDistance"]["value"]) == (1500, 0)
+    assert (second["xDistance"]["value"], second["yDistance"]["value"]) == (1500, -500)
+    assert first["xSpeed"]["value"] == 300
+
+
+def test_a_cam_says_where_its_sender_is() -> None:
+    encoder = Asn1Encoder([TINY], ["cam"])
+    short, long = (encoder.encode(message("cam", 1), low_frequency=low) for low in (False, True))
+    assert len(long) > len(short)
+    decoded = encoder.decode("cam", long)["cam"]["camParameters"]
+    position = decoded["basicContainer"]["referencePosition"]
+    assert position["longitude"] == round(10.0 / 111_319.49 * 1e7)
+    kind, fast = decoded["highFrequencyContainer"]
+    assert kind == "basicVehicleContainerHighFrequency"
+    assert fast["heading"]["headingValue"] == 0, "north"
+    assert fast["speed"]["speedValue"] == 800
+
+
+def test_each_object_takes_its_bits() -> None:
+    """An object of the tiny module has 8 + 12 + 2 (19 + 7) + 15 + 7 bits = 94."""
+    encoder = Asn1Encoder([TINY], ["cpm"])
+    sizes = [len(encoder.encode(message("cpm", count))) for count in (1, 9, 17)]
+    assert sizes[1] - sizes[0] == sizes[2] - sizes[1] == 94
+
+
+def test_values_beyond_the_range_of_the_field_are_cut() -> None:
+    encoder = Asn1Encoder([TINY], ["cpm"])
+    decoded = encoder.decode("cpm", encoder.encode(message("cpm", 1, x=1e5)))
+    assert decoded["cpm"]["cpmParameters"]["perceivedObjectContainer"][0]["yDistance"]["value"] == -132768
+
+
+def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
+    place = {"source": "scenario.xosc", "line": 7}
+    with pytest.raises(SettingError, match=r"scenario.xosc:7: no ASN.1 module .*gone.asn1"):
+        Asn1Encoder([tmp_path / "gone.asn1"], ["cpm"], **place)  # type: ignore[arg-type]
+    broken = tmp_path / "broken.asn1"
+    broken.write_text("Tiny DEFINITIONS ::= BEGIN A ::= SEQUENCE { END")
+    with pytest.raises(SettingError, match=r"scenario.xosc:7: .*broken.asn1: "):
+        Asn1Encoder([broken], ["cpm"], **place)  # type: ignore[arg-type]
+    other = tmp_path / "other.asn1"
+    other.write_text("Other DEFINITIONS ::= BEGIN CAM ::= INTEGER END")
+    with pytest.raises(SettingError, match="have no type 'CPM', which a cpm needs"):
+        Asn1Encoder([other], ["cam", "cpm"], **place)  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match="takes no cam of 'Ego'"):
+        Asn1Encoder([other], ["cam"]).encode(message("cam", 1))
