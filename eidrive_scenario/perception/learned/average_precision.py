@@ -1,4 +1,4 @@
-"""Average precision and recall of detections in pictures."""
+"""Average precision and recall of detections, in pictures and seen from above."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEAST_OVERLAP = 0.5
 
 @dataclass(frozen=True)
 class Matches:
-    """What the detections of one class in one picture came to.
+    """What the detections in one picture came to, those of one class or of all.
 
     scores (N,); correct (N,) the detection found an object; counted (N,) False for what fell on an ignored object;
     found (M,) whether each object of the picture, ignored ones included, was found
@@ -33,16 +33,31 @@ class Matches:
 def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: float = LEAST_OVERLAP) -> Matches:
     """Detections (N, 4) against objects (M, 4) of one class; `ignored` (M,) need not be found and do no harm.
 
+    As `match_by_share`; a detection that lies by half in an ignored object does not count either.
+    """
+    return match_by_share(
+        overlap(boxes, objects),
+        scores,
+        ignored,
+        least,
+        covered(boxes, objects[ignored]).max(axis=1, initial=0.0) >= 0.5,
+    )
+
+
+def match_by_share(
+    shares: Array, scores: Array, ignored: Bools, least: float, harmless: Bools | None = None
+) -> Matches:
+    """Detections against objects that they overlap by shares (N, M), in any sense; `harmless` (N,) do not count if they
+    find nothing.
+
     Best detection first, each takes the object that it overlaps most among those still free, if by `least`. One that
-    takes an ignored object, or lies by half in one, does not count.
+    takes an ignored object does not count.
     """
     order = np.argsort(-scores, kind="stable")
-    shares = overlap(boxes[order], objects)
-    inside = covered(boxes[order], objects[ignored])
     correct, counted = np.zeros(len(order), dtype=bool), np.ones(len(order), dtype=bool)
-    found = np.zeros(len(objects), dtype=bool)
-    for rank in range(len(order)):
-        free = np.where(found, -1.0, shares[rank])
+    found = np.zeros(len(ignored), dtype=bool)
+    for rank, row in enumerate(order.tolist()):
+        free = np.where(found, -1.0, shares[row])
         wanted = np.where(ignored, -1.0, free)
         best = int(np.argmax(wanted)) if len(wanted) else -1
         if best >= 0 and wanted[best] >= least:
@@ -52,7 +67,7 @@ def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: fl
         if other >= 0 and free[other] >= least:
             found[other] = True
             counted[rank] = False
-        elif inside.shape[1] and inside[rank].max() >= 0.5:
+        elif harmless is not None and harmless[row]:
             counted[rank] = False
     return Matches(scores[order], correct, counted, found)
 
