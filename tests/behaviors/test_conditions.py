@@ -29,6 +29,15 @@ def speed(value: float, seconds: float) -> str:
       </PrivateAction>"""
 
 
+@pytest.mark.element(
+    "CollisionCondition",
+    "TimeHeadwayCondition",
+    "TimeToCollisionCondition",
+    "TraveledDistanceCondition",
+    "ReachPositionCondition",
+    "DistanceCondition",
+    "RelativeDistanceCondition",
+)
 @pytest.mark.parametrize(
     ("condition", "time"),
     [
@@ -58,6 +67,7 @@ def test_distances_and_what_comes_of_them(scene: Any, condition: str, time: floa
     assert first(scene(6, ("Ego", NOTHING, of(condition)))) == pytest.approx(time)
 
 
+@pytest.mark.element("AccelerationCondition", "StandStillCondition", "SpeedCondition", "RelativeSpeedCondition")
 @pytest.mark.parametrize(
     ("condition", "time"),
     [
@@ -75,6 +85,7 @@ def test_speeds_while_ego_brakes_to_a_stop_in_four_seconds(scene: Any, condition
     assert first(played) == pytest.approx(time)
 
 
+@pytest.mark.element("triggeringEntitiesRule")
 def test_any_and_all(scene: Any) -> None:
     fast = '<SpeedCondition rule="greaterThan" value="15"/>'
     assert first(scene(1, ("Ego", NOTHING, of(fast, "Ego Other", "any")))) == 0.0
@@ -110,6 +121,7 @@ def test_who_moves_away_has_no_time_to_collision(scene: Any) -> None:
     assert first(scene(1, ("Ego", NOTHING, of(condition)), ego=(-1, 100, 5))) is None
 
 
+@pytest.mark.element("EndOfRoadCondition", "OffroadCondition")
 def test_the_end_of_the_road_and_off_the_road(scene: Any) -> None:
     """5 m before the end at 20 m/s: there at 0.3 s. Off the road from 4 m beside it on."""
     end = of('<EndOfRoadCondition duration="0.5"/>')
@@ -122,6 +134,7 @@ def test_the_end_of_the_road_and_off_the_road(scene: Any) -> None:
     assert first(scene(2, ("Ego", NOTHING, off), ("Ego", aside))) == pytest.approx(0.5)
 
 
+@pytest.mark.element("AngleCondition", "RelativeAngleCondition")
 def test_angles(scene: Any) -> None:
     turn = """<PrivateAction><TeleportAction><Position><WorldPosition x="300" y="-2" h="{}"/></Position>
       </TeleportAction></PrivateAction>"""
@@ -134,6 +147,7 @@ def test_angles(scene: Any) -> None:
         assert first(scene(0.5, ("Ego", NOTHING, condition), ("Ego", turn.format(0.9)), other=(1, 150, 0))) is None
 
 
+@pytest.mark.element("RelativeClearanceCondition")
 @pytest.mark.parametrize(
     ("other", "opposite", "clear"),
     [
@@ -162,6 +176,7 @@ def test_where_there_is_no_such_lane_there_is_no_clearance(scene: Any) -> None:
     assert first(scene(0.2, ("Ego", NOTHING, condition), ego=(-2, 100, 20))) is None
 
 
+@pytest.mark.element("StoryboardElementStateCondition")
 def test_a_state_lasts_and_a_transition_passes(scene: Any) -> None:
     """The braking ends in the tick at 0.9 s; conditions see that at 1.0 s."""
     state = (
@@ -181,6 +196,7 @@ def test_a_state_lasts_and_a_transition_passes(scene: Any) -> None:
     assert times == [pytest.approx(1.0), pytest.approx(1.0), 0.0, 0.0, None]
 
 
+@pytest.mark.element("ParameterCondition")
 def test_a_parameter_and_a_value_from_outside(scene: Any) -> None:
     value = "<ByValueCondition>{}</ByValueCondition>"
     level = value.format('<ParameterCondition parameterRef="Level" rule="greaterThan" value="1.5"/>')

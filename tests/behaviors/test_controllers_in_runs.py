@@ -23,6 +23,7 @@ def activate(on: str) -> str:
     )
 
 
+@pytest.mark.element("OverrideControllerValueAction")
 def test_a_held_brake_stops_the_car_with_its_share_and_lets_go(run: Any) -> None:
     """Half of 10 m/s² in the 1.5 s of the hold, rolling resistance and drag (below 0.5 m/s²) beside it."""
     brake = '<Throttle active="{0}" value="0"/><Brake active="{0}"><BrakePercent value="0.5"/></Brake>'
@@ -59,6 +60,7 @@ def test_a_held_wheel_bends_the_way(run: Any) -> None:
     assert slope(right.of("Ego", "yaw"), 1.0, 2.5) == pytest.approx(-0.167, rel=0.05)
 
 
+@pytest.mark.element("OverrideControllerValueAction")
 def test_gears_and_the_clutch(run: Any) -> None:
     """Reverse drives backwards, neutral and a trodden clutch roll, park holds."""
 
@@ -75,6 +77,7 @@ def test_gears_and_the_clutch(run: Any) -> None:
     )
 
 
+@pytest.mark.element("ActivateControllerAction")
 def test_a_controller_hands_over_and_takes_over_again_without_a_jump(run: Any) -> None:
     stop = private(
         "<LongitudinalAction><SpeedAction>"
@@ -105,6 +108,7 @@ def test_a_car_that_was_handed_over_is_no_longer_moved_by_its_pedals(run: Any) -
     assert speed[25:] == pytest.approx([speed[25]] * (len(speed) - 25), abs=1e-9)
 
 
+@pytest.mark.element("EnvironmentAction")
 def test_a_slippery_road_takes_grip(run: Any) -> None:
     """Of the grip 0.2 · 9.81 m/s² the brakes use 0.95."""
     ice = everywhere(
@@ -135,6 +139,7 @@ def by_name(name: str, on: str) -> str:
     )
 
 
+@pytest.mark.element("AssignControllerAction")
 def test_another_tool_s_controller_takes_over_when_it_is_activated(run: Any) -> None:
     """Scripted speed stays as it is to the last bit; driven speed does not."""
 

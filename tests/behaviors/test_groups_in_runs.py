@@ -40,12 +40,14 @@ def by(entities: str, condition: str, rule: str = "any") -> str:
       <EntityCondition>{condition}</EntityCondition></ByEntityCondition>"""
 
 
+@pytest.mark.element("EntitySelection")
 def test_a_group_acts_as_each_of_its_members(group: Any) -> None:
     for selection, expected in (("slow", [20, 5, 5]), ("nested", [20, 5, 5]), ("all", [5, 5, 5])):
         played = group(1, (selection, SPEED, after(0.5)))
         assert [played.of(name, "speed")[-1] for name in CARS] == expected
 
 
+@pytest.mark.element("EntitySelection", "triggeringEntitiesRule")
 def test_a_group_triggers_by_any_or_all_of_its_members(group: Any) -> None:
     """At 10 m/s from s = 120 m and 300 m the group's first member has gone 3 m after 0.3 s, and both have."""
     gone = by("all", '<TraveledDistanceCondition value="{}"/>', "{}")
@@ -77,6 +79,7 @@ def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
     assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(50)))).begun("event 0") == []
 
 
+@pytest.mark.element("selectTriggeringEntities")
 def test_the_entities_that_triggered_act_beside_the_actors(group: Any) -> None:
     """selectTriggeringEntities: Second and Third are slower than 15 m/s."""
     slower = by("all", '<SpeedCondition value="15" rule="lessThan"/>')
@@ -87,6 +90,7 @@ def test_the_entities_that_triggered_act_beside_the_actors(group: Any) -> None:
     assert [group(1, ("Ego", SPEED, slower)).of(name, "speed")[-1] for name in CARS] == [5, 10, 10]
 
 
+@pytest.mark.element("selectTriggeringEntities")
 def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
     """Ego is faster than 15 m/s until 0.5 s, and no one is when the trigger fires."""
     slow_down = ("Ego", SPEED, after(0.5))
@@ -128,6 +132,7 @@ OBJECT = """<objects><object id="77" name="hut" type="building" s="200" t="-9" z
   width="3" height="2.5"/></objects>"""
 
 
+@pytest.mark.element("ExternalObjectReference")
 def test_an_external_object_is_where_and_what_the_road_network_says(run: Any) -> None:
     street = STREET.replace("</lanes>", f"</lanes>{OBJECT}")
     external = '<ScenarioObject name="Hut"><ExternalObjectReference name="{}"/></ScenarioObject>'

@@ -24,6 +24,7 @@ def beside(count: int, entity: str = "Ego") -> str:
     return f'<RelativeTargetLane entityRef="{entity}" value="{count}"/>'
 
 
+@pytest.mark.element("LaneChangeAction")
 @pytest.mark.parametrize(
     ("shape", "quarter"),
     [
@@ -66,6 +67,7 @@ def test_a_step_changes_lane_at_once_and_an_offset_may_remain(scene: Any) -> Non
     assert (played.at(0.1).x, played.at(0.1).y) == pytest.approx((102.0, -5.5))
 
 
+@pytest.mark.element("LaneChangeAction")
 @pytest.mark.parametrize(
     ("target", "ego", "y"),
     [
@@ -99,6 +101,7 @@ def offset(target: str, continuous: str = "false", acceleration: str = 'maxLater
       <LaneOffsetTarget>{target}</LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
 
 
+@pytest.mark.element("LaneOffsetAction")
 def test_an_offset_is_reached_within_the_lateral_acceleration(scene: Any) -> None:
     """Cubic over 1 m at 1.5 m/s²: √(6 / 1.5) = 2 s."""
     played = scene(3, ("Ego", offset('<AbsoluteTargetLaneOffset value="1"/>')))
@@ -107,6 +110,7 @@ def test_an_offset_is_reached_within_the_lateral_acceleration(scene: Any) -> Non
     assert played.when("action 0", "completeState") == pytest.approx(1.9)
 
 
+@pytest.mark.element("LaneOffsetAction")
 def test_an_offset_beside_somebody_follows_him_where_it_is_continuous(scene: Any) -> None:
     played = scene(
         6,
@@ -118,6 +122,7 @@ def test_an_offset_beside_somebody_follows_him_where_it_is_continuous(scene: Any
     assert played.when("action 1", "completeState") is None
 
 
+@pytest.mark.element("LateralDistanceAction")
 def test_a_lateral_distance_is_kept_beside(scene: Any) -> None:
     action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="3" freespace="false"
       continuous="false" coordinateSystem="lane" displacement="leftToReferencedEntity">
@@ -127,6 +132,7 @@ def test_a_lateral_distance_is_kept_beside(scene: Any) -> None:
     assert played.at(4.0).y == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.element("LateralDistanceAction")
 def test_free_space_beside_is_from_flank_to_flank(scene: Any) -> None:
     """Two cars of 2 m: their middles are 2.5 m apart; within a limit of acceleration the way there is a spring's."""
     action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="0.5" freespace="true"
@@ -138,6 +144,7 @@ def test_free_space_beside_is_from_flank_to_flank(scene: Any) -> None:
     assert played.at(12.0).yaw == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.element("TeleportAction")
 def test_teleports_show_in_the_next_view(scene: Any) -> None:
     action = """<PrivateAction><TeleportAction><Position><LanePosition roadId="1" laneId="1" s="500"/></Position>
       </TeleportAction></PrivateAction>"""
@@ -161,6 +168,7 @@ def trajectory(points: list[tuple[float, float, float | None]], reference: str, 
 CORNER = [(100.0, -2.0, None), (110.0, -2.0, None), (110.0, 18.0, None)]
 
 
+@pytest.mark.element("FollowTrajectoryAction", "Polyline")
 def test_a_trajectory_without_timing_is_driven_at_the_own_speed(scene: Any) -> None:
     played = scene(2, ("Ego", trajectory(CORNER, "<None/>")))
     assert (played.at(0.4).x, played.at(0.4).y) == pytest.approx((108.0, -2.0))
@@ -168,6 +176,7 @@ def test_a_trajectory_without_timing_is_driven_at_the_own_speed(scene: Any) -> N
     assert played.when("action 0", "completeState") == pytest.approx(1.4)
 
 
+@pytest.mark.element("FollowTrajectoryAction", "Timing")
 @pytest.mark.parametrize(
     ("domain", "offset", "scale", "start"),
     [("relative", 0, 1, 0.5), ("absolute", 0.5, 1, 0.5), ("relative", 1, 2, 1.5)],

@@ -27,6 +27,7 @@ def relative(value: float, kind: str, continuous: bool = False) -> str:
     )
 
 
+@pytest.mark.element("SpeedAction")
 @pytest.mark.parametrize(
     ("shape", "dimension", "value", "half", "end"),
     [
@@ -73,6 +74,7 @@ def test_a_relative_speed(scene: Any, value: float, kind: str, expected: float) 
     assert played.at(0.5).speed == expected
 
 
+@pytest.mark.element("SpeedAction")
 def test_a_continuous_relative_speed_follows_until_somebody_else_takes_over(scene: Any) -> None:
     later = '<ByValueCondition><SimulationTimeCondition value="2.95" rule="greaterThan"/></ByValueCondition>'
     played = scene(
@@ -112,6 +114,7 @@ def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") ->
       </SpeedProfileAction></LongitudinalAction></PrivateAction>"""
 
 
+@pytest.mark.element("SpeedProfileAction")
 def test_a_profile_in_straight_lines(scene: Any) -> None:
     played = scene(4, ("Ego", profile("position", (1.0, 30.0), (2.0, 20.0))))
     assert [played.at(t).speed for t in (0.5, 1.0, 2.0, 3.0)] == pytest.approx([25, 30, 25, 20])
@@ -124,6 +127,7 @@ def test_an_entry_without_time_is_reached_as_fast_as_the_limits_allow(scene: Any
     assert [played.at(t).speed for t in (1.0, 2.0, 3.0, 4.0)] == pytest.approx([25, 30, 26, 22])
 
 
+@pytest.mark.element("SpeedProfileAction")
 def test_followed_profiles_round_their_corners() -> None:
     """To 10 m/s in 4 s, to 4 m/s in 4 s more; slopes 2.5 and -1.5 m/s², rates 4 and 3 m/s³: worked by hand.
 
@@ -155,6 +159,7 @@ def keep(attributes: str, limits: str = "") -> str:
       </LongitudinalAction></PrivateAction>"""
 
 
+@pytest.mark.element("LongitudinalDistanceAction")
 @pytest.mark.parametrize(
     ("attributes", "gap"),
     [
@@ -171,6 +176,7 @@ def test_without_limits_a_distance_holds_at_once(scene: Any, attributes: str, ga
     assert played.at(1.0).speed == 10.0
 
 
+@pytest.mark.element("LongitudinalDistanceAction")
 def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
     limits = '<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="25"/>'
     played = scene(40, ("Ego", keep('distance="20" freespace="false" continuous="false"', limits)))
@@ -181,6 +187,7 @@ def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
     assert max(changes) <= 0.3 + 1e-9
 
 
+@pytest.mark.element("SynchronizeAction")
 def test_two_arrive_together(scene: Any) -> None:
     """Other needs (400 - 150) / 10 = 25 s; Ego has 500 m for that, and shall arrive with 22 m/s."""
     position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'

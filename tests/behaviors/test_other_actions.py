@@ -23,6 +23,7 @@ def everywhere(action: str) -> str:
     return f"<GlobalAction>{action}</GlobalAction>"
 
 
+@pytest.mark.element("AssignRouteAction")
 def test_a_route_becomes_the_path_of_who_drives_itself(scene: Any) -> None:
     position = '<Position><LanePosition roadId="1" laneId="-1" s="{}"/></Position>'
     waypoint = f'<Waypoint routeStrategy="shortest">{position}</Waypoint>'
@@ -32,6 +33,7 @@ def test_a_route_becomes_the_path_of_who_drives_itself(scene: Any) -> None:
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [400.0, -2.0]])
 
 
+@pytest.mark.element("AcquirePositionAction")
 def test_a_position_to_acquire_is_a_route_from_here(scene: Any) -> None:
     position = '<Position><LanePosition roadId="1" laneId="-1" s="300"/></Position>'
     action = private(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
@@ -39,6 +41,7 @@ def test_a_position_to_acquire_is_a_route_from_here(scene: Any) -> None:
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [300.0, -2.0]])
 
 
+@pytest.mark.element("ActivateControllerAction")
 def test_a_controller_that_is_turned_off_leaves_the_actor_to_its_lane(scene: Any) -> None:
     off = private(
         '<ControllerAction><ActivateControllerAction lateral="false" longitudinal="false"/></ControllerAction>'
@@ -78,6 +81,7 @@ def test_pedals_are_held_until_they_are_given_back(scene: Any) -> None:
     assert played.commands[4].overrides == {}
 
 
+@pytest.mark.element("VariableSetAction", "VariableModifyAction", "VariableCondition", "VariableDeclaration")
 def test_variables_and_parameters_are_set_and_calculated_with(scene: Any) -> None:
     triple = everywhere(
         '<VariableAction variableRef="Mood"><ModifyAction><Rule><MultiplyByValue value="3"/></Rule></ModifyAction>'
@@ -98,6 +102,29 @@ def test_variables_and_parameters_are_set_and_calculated_with(scene: Any) -> Non
     assert played.why("event 4") == "variable Mood = 21 = 21.0"
 
 
+@pytest.mark.element("ParameterSetAction", "ParameterModifyAction", "ParameterCondition")
+def test_a_parameter_that_is_set_and_modified_is_seen_by_conditions(scene: Any) -> None:
+    """Level is declared as 2: set to 7 at 0.2 s, times 3 at 0.4 s, less 1 at 0.6 s."""
+    action = '<ParameterAction parameterRef="Level">{}</ParameterAction>'
+    rule = "<ModifyAction><Rule>{}</Rule></ModifyAction>"
+    changes = (
+        '<SetAction value="7"/>',
+        rule.format('<MultiplyByValue value="3"/>'),
+        rule.format('<AddValue value="-1"/>'),
+    )
+    seen = '<ByValueCondition><ParameterCondition parameterRef="Level" rule="equalTo" value="{}"/></ByValueCondition>'
+    nothing = private('<VisibilityAction graphics="true" sensors="true" traffic="true"/>')
+    played = scene(
+        1,
+        *(
+            ("Ego", everywhere(action.format(change)), after(t))
+            for change, t in zip(changes, (0.15, 0.35, 0.55), strict=True)
+        ),
+        *(("Ego", nothing, seen.format(value)) for value in (2, 7, 21, 20)),
+    )
+    assert [played.when(f"event {n}", "runningState") for n in (3, 4, 5, 6)] == pytest.approx([0.0, 0.2, 0.4, 0.6])
+
+
 def test_to_calculate_with_a_word_is_an_error(scene: Any) -> None:
     rule = '<Rule><AddValue value="3"/></Rule>'
     add = f'<VariableAction variableRef="Mood"><ModifyAction>{rule}</ModifyAction></VariableAction>'
@@ -105,6 +132,7 @@ def test_to_calculate_with_a_word_is_an_error(scene: Any) -> None:
         scene(0.2, ("Ego", everywhere(add)))
 
 
+@pytest.mark.element("TrafficSignalStateAction", "TrafficSignalCondition")
 def test_a_signal_changes_and_conditions_below_see_it_in_the_same_tick(scene: Any) -> None:
     change = everywhere(
         "<InfrastructureAction><TrafficSignalAction>"
@@ -118,6 +146,7 @@ def test_a_signal_changes_and_conditions_below_see_it_in_the_same_tick(scene: An
     assert played.commands[2].appearances["Ego"].visibility == Visibility(sensors=False)
 
 
+@pytest.mark.element("TimeOfDayCondition")
 def test_the_environment_and_its_clock(scene: Any) -> None:
     environment = everywhere(
         '<EnvironmentAction><Environment name="noon"><TimeOfDay animation="true" dateTime="2024-06-01T12:00:00"/>'
@@ -131,6 +160,7 @@ def test_the_environment_and_its_clock(scene: Any) -> None:
     assert played.when("event 1", "runningState") == pytest.approx(0.7)
 
 
+@pytest.mark.element("LightStateAction")
 def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> None:
     light = private(
         '<AppearanceAction><LightStateAction transitionTime="{}"><LightType><VehicleLight vehicleLightType="{}"/>'
@@ -148,6 +178,7 @@ def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> Non
     assert played.when("action 1", "completeState") == pytest.approx(1.1)
 
 
+@pytest.mark.element("CustomCommandAction")
 def test_a_command_is_handed_on_once(scene: Any) -> None:
     command = (
         '<UserDefinedAction><CustomCommandAction type="eidrive.channel">ideal</CustomCommandAction></UserDefinedAction>'

@@ -50,6 +50,7 @@ def fork() -> str:
       <junction id="9" name="">{connections}</junction></OpenDRIVE>"""
 
 
+@pytest.mark.element("RandomRouteAction")
 @pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
 def test_over_the_seeds_all_branches_are_taken_and_one_seed_takes_one(run: Any, driven: bool) -> None:
     def turn(seed: int) -> float:
@@ -62,6 +63,7 @@ def test_over_the_seeds_all_branches_are_taken_and_one_seed_takes_one(run: Any, 
     assert turn(3) == taken[3]
 
 
+@pytest.mark.element("AssignRouteAction")
 def test_a_route_that_is_assigned_later_ends_the_wandering(run: Any) -> None:
     waypoint = '<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="{}" laneId="-1" s="{}"/></Position>'
     waypoints = "".join(waypoint.format(*place) + "</Waypoint>" for place in ((1, 25), (4, 150)))

@@ -18,6 +18,7 @@ LIGHTS = """<TrafficSignals><TrafficSignalController name="crossing">
   </TrafficSignalController></TrafficSignals>"""
 
 
+@pytest.mark.element("TrafficSignalControllerAction", "TrafficSignalControllerCondition", "TrafficSignalController")
 def test_signals_run_through_their_phases_and_are_recorded(run: Any, tmp_path: Path) -> None:
     go = '<ByValueCondition><TrafficSignalControllerCondition trafficSignalControllerRef="crossing" phase="stop"/>'
     red = '<ByValueCondition><TrafficSignalCondition name="7" state="ON;OFF;OFF"/></ByValueCondition>'

@@ -107,6 +107,7 @@ def at_time(value: float) -> str:
     return f'<ByValueCondition><SimulationTimeCondition value="{value}" rule="greaterOrEqual"/></ByValueCondition>'
 
 
+@pytest.mark.element("TrafficSwarmAction")
 def test_a_swarm_of_init_is_in_the_world_after_the_first_step(run: Run) -> None:
     played = run(8.0, ego=(-1, 400.0, 10.0), driven=False, globally=traffic(swarm()))
     assert crowd(played, 0.0) == []
@@ -149,6 +150,7 @@ def test_sensors_of_an_agent_see_the_swarm(run: Run) -> None:
     assert seen - {"0"}
 
 
+@pytest.mark.element("TrafficSourceAction")
 def test_the_action_goes_on_until_it_is_stopped_and_the_cars_stay(run: Run) -> None:
     played = run(
         12.0,
@@ -167,6 +169,7 @@ def test_the_action_goes_on_until_it_is_stopped_and_the_cars_stay(run: Run) -> N
     assert [len(crowd(played, time)) for time in (0.05, 2.5, 4.95, 6.5, 11.9)] == [1, 2, 3, 3, 3]
 
 
+@pytest.mark.element("TrafficStopAction")
 def test_a_stop_is_for_the_traffic_of_its_name_or_for_all(run: Run) -> None:
     def play(name: str) -> Watched:
         return run(
@@ -181,6 +184,7 @@ def test_a_stop_is_for_the_traffic_of_its_name_or_for_all(run: Run) -> None:
     assert [len(crowd(every, 9.5, name)) for name in ("one", "two")] == [2, 2]
 
 
+@pytest.mark.element("TrafficSourceAction", "TrafficSinkAction")
 def test_a_source_feeds_a_sink(run: Run) -> None:
     played = run(
         60.0,
@@ -206,6 +210,7 @@ def test_entities_of_the_scenario_pass_a_sink(run: Run) -> None:
     assert played.x("Ego")[-1] > 500.0
 
 
+@pytest.mark.element("TrafficAreaAction")
 def test_an_area_by_roads_and_lanes(run: Run) -> None:
     where = road_range(300.0, 500.0, '<Lane id="-1"/>')
     played = run(5.0, driven=False, ego=(1, 900.0, 0.0), globally=traffic(area(6, "true", where)))
@@ -218,6 +223,7 @@ def test_an_area_by_roads_and_lanes(run: Run) -> None:
     assert len(crowd(played, 0.05)) == 6
 
 
+@pytest.mark.element("TrafficAreaAction")
 def test_an_area_by_a_polygon_is_filled_once_and_its_action_is_done(run: Run) -> None:
     corners = "".join(
         f'<Position><WorldPosition x="{x}" y="{y}"/></Position>' for x, y in ((300, -9), (500, -9), (500, 5), (300, 5))
@@ -252,6 +258,7 @@ def test_pedestrians_walk_on_sidewalks(run: Run) -> None:
     assert all(1.0 < speed < 1.7 for speed in frame.view.speed[rows])
 
 
+@pytest.mark.element("TrafficDefinition", "TrafficDistribution")
 def test_shares_of_categories_and_of_entities(run: Run) -> None:
     categories = '<VehicleCategoryDistributionEntry category="{}" weight="{}"/>'
     mixed = categories.format("truck", 1) + categories.format("car", 1) + categories.format("bicycle", 0)

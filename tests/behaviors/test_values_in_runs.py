@@ -12,6 +12,7 @@ from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.states import Transition
 
 
+@pytest.mark.element("EnvironmentAction")
 def test_what_an_environment_leaves_out_stays(run: Any) -> None:
     first = everywhere("""<EnvironmentAction><Environment name="morning">
       <TimeOfDay animation="true" dateTime="2024-06-01T06:00:00"/>
@@ -32,6 +33,7 @@ def test_what_an_environment_leaves_out_stays(run: Any) -> None:
     assert now.clock(2.0).isoformat() == "2024-06-01T06:00:02"
 
 
+@pytest.mark.element("UserDefinedValueCondition")
 def test_a_value_from_outside_starts_an_event(run: Any) -> None:
     condition = '<UserDefinedValueCondition name="signal strength" rule="lessThan" value="5"/>'
     condition = f"<ByValueCondition>{condition}</ByValueCondition>"
@@ -49,6 +51,7 @@ def test_a_value_from_outside_starts_an_event(run: Any) -> None:
     assert (answered.begun("event 0"), answered.result.warnings) == ([0.0], ())
 
 
+@pytest.mark.element("SetMonitorAction", "MonitorDeclaration")
 def test_a_monitor_is_seen_in_frames_metrics_and_a_verdict(run: Any) -> None:
     criterion = (
         '<UserDefinedAction><CustomCommandAction type="eidrive.criterion">[{{monitor: {{of: Passed{0}}}}}]'
@@ -66,6 +69,7 @@ def test_a_monitor_is_seen_in_frames_metrics_and_a_verdict(run: Any) -> None:
     assert not run(2, ("Ego", passed, after(1.0)), globally=criterion.format(", throughout: true")).result.passed
 
 
+@pytest.mark.element("LightStateAction", "AnimationAction")
 def test_lights_and_animations_are_in_the_frames(run: Any) -> None:
     light = private("""<AppearanceAction><LightStateAction transitionTime="0.5"><LightType><UserDefinedLight
       userDefinedLightType="rotating beacon"/></LightType><LightState mode="flashing" flashingOnDuration="0.2"
@@ -120,6 +124,7 @@ def test_a_light_fades_over_its_transition(run: Any) -> None:
     assert [lights["lowBeam"].brightness(t) for t in (0.0, 0.25, 1.0)] == [1.0, 0.75, 0.0]
 
 
+@pytest.mark.element("AnimationAction")
 def test_a_pedestrian_waves_and_a_loop_goes_on(run: Any) -> None:
     wave = private("""<AppearanceAction><AnimationAction loop="true" animationDuration="0.2"><AnimationType>
       <PedestrianAnimation motion="standing"><PedestrianGesture gesture="wavingRightArm"/></PedestrianAnimation>
@@ -130,6 +135,7 @@ def test_a_pedestrian_waves_and_a_loop_goes_on(run: Any) -> None:
     assert not any(c.element == "action 0" and c.transition is Transition.END for f in played.frames for c in f.changes)
 
 
+@pytest.mark.element("VisibilityAction")
 def test_who_is_hidden_from_sensors_is_not_detected_and_is_there_all_the_same(run: Any) -> None:
     hide = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
     played = run(

@@ -55,6 +55,7 @@ def properties_of(controller: model.Controller) -> dict[str, str]:
     return {one.name: one.value for one in controller.properties.property}
 
 
+@pytest.mark.element("CatalogReference", "ParameterAssignment")
 def test_an_entry_gets_its_own_values(shelf: Callable[..., Path], scene: Callable[..., Path]) -> None:
     shelf("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3))
     plain = load_scenario(scene(reference("Drivers", "driver")))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from eidrive_scenario.openscenario.expressions import MAX_LENGTH, ExpressionError, concatenate, evaluate, joins_text
 
 
+@pytest.mark.element("${expression}")
 @pytest.mark.parametrize(
     ("text", "value"),
     [

@@ -15,12 +15,14 @@ def speed_of(scenario: Scenario) -> float:
     return next(one.value for one in scenario.document.walk() if isinstance(one, model.AbsoluteTargetSpeed))
 
 
+@pytest.mark.element("$parameter")
 def test_a_parameter_is_put_in(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "12.5")), story=story_xml(speed="$Speed"))
     assert speed_of(load_scenario(xml)) == 12.5
     assert load_scenario(xml).parameters == {"Speed": "12.5"}
 
 
+@pytest.mark.element("${expression}")
 def test_a_value_from_outside_comes_first(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     declared = parameters_xml(Kmh=("double", "36"), Speed=("double", "${$Kmh / 3.6}"))
     xml = scenario_xml(declarations=declared, story=story_xml(speed="${$Speed + 1}"))
@@ -39,6 +41,7 @@ def test_unknown_or_unfit_values_from_outside_are_refused(scenario_xml: Build, p
         load_scenario(scenario_xml(), {"Speed": "3"})
 
 
+@pytest.mark.element("$parameter")
 def test_an_inner_scope_hides_the_outer(scenario_xml: Build, story_xml: Text, parameters_xml: Text) -> None:
     inner = parameters_xml(Speed=("double", "${$Speed * 2}"))
     story = story_xml(speed="$Speed").replace('<Story name="story">', f'<Story name="story">{inner}')
@@ -46,6 +49,7 @@ def test_an_inner_scope_hides_the_outer(scenario_xml: Build, story_xml: Text, pa
     assert speed_of(load_scenario(xml)) == 8
 
 
+@pytest.mark.element("ConstraintGroup")
 @pytest.mark.parametrize(
     ("kind", "value", "rule", "limit", "fits"),
     [
@@ -67,6 +71,7 @@ def test_constraints(scenario_xml: Build, kind: str, value: str, rule: str, limi
             load_scenario(scenario_xml(declarations=declared))
 
 
+@pytest.mark.element("ConstraintGroup")
 def test_groups_of_constraints_are_alternatives(scenario_xml: Build) -> None:
     group = '<ConstraintGroup><ValueConstraint rule="equalTo" value="{}"/></ConstraintGroup>'
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="2">

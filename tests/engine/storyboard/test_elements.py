@@ -76,6 +76,7 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
     return seen
 
 
+@pytest.mark.element("Event without StartTrigger")
 def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
     first, second, third = play(clock, root, 3)
@@ -91,6 +92,7 @@ def test_an_action_of_one_tick_starts_and_ends_in_the_same(clock: Any, make: Any
     assert play(clock, root, 1)[0][-2:] == ["story end", "storyboard end"]
 
 
+@pytest.mark.element("Act StartTrigger")
 def test_an_act_waits_for_its_trigger_and_its_events_begin_to_look_only_then(clock: Any, make: Any, task: Any) -> None:
     event = make.event("event", task(1), start=[YES])
     root = make.storyboard(make.act(make.group(make.maneuver(event)), start=[NO, NO, YES]))
@@ -100,6 +102,7 @@ def test_an_act_waits_for_its_trigger_and_its_events_begin_to_look_only_then(clo
     assert event.start_leaf.trigger.groups[0].monitors[0].condition.asked == 1
 
 
+@pytest.mark.element("Storyboard StopTrigger")
 def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, task: Any) -> None:
     late = make.event("late", task(1), start=[NO, YES])
     running = make.event("running", task(9))
@@ -110,6 +113,7 @@ def test_a_stop_trigger_is_judged_before_the_children(clock: Any, make: Any, tas
     ]
 
 
+@pytest.mark.element("Act StopTrigger")
 def test_an_act_is_stopped_alone_from_the_tick_after_its_start(clock: Any, make: Any, task: Any) -> None:
     one = make.act(make.group(make.maneuver(make.event("one", task(9)))), stop=[NO, YES], name="first")
     two = make.act(make.group(make.maneuver(make.event("two", task(9)))), name="second")
@@ -119,14 +123,19 @@ def test_an_act_is_stopped_alone_from_the_tick_after_its_start(clock: Any, make:
     assert two.state.name == "RUNNING"
 
 
-def test_override_stops_the_running_events_of_its_maneuver_only(clock: Any, make: Any, task: Any) -> None:
-    old, new = make.event("old", task(9)), make.event("new", task(1), start=[NO, YES], priority="override")
+@pytest.mark.element("priority overwrite", "priority override")
+@pytest.mark.parametrize("priority", ["override", "overwrite"])
+def test_override_stops_the_running_events_of_its_maneuver_only(
+    clock: Any, make: Any, task: Any, priority: str
+) -> None:
+    old, new = make.event("old", task(9)), make.event("new", task(1), start=[NO, YES], priority=priority)
     other = make.maneuver(make.event("other", task(9)))
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new), other))), 2)
     assert ticks[1] == ["old.0 stop", "old stop", "new start", "new.0 start", "new.0 end", "new end", "maneuver end"]
     assert other.state.name == "RUNNING"
 
 
+@pytest.mark.element("priority skip")
 def test_skip_stands_by_while_another_runs_and_may_start_later(clock: Any, make: Any, task: Any) -> None:
     running = make.event("running", task(2))
     shy = make.event("shy", task(1), start=[NO, YES, YES], priority="skip")
@@ -135,12 +144,14 @@ def test_skip_stands_by_while_another_runs_and_may_start_later(clock: Any, make:
     assert ticks[2][:2] == ["shy start", "shy.0 start"]
 
 
+@pytest.mark.element("priority parallel")
 def test_parallel_lets_others_run(clock: Any, make: Any, task: Any) -> None:
     old, new = make.event("old", task(9)), make.event("new", task(9), start=[NO, YES])
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new)))), 2)
     assert ticks[1] == ["new start", "new.0 start"]
 
 
+@pytest.mark.element("Event maximumExecutionCount")
 def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: Any) -> None:
     event = make.event("event", task(1), start=[NO, YES], limit=2)
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 4)
@@ -149,6 +160,7 @@ def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: An
     assert ticks[2][-1] == "storyboard end"
 
 
+@pytest.mark.element("ManeuverGroup maximumExecutionCount")
 def test_a_group_that_is_executed_again_starts_all_below_anew(clock: Any, make: Any, task: Any) -> None:
     doing = task(1)
     group = make.group(make.maneuver(make.event("event", doing)), limit=3)
@@ -171,6 +183,7 @@ def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, mak
     assert root.state.name == "RUNNING"
 
 
+@pytest.mark.element("conflicting actions")
 def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make: Any, task: Any) -> None:
     slow = make.event("slow", task(9, actor="A", domain=Domain.LONGITUDINAL))
     aside = make.event("aside", task(9, actor="A", domain=Domain.LATERAL))
@@ -188,6 +201,7 @@ def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any,
     assert ticks[1][0] == "action end"
 
 
+@pytest.mark.element("conflicting actions")
 def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, stage: Any) -> None:
     init = InitBlock(stage, [task(9, actor="A", domain=Domain.LONGITUDINAL)])
     init.start()

@@ -38,6 +38,7 @@ def at(stage: Any, **frame: Any) -> tuple[Pose, Any]:
     return place.pose, place.location
 
 
+@pytest.mark.element("GeoPosition")
 def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: Stage) -> None:
     """On the middle meridian x is the false easting, and the map is smaller than the globe by 0.9996."""
     first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
@@ -69,6 +70,7 @@ def test_the_ground_the_level_or_the_altitude_say_how_high(globe: Stage) -> None
         at(globe, **place, vertical_road_selection=2)
 
 
+@pytest.mark.element("GeoPosition")
 def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: Stage) -> None:
     expected, _ = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     old, _ = at(globe, latitude=math.radians(LATITUDE), longitude=math.radians(9.0))

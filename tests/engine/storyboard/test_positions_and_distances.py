@@ -31,6 +31,15 @@ def relative(h: Any) -> Any:
     return model.Orientation(h=h, type=model.ReferenceContext.RELATIVE)
 
 
+@pytest.mark.element(
+    "WorldPosition",
+    "RelativeWorldPosition",
+    "RelativeObjectPosition",
+    "LanePosition",
+    "RelativeLanePosition",
+    "RoadPosition",
+    "RelativeRoadPosition",
+)
 @pytest.mark.parametrize(
     ("frame", "x", "y", "h"),
     [
@@ -72,6 +81,7 @@ def waypoint(lane: Any, s: Any) -> Any:
     )
 
 
+@pytest.mark.element("RoutePosition")
 @pytest.mark.parametrize(
     ("within", "x", "y"),
     [
@@ -92,6 +102,7 @@ def test_a_route_position_counts_from_the_first_waypoint(on_street: Any, within:
     assert resolve(model.Position(route_position=frame), on_street).pose[:2] == pytest.approx((x, y), abs=1e-6)
 
 
+@pytest.mark.element("TrajectoryPosition")
 def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: Any) -> None:
     corners = tuple(
         model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=y)))

@@ -67,6 +67,7 @@ def test_phases_change_in_the_tick_of_their_time_though_ticks_are_no_binary_numb
     assert course(found, [tick * 0.1 for tick in range(3000)]) == [f"p{tick % 3}" for tick in range(3000)]
 
 
+@pytest.mark.element("TrafficSignalController")
 def test_who_refers_to_another_is_behind_it_from_the_start() -> None:
     found = signals(controller(*CYCLE), controller(*CYCLE, name="c2", reference="c1", delay=5))
     assert course(found, [0, 4.95, 5, 14.95, 15, 18, 25], "c2") == [

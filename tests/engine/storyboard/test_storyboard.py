@@ -81,6 +81,7 @@ def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
         build(beside).initial()
 
 
+@pytest.mark.element("SimulationTimeCondition")
 def test_a_step_of_speed_moves_the_actor_in_the_step_in_which_it_starts(build: Any) -> None:
     """At 10 m/s from x = 5; the event at 0.2 s (the first time above 0.15 s) makes it 20 m/s."""
     trigger = AFTER.format(kind="Start", edge="rising", value=0.15)
@@ -97,6 +98,7 @@ def test_a_linear_change_of_speed_ends_in_the_tick_that_commands_its_target(buil
     assert storyboard.ended == "storyboard complete"
 
 
+@pytest.mark.element("SimulationTimeCondition", "Storyboard StopTrigger")
 def test_the_stop_trigger_ends_the_run(build: Any) -> None:
     storyboard = build(STARTS, stop=AFTER.format(kind="Stop", edge="none", value=0.25))
     play(storyboard, 3)
@@ -119,6 +121,7 @@ def test_without_a_stop_trigger_and_without_stories_it_goes_on(build: Any) -> No
     assert storyboard.ended is None
 
 
+@pytest.mark.element("AddEntityAction", "DeleteEntityAction")
 def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
     entity = '<GlobalAction><EntityAction entityRef="B">{}</EntityAction></GlobalAction>'
     come = entity.format(f"<AddEntityAction><Position>{AT.format(x=50)}</Position></AddEntityAction>")
@@ -162,6 +165,7 @@ WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" condi
   </ByValueCondition></Condition></ConditionGroup></StartTrigger>"""
 
 
+@pytest.mark.element("StoryboardElementStateCondition")
 @pytest.mark.parametrize(
     ("kind", "name", "state", "when"),
     [

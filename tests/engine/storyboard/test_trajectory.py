@@ -30,6 +30,7 @@ def polyline(*points: Any, closed: Any = False) -> Any:
     return lay_out(trajectory(closed, polyline=model.Polyline(vertex=vertices)), resolve)
 
 
+@pytest.mark.element("Polyline")
 def test_a_polyline_turns_at_its_corners() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
     assert way.length == 7.0
@@ -49,6 +50,7 @@ def test_a_closed_polyline_comes_back_to_its_start() -> None:
     assert way.at(14.0)[:2] == pytest.approx((2.0, 0.0))
 
 
+@pytest.mark.element("Timing")
 def test_times_are_kept_at_the_corners_at_constant_speed_between() -> None:
     way = polyline((0, 0, 1.0, None), (10, 0, 3.0, None), (10, 30, 5.0, None))
     assert [way.at_time(t) for t in (0.0, 1.0, 2.0, 3.0, 4.0, 9.0)] == pytest.approx([0, 0, 5, 10, 25, 40])
@@ -64,12 +66,14 @@ def test_times_are_kept_at_the_corners_with_speeds_that_change_linearly() -> Non
     assert way.at_time(1.5, speeds) == pytest.approx(6.0)
 
 
+@pytest.mark.element("Clothoid")
 def test_a_clothoid_without_change_of_curvature_is_an_arc() -> None:
     shape = model.Clothoid(curvature=0.1, length=5 * math.pi, curvature_prime=0.0, position=at(0, 0))
     way = lay_out(trajectory(clothoid=shape), resolve)
     assert way.at(way.length)[:4] == pytest.approx((10.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
 
 
+@pytest.mark.element("Clothoid")
 def test_a_clothoid_turns_by_its_mean_curvature() -> None:
     shape = model.Clothoid(
         curvature=0.0, length=20.0, curvature_prime=0.01, start_time=1.0, stop_time=3.0, position=at(0, 0)
@@ -79,6 +83,7 @@ def test_a_clothoid_turns_by_its_mean_curvature() -> None:
     assert way.at_time(2.0) == pytest.approx(10.0)
 
 
+@pytest.mark.element("ClothoidSpline")
 def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
     pieces = (
         model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=10.0, position_start=at(0, 0)),
@@ -89,6 +94,7 @@ def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
     assert way.at(way.length)[:4] == pytest.approx((20.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
 
 
+@pytest.mark.element("Nurbs")
 def test_a_rational_spline_makes_an_exact_circle() -> None:
     """The quarter circle of Piegl and Tiller: weights 1, 1/√2, 1."""
     points = ((10, 0, 1.0), (10, 10, math.sqrt(0.5)), (0, 10, 1.0))

@@ -15,6 +15,7 @@ def answers(clock: Any, monitor: Any, count: Any) -> Any:
     return [monitor.evaluate(clock.step()) for _ in range(count)]
 
 
+@pytest.mark.element("edge none", "edge rising", "edge falling", "edge risingOrFalling")
 @pytest.mark.parametrize(
     ("edge", "expected"),
     [
@@ -29,11 +30,13 @@ def test_the_first_evaluation_yields_no_edge(clock: Any, script: Any, edge: Any,
     assert answers(clock, monitor, 5) == expected
 
 
+@pytest.mark.element("delay")
 def test_a_delay_shows_the_edge_of_that_time_ago(clock: Any, script: Any) -> None:
     monitor = ConditionMonitor(script([NO, YES, YES, NO, NO, NO, NO]), edge="rising", delay=0.3)
     assert answers(clock, monitor, 7) == [NO, NO, NO, NO, YES, NO, NO]
 
 
+@pytest.mark.element("delay")
 def test_a_delayed_value_without_edge_lasts_as_long_as_it_lasted(clock: Any, script: Any) -> None:
     monitor = ConditionMonitor(script([NO, YES, YES, NO, NO, NO, NO]), delay=0.3)
     assert answers(clock, monitor, 7) == [NO, NO, NO, NO, YES, YES, NO]
@@ -73,6 +76,7 @@ def test_two_edges_at_different_times_never_meet(clock: Any, script: Any) -> Non
     assert [group.evaluate(clock.step()) for _ in range(3)] == [NO, NO, NO]
 
 
+@pytest.mark.element("several condition groups")
 def test_one_true_group_fires_and_says_why(clock: Any, script: Any) -> None:
     trigger = Trigger(
         [

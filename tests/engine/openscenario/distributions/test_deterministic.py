@@ -45,6 +45,7 @@ def texts(path: Path) -> list[str]:
     return [run.parameters["P"] for run in load_distribution(path)]
 
 
+@pytest.mark.element("DistributionSet", "ValueSetDistribution")
 def test_all_combinations_in_the_order_of_the_file(distribution_file: Write, tmp_path: Path) -> None:
     body = deterministic(values("A", "1", "2"), sets({"B": "x", "C": "u"}, {"B": "y", "C": "v"}), values("D", "on"))
     runs = load_distribution(distribution_file(body))
@@ -74,6 +75,7 @@ def test_a_value_knows_its_line(distribution_file: Write) -> None:
     }
 
 
+@pytest.mark.element("DistributionRange")
 @pytest.mark.parametrize(
     ("lower", "upper", "step", "expected"),
     [
@@ -130,6 +132,7 @@ def test_some_of_many_runs_are_spread_over_all_values(distribution_file: Write) 
     assert list(runs.spread(840)) == list(runs.spread(10**6)) == list(range(840))
 
 
+@pytest.mark.element("UserDefinedDistribution")
 @pytest.mark.parametrize(
     ("distributions", "line", "message"),
     [

@@ -50,6 +50,7 @@ def weighted(*elements: tuple[str, str]) -> str:
     return f"<ProbabilityDistributionSet>{inside}</ProbabilityDistributionSet>"
 
 
+@pytest.mark.element("UniformDistribution", "NormalDistribution", "LogNormalDistribution")
 @pytest.mark.parametrize(
     ("distribution", "expected"),
     [
@@ -72,6 +73,7 @@ def test_draws_have_the_stated_distribution(stochastic: Write, distribution: str
     assert len(set(values)) == RUNS
 
 
+@pytest.mark.element("LogNormalDistribution")
 def test_a_log_normal_one_is_cut_off_at_its_range(stochastic: Write) -> None:
     values = drawn(stochastic(normal(0, 1, RANGE.format(0.5, 2), kind="LogNormalDistribution"), runs=RUNS))
     whole = stats.lognorm(1)
@@ -80,11 +82,13 @@ def test_a_log_normal_one_is_cut_off_at_its_range(stochastic: Write) -> None:
     assert 0.5 <= min(values) < max(values) <= 2
 
 
+@pytest.mark.element("Histogram")
 def test_a_histogram_is_uniform_in_its_bins(stochastic: Write) -> None:
     values = drawn(stochastic(histogram(("1", "0", "1"), ("3", "2", "4"), ("0", "4", "9")), runs=RUNS))
     assert stats.kstest(values, lambda x: np.interp(x, [0, 1, 2, 4], [0, 0.25, 0.25, 1])).pvalue > LEVEL
 
 
+@pytest.mark.element("PoissonDistribution")
 @pytest.mark.parametrize(
     ("distribution", "support"),
     [
@@ -115,6 +119,7 @@ def test_counts_have_the_stated_distribution(stochastic: Write, distribution: st
     )
 
 
+@pytest.mark.element("ProbabilityDistributionSet")
 def test_values_come_by_their_weights(stochastic: Write) -> None:
     texts = [
         run.parameters["P"]
