@@ -8,6 +8,8 @@ until it has cleared the fork.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -27,7 +29,6 @@ class Crossings:
     def __init__(self, lanes: TrafficLanes) -> None:
         self._lanes = lanes
         self._meeting: dict[int, dict[int, bool]] = {}
-        self._lines: dict[int, Array] = {}
         self._by_junction: dict[str, list[int]] = {}
         for row, key in enumerate(lanes.keys):
             junction = lanes.roads.roads[key.road].junction_id
@@ -46,13 +47,15 @@ class Crossings:
         known = self._meeting.get(row)
         if known is not None:
             return known
+        lines, low, high = self._lines
         found: dict[int, bool] = {}
-        mine = self._line(row)
+        mine = lines[row]
         tree = cKDTree(mine)
         for other in self.junction_lanes(row):
-            if self._lanes.road[other] == self._lanes.road[row]:
+            near_by = np.all(low[other] <= high[row] + CLEARANCE) and np.all(low[row] <= high[other] + CLEARANCE)
+            if self._lanes.road[other] == self._lanes.road[row] or not near_by:
                 continue
-            line = self._line(other)
+            line = lines[other]
             near = np.flatnonzero(tree.query(line)[0] < CLEARANCE)
             if near.size:
                 together = np.hypot(*(line[0] - mine[0])) < 1.0
@@ -60,16 +63,22 @@ class Crossings:
         self._meeting[row] = found
         return found
 
-    def _line(self, row: int) -> Array:
-        known = self._lines.get(row)
-        if known is not None:
-            return known
-        count = max(int(self._lanes.length[row] / SAMPLE), 1) + 1
-        rows = np.full(count, row)
-        s = self._lanes.s(rows, np.linspace(0.0, self._lanes.length[row], count))
-        poses = self._lanes.tables.lane_poses(rows, s, np.zeros(count))
-        line = self._lines[row] = np.column_stack([poses.x, poses.y])
-        return line
+    @cached_property
+    def _lines(self) -> tuple[dict[int, Array], Array, Array]:
+        """The centre lines (K, 2) of all lanes in junctions, and the corners of the boxes around those of all lanes."""
+        lanes = self._lanes
+        inside = np.array([row for group in self._by_junction.values() for row in group], dtype=np.int64)
+        counts = np.maximum((lanes.length[inside] / SAMPLE).astype(np.int64), 1) + 1
+        rows = np.repeat(inside, counts)
+        step = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+        progress = lanes.length[rows] * step / np.repeat(counts - 1, counts)
+        poses = lanes.tables.lane_poses(rows, lanes.s(rows, progress), np.zeros(len(rows)))
+        points = np.column_stack([poses.x, poses.y])
+        low, high = np.full((len(lanes.keys), 2), np.inf), np.full((len(lanes.keys), 2), -np.inf)
+        np.minimum.at(low, rows, points)
+        np.maximum.at(high, rows, points)
+        pieces = np.split(points, np.cumsum(counts)[:-1])
+        return dict(zip(inside.tolist(), pieces, strict=True)), low, high
 
     def free(self, row: int, name: str, blocked: set[int]) -> bool:
         """True where `name` may have a lane: nobody holds, and nothing stands on, a lane that it meets."""
