@@ -28,7 +28,8 @@ AT_BORDER = 2.0
 ROUNDS = 10
 FARTHEST = 300.0
 LEVEL = 0.1
-"""Roads that lie this much higher or lower at an object than was assumed call for a second look [m]."""
+"""Roads that lie this much higher or lower at an object than was assumed call for another look [m]."""
+LOOKS = 4
 LARGEST_VARIANCE = 2500.0
 
 _OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
@@ -42,18 +43,20 @@ def lift_by_ground(
 
     Each stands on the ground, has the usual size of its class, and is moved until the outline of its projection has
     the edges of the given box: least squares over the place (Levenberg and Marquardt) for some headings, of which the
-    one with the least error is taken; what the others would give counts as uncertainty. Of edges at the picture's
-    border only counts that the object goes on there. The heading follows the lane where a map is at hand, else it leads
-    away from the camera. Roads' heights come from the map, else they are `ground` [m].
+    one with the least error is taken; where the others lead counts as uncertainty. Of edges at the picture's border only
+    counts that the object goes on there. The front follows the lane where a map is at hand, else it leads away from the
+    camera. Roads' heights come from the map, else they are `ground` [m].
     """
     if not len(boxes):
         return np.empty((0, 7)), np.empty((0, 2, 2))
-    heights = np.full(len(boxes), ground)
     view = _View(np.asarray(boxes, dtype=float), classes, camera)
-    found, covariance = view.place(heights, surroundings)
-    there = surroundings.ground(found[:, :2], ground)
-    if np.any(np.abs(there - heights) > LEVEL):
-        found, covariance = view.place(there, surroundings)
+    heights = surroundings.ground(view.far_as_tall(), ground)
+    for _ in range(LOOKS):
+        found, covariance = view.place(heights, surroundings)
+        there = surroundings.ground(found[:, :2], ground)
+        if np.all(np.abs(there - heights) <= LEVEL):
+            break
+        heights = there
     return found, covariance
 
 
@@ -96,14 +99,20 @@ class _View:
         rows = np.arange(count)
         weights = np.exp(-0.5 * (costs - costs[rows, best][:, None]))
         weights /= weights.sum(axis=1, keepdims=True)
-        apart = places - places[rows, best][:, None]
-        doubt = np.einsum("nk,nki,nkj->nij", weights, apart, apart)
         place, heading, information = places[rows, best], headings[rows, best], informations[rows, best]
+        apart = places - place[:, None]
+        doubt = np.einsum("nk,nki,nkj->nij", weights, apart, apart)
         along = np.where(on_lane, base, np.arctan2(place[:, 1], place[:, 0]))
         heading = np.where(np.cos(heading - along) < -1e-9, heading + np.pi, heading)
         boxes = np.column_stack([place, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
         covariance = self._covariance(information, heading) + doubt
         return self._frame.boxes_to_world(boxes), self._frame.covariance_to_world(covariance)
+
+    def far_as_tall(self) -> Array:
+        """(N, 2) where the objects are in the world if they are as tall as usual, whatever the ground."""
+        left, top, right, bottom = self._edges.T
+        rays = np.stack([(left + right) / 2.0, (top + bottom) / 2.0, np.ones(len(left))], axis=1) @ self._turn
+        return self._frame.to_world(rays[:, :2] * (self._sizes[:, 2] / np.maximum(bottom - top, 1e-6))[:, None])
 
     def _first_guess(self, ground: Array) -> Array:
         """(N, 2) where the ray through the lower edge meets the ground, else by the height of the box."""

@@ -92,6 +92,7 @@ def _by_points(
 ) -> list[Fit | None]:
     """What the points in each box say of its object."""
     places, _ = pixels(scan.world, camera)
+    away = np.hypot(*(scan.world[:, :2] - camera.pose[:2, 3]).T)
     found: list[Fit | None] = []
     for box, name, guess, spread in zip(boxes.tolist(), classes, by_ground, covariance, strict=True):
         left, top, right, bottom = box
@@ -101,7 +102,7 @@ def _by_points(
         deviation = math.sqrt(float(place @ spread @ place)) / expected**2
         lengths = _Expected(expected, min(math.hypot(deviation, LEAST_DEVIATION), LARGEST_DEVIATION))
         heading = float(guess[6]) - scan.frame.yaw
-        fit = _foreground(scan, np.flatnonzero(inside), name, lengths, heading)
+        fit = _foreground(scan, np.flatnonzero(inside), away, name, lengths, heading)
         found.append(fit if fit is not None and _fills(fit, scan, box, camera) else None)
     return found
 
@@ -127,15 +128,20 @@ class _Expected(NamedTuple):
     deviation: float
 
 
-def _foreground(scan: Scan, rows: NDArray[np.intp], name: str, expected: _Expected, heading: float) -> Fit | None:
-    """The box of the object among points that a box of a picture has within it; None where there is none."""
+def _foreground(
+    scan: Scan, rows: NDArray[np.intp], away: Array, name: str, expected: _Expected, heading: float
+) -> Fit | None:
+    """The box of the object among points that a box of a picture has within it; None where there is none.
+
+    away   (N,) distance of all points of the scan from the camera [m]
+    """
     best: tuple[float, NDArray[np.int64]] | None = None
     points = scan.points[rows]
     depth = max(prior_of(name).mean[:2]) / 2.0
     for cluster in clusters(points, scan.pattern.azimuth):
         if len(cluster) < LEAST_POINTS:
             continue
-        distance = float(np.median(np.hypot(points[cluster, 0], points[cluster, 1]))) + depth / 2.0
+        distance = float(np.median(away[rows[cluster]])) + depth / 2.0
         off = math.log(max(distance, 0.5) / expected.distance) / expected.deviation
         if abs(off) > GATE:
             continue
