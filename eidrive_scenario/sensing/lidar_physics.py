@@ -56,8 +56,7 @@ class Returns(NamedTuple):
 
 
 def extinction(weather: Weather) -> float:
-    """Of light of 905 nm [1/m]: fog by Kruse's law (ITU-R P.1814), drops as for visible
-    light."""
+    """Of light of 905 nm [1/m]: fog by Kruse's law (ITU-R P.1814), drops as for visible light."""
     kilometres = weather.visual_range / 1000.0
     if kilometres > 50.0:
         power = 1.6

@@ -45,12 +45,12 @@ def inside(corners: np.ndarray, x: float, y: float) -> bool:
 def test_pixels_whose_centres_lie_inside_are_covered() -> None:
     rng = np.random.default_rng(1)
     corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
-    nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[:, None], 3, axis=1)
-    cover = rasterise(corners[..., 0], corners[..., 1], nearness, 20, 16)
+    nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[None], 3, axis=0)
+    cover = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 20, 16)
     for pixel in range(20 * 16):
         x, y = pixel % 20 + 0.5, pixel // 20 + 0.5
         holders = [k for k in range(40) if inside(corners[k], x, y)]
-        nearest = max(holders, key=lambda k: nearness[k, 0], default=-1)
+        nearest = max(holders, key=lambda k: nearness[0, k], default=-1)
         assert cover.triangle[pixel] == nearest
 
 
@@ -61,9 +61,9 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
     triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
     counts = np.zeros(400, dtype=int)
     for one in triangles:
-        counts += rasterise(one[None, :, 0], one[None, :, 1], np.ones((1, 3)), 20, 20).triangle >= 0
+        counts += rasterise(one[:, :1], one[:, 1:], np.ones((3, 1)), 20, 20).triangle >= 0
     assert counts.max() == 1
-    together = rasterise(triangles[..., 0], triangles[..., 1], np.ones((5, 3)), 20, 20).triangle >= 0
+    together = rasterise(triangles[..., 0].T, triangles[..., 1].T, np.ones((3, 5)), 20, 20).triangle >= 0
     assert counts.sum() == together.sum()
     grid = together.reshape(20, 20)
     for line in grid:
@@ -72,9 +72,9 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
 
 
 def test_nearness_is_that_of_the_plane() -> None:
-    corners = np.array([[[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]]])
-    nearness = np.array([[0.1, 0.5, 0.3]])
-    cover = rasterise(corners[..., 0], corners[..., 1], nearness, 20, 20)
+    corners = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]])
+    nearness = np.array([[0.1], [0.5], [0.3]])
+    cover = rasterise(corners[:, :1], corners[:, 1:], nearness, 20, 20)
     hit = np.flatnonzero(cover.triangle == 0)
     x, y = hit % 20 + 0.5, hit // 20 + 0.5
     np.testing.assert_allclose(cover.nearness[hit], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)
