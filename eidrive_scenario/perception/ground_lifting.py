@@ -43,9 +43,9 @@ def lift_by_ground(
 
     Each stands on the ground, has the usual size of its class, and is moved until the outline of its projection has
     the edges of the given box: least squares over the place (Levenberg and Marquardt) for some headings, of which the
-    one with the least error is taken; where the others lead counts as uncertainty. Of edges at the picture's border only
-    counts that the object goes on there. The front follows the lane where a map is at hand, else it leads away from the
-    camera. Roads' heights come from the map, else they are `ground` [m].
+    one with the least error is taken; where the others lead counts as uncertainty. Of edges at the picture's border
+    only counts that the object goes on there. The front follows the lane where a map is at hand, else it leads away
+    from the camera. Roads' heights come from the map, else they are `ground` [m].
     """
     if not len(boxes):
         return np.empty((0, 7)), np.empty((0, 2, 2))

@@ -9,13 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model import SignalPlace
 from eidrive_scenario.roads.signal_states import lamp_colours, must_stop
-from eidrive_scenario.sensing.readings import CameraReading, SignalReading
+from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import is_stop_sign
-from eidrive_scenario.world.furniture import signal_heads
 
 Array = NDArray[np.float64]
 Kind = Literal["light", "stop sign"]
@@ -93,34 +91,6 @@ class SignalsAhead:
                 if stop and line.kind == "light":
                     stop = must_stop(state or "", self._colours[line.signal])
                 yield SignalAhead(line.signal, line.kind, place - progress, state, stop)
-
-
-def recognised(
-    boxes: Array, states: Sequence[str], camera: CameraReading, roads: RoadNetwork, *, within: float = 1.0
-) -> tuple[SignalReading, ...]:
-    """Which lights of the map a detector of pictures has seen: boxes (N, 4) [px] and what each shows.
-
-    A box belongs to the light of the map whose head, projected, has its middle nearest to that of the box, at most
-    `within` times the size of the box away. For cameras in place of the lookout.
-    """
-    heads = [head for head in signal_heads(roads) if head.signal.dynamic]
-    boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
-    if not heads or not len(boxes):
-        return ()
-    middles = np.array([(head.pose.x, head.pose.y, head.pose.z + head.height / 2.0) for head in heads])
-    facing = np.array([(math.cos(head.pose.h), math.sin(head.pose.h)) for head in heads])
-    turned_to = np.einsum("ni,ni->n", camera.pose[:2, 3] - middles[:, :2], facing) > 0.0
-    places, _ = pixels(middles, camera)
-    places[~turned_to] = np.nan
-    found: dict[str, tuple[float, str]] = {}
-    for (left, top, right, bottom), state in zip(boxes.tolist(), states, strict=True):
-        off = np.hypot(places[:, 0] - (left + right) / 2.0, places[:, 1] - (top + bottom) / 2.0)
-        off = np.where(np.isnan(off), np.inf, off) / max(right - left, bottom - top, 1e-6)
-        nearest = int(np.argmin(off))
-        name = heads[nearest].signal.id
-        if off[nearest] <= within and off[nearest] < found.get(name, (math.inf, ""))[0]:
-            found[name] = (float(off[nearest]), state)
-    return tuple(SignalReading(name, state) for name, (_, state) in sorted(found.items()))
 
 
 def _lines(roads: RoadNetwork, signal: Signal, place: SignalPlace) -> Iterator[StopLine]:

@@ -1,0 +1,211 @@
+"""Stop lines on the way, what signals show from where they can be seen, and vehicles that stop for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.signal_stops import WAIT
+from eidrive_scenario.driving.step import Goal
+from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import SignalReading
+from eidrive_scenario.sensing.rig import Rig
+from eidrive_scenario.sensing.signals import SignalLookout
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+
+LANES = """<lanes><laneSection s="0">
+<left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></left>
+<center><lane id="0" type="none"/></center>
+<right><lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection>
+</lanes>"""
+SIGNAL = (
+    '<signal s="{s}" t="{t}" id="{id}" name="" dynamic="{dynamic}" orientation="{orientation}" zOffset="{z}"'
+    ' country="DE" type="{type}" subtype="-1" value="-1" height="0.9" width="0.34" hOffset="0"/>'
+)
+
+
+def light(name: str, s: float, *, orientation: str = "+", t: float = -4.5) -> str:
+    return SIGNAL.format(s=s, t=t, id=name, dynamic="yes", orientation=orientation, z=2.5, type="1000001")
+
+
+def stop_sign(name: str, s: float) -> str:
+    return SIGNAL.format(s=s, t=-4.5, id=name, dynamic="no", orientation="+", z=2.0, type="206")
+
+
+def street(*signals: str) -> RoadNetwork:
+    """A straight road of 200 m along x, a lane each way."""
+    return RoadNetwork.parse(
+        '<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="200" id="1" junction="-1"><planView>'
+        f'<geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>{LANES}'
+        f"<signals>{''.join(signals)}</signals></road></OpenDRIVE>"
+    )
+
+
+EAST = np.column_stack([np.arange(0.0, 200.0), np.full(200, -1.75)])
+WEST = np.column_stack([np.arange(199.0, -1.0, -1.0), np.full(200, 1.75)])
+
+
+def names(roads: RoadNetwork, path: np.ndarray, progress: float = 0.0) -> list[tuple[str, float]]:
+    signals = SignalsAhead(roads)
+    signals.follow(path)
+    return [(one.signal, round(one.distance, 3)) for one in signals.ahead(progress)]
+
+
+def test_a_signal_stops_the_lanes_of_its_direction() -> None:
+    roads = street(light("east", 120.0), light("west", 60.0, orientation="-"), light("both", 150.0, orientation="none"))
+    assert names(roads, EAST) == [("east", 120.0), ("both", 150.0)]
+    assert names(roads, WEST) == [("both", 49.0), ("west", 139.0)]
+    assert names(roads, EAST, 130.0) == [("both", 20.0)]
+    assert names(roads, EAST + np.array([0.0, 8.0])) == []
+
+
+def test_signs_that_do_not_stop_are_left_out() -> None:
+    roads = street(stop_sign("stop", 80.0), SIGNAL.format(
+        s=50, t=-4.5, id="limit", dynamic="no", orientation="+", z=2.0, type="274"
+    ))  # fmt: skip
+    assert [(line.signal, line.kind) for line in stop_lines(roads)] == [("stop", "stop sign")]
+
+
+JUNCTION = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+<road name="" length="50" id="1" junction="-1"><link><successor elementType="junction" elementId="9"/></link><planView>
+<geometry s="0" x="0" y="0" hdg="0" length="50"><line/></geometry></planView>{lanes}</road>
+<road name="" length="20" id="2" junction="9"><link><predecessor elementType="road" elementId="1" contactPoint="end"/>
+<successor elementType="road" elementId="4" contactPoint="start"/></link><planView>
+<geometry s="0" x="50" y="0" hdg="0" length="20"><line/></geometry></planView>{one}<signals>{straight}</signals></road>
+<road name="" length="15.708" id="3" junction="9"><link>
+<predecessor elementType="road" elementId="1" contactPoint="end"/>
+</link><planView><geometry s="0" x="50" y="0" hdg="0" length="15.708"><arc curvature="0.1"/></geometry></planView>{one}
+<signals>{left}</signals></road>
+<road name="" length="50" id="4" junction="-1"><link><predecessor elementType="junction" elementId="9"/></link>
+<planView>
+<geometry s="0" x="70" y="0" hdg="0" length="50"><line/></geometry></planView>{lanes}</road>
+<junction id="9" name=""><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">
+<laneLink from="-1" to="-1"/></connection><connection id="1" incomingRoad="1" connectingRoad="3" contactPoint="start">
+<laneLink from="-1" to="-1"/></connection></junction></OpenDRIVE>"""
+
+
+def test_lights_on_connecting_roads_hold_before_the_junction_and_only_those_who_go_there() -> None:
+    """Straight on and left begin at the same place, each with its own light."""
+    one = LANES[: LANES.index("<left>")] + LANES[LANES.index("<center>") :]
+    roads = RoadNetwork.parse(
+        JUNCTION.format(lanes=LANES, one=one, straight=light("straight", 10.0), left=light("left", 8.0))
+    )
+    arc = np.linspace(0, math.pi / 2, 20)
+    turn = np.column_stack([50 + 11.75 * np.sin(arc), 10 - 11.75 * np.cos(arc)])
+    before = np.column_stack([np.arange(0.0, 50.0), np.full(50, -1.75)])
+    on = np.column_stack([np.arange(50.0, 110.0), np.full(60, -1.75)])
+    assert names(roads, np.concatenate([before, on])) == [("straight", 50.0)]
+    assert [name for name, _ in names(roads, np.concatenate([before, turn]))] == ["left"]
+
+
+def test_only_what_was_seen_stops() -> None:
+    signals = SignalsAhead(street(light("east", 120.0), stop_sign("stop", 150.0)))
+    signals.follow(EAST)
+    assert [one.must_stop for one in signals.ahead(0.0)] == [False, False]
+    for state, stops in (("red", True), ("green", False), ("on;off;off", True), ("", False)):
+        signals.see([SignalReading("east", state), SignalReading("stop", "")])
+        assert [one.must_stop for one in signals.ahead(0.0)] == [stops, True]
+
+
+CAR = ActorSpec("Ego", "car", "car", (4.892, 1.837, 1.49), (1.4, 0.0, 0.745), wheelbase=2.85, max_steering=0.6)
+TRUCK = ActorSpec("Truck", "firetruck", "truck", (8.5, 2.9, 3.8), (0.0, 0.0, 1.9), wheelbase=5.0)
+
+
+def seen(roads: RoadNetwork, states: Mapping[str, str], x: float, yaw: float = 0.0, *, truck: bool = False) -> set[str]:
+    with World(roads, dt=0.05) as world:
+        world.add(CAR, Placement(x, -1.75, yaw=yaw))
+        if truck:
+            world.add(TRUCK, Placement(x + 14, -2.5))
+        readings = SignalLookout(CAR, roads).read(world, world.view(), 0, states)
+    return {f"{reading.id} {reading.state}".strip() for reading in readings}
+
+
+def test_a_light_is_seen_from_its_front_within_range_and_if_nothing_hides_it() -> None:
+    roads = street(light("east", 120.0), light("west", 100.0, orientation="-"), stop_sign("stop", 130.0))
+    states = {"east": "red", "west": "green"}
+    assert seen(roads, states, 60.0) == {"east red", "stop"}
+    assert seen(roads, states, 10.0) == set()
+    assert seen(roads, states, 125.0) == {"stop"}
+    assert "east red" not in seen(roads, states, 90.0, truck=True)
+    assert seen(roads, {}, 60.0) == {"east", "stop"}
+
+
+class Drive:
+    """A car that follows its lane from x = 20 m at 10 m/s and sees what the lookout sees."""
+
+    def __init__(self, roads: RoadNetwork, *, obeys: bool = True) -> None:
+        self.world = World(roads, dt=0.05)
+        self.world.add(CAR, Placement(20.0, -1.75, speed=10.0), driven=True)
+        settings = AgentSettings.model_validate({"obey_signals": obeys, "target_speed": 10.0})
+        self.planner = RoutePlanner(settings, CAR, roads, dt=0.05, seed=0)
+        self.controller = Controller(CAR, 0.05)
+        self.lookout = SignalLookout(CAR, roads)
+        self.rig = Rig(CAR, {})
+        self.reasons: list[str] = []
+
+    def run(self, seconds: float, states: Mapping[str, str]) -> tuple[float, float]:
+        """Where its front is [m], and its speed [m/s], after so long."""
+        for _ in range(round(seconds / 0.05)):
+            view = self.world.view()
+            ego = self.rig.read(self.world, view).ego
+            self.planner.heed(self.lookout.read(self.world, view, 0, states))
+            plan = self.planner.plan(ego, Detections(view.time), Goal(), view.time)
+            self.reasons.append(plan.reason)
+            self.world.step({}, {"Ego": self.controller.control(ego, plan)})
+        view = self.world.view()
+        return float(view.position[0, 0]) + 1.4 + 2.446, float(view.speed[0])
+
+
+def test_a_car_stops_at_red_and_goes_on_at_green() -> None:
+    """The light stands at 120 m: the front comes to a stand within two metres before it, and passes it when it turns."""
+    drive = Drive(street(light("east", 120.0)))
+    front, speed = drive.run(18.0, {"east": "red"})
+    assert 117.5 < front < 120.0
+    assert abs(speed) < 0.05
+    assert drive.reasons[-1] == "stop at traffic light east"
+    front, speed = drive.run(6.0, {"east": "green"})
+    assert front > 130.0
+    drive.world.close()
+
+
+def test_a_car_that_does_not_obey_drives_on() -> None:
+    drive = Drive(street(light("east", 120.0)), obeys=False)
+    front, speed = drive.run(12.0, {"east": "red"})
+    assert front > 130.0
+    assert speed == pytest.approx(10.0, abs=0.5)
+    drive.world.close()
+
+
+def test_a_light_that_turns_too_late_is_passed() -> None:
+    """Green until the front is 6 m before the line: at 10 m/s that would take 8 m/s²."""
+    drive = Drive(street(light("east", 120.0)))
+    front = 0.0
+    while front < 114.0:
+        front, _ = drive.run(0.05, {"east": "green"})
+    front, speed = drive.run(3.0, {"east": "red"})
+    assert front > 135.0
+    assert speed > 9.0
+    drive.world.close()
+
+
+def test_a_car_stops_at_a_stop_sign_waits_and_goes_on() -> None:
+    drive = Drive(street(stop_sign("stop", 100.0)))
+    fronts, speeds = [], []
+    for _ in range(440):
+        front, speed = drive.run(0.05, {})
+        fronts.append(front)
+        speeds.append(speed)
+    standing = np.abs(speeds) < 0.1
+    assert 97.5 < fronts[int(np.argmax(standing))] < 100.0
+    assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
+    assert fronts[-1] > 110.0
+    drive.world.close()
