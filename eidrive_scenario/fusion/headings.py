@@ -20,8 +20,10 @@ FORGETTING = 0.8
 
 def first_heading(yaw: Array) -> tuple[Array, Array]:
     """Headings (N, 2), yaw and its rate, seen for the first time, and their covariances (N, 3): of yaw, both, rate."""
-    covariance = np.tile([HEADING_DEVIATION**2, 0.0, UNKNOWN_TURN**2], (len(yaw), 1))
-    return np.stack([yaw, np.zeros(len(yaw))], axis=1), covariance
+    heading, covariance = np.zeros((len(yaw), 2)), np.empty((len(yaw), 3))
+    heading[:, 0] = yaw
+    covariance[:] = HEADING_DEVIATION**2, 0.0, UNKNOWN_TURN**2
+    return heading, covariance
 
 
 def predicted_heading(heading: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
@@ -51,13 +53,11 @@ def updated_heading(heading: Array, covariance: Array, facing: Array, yaw: Array
     off = wrap_angle(yaw - heading[:, 0])
     against = np.abs(off) > math.pi / 2.0
     off = np.where(against, off - np.copysign(math.pi, off), off)
-    spread = covariance[:, 0] + HEADING_DEVIATION**2
-    gain, rate_gain = covariance[:, 0] / spread, covariance[:, 1] / spread
-    corrected = heading + np.stack([gain * off, rate_gain * off], axis=1)
-    left = 1.0 - gain
-    after = np.stack(
-        [left * covariance[:, 0], left * covariance[:, 1], covariance[:, 2] - rate_gain * covariance[:, 1]], axis=1
-    )
+    gains = covariance[:, :2] / (covariance[:, :1] + HEADING_DEVIATION**2)
+    corrected = heading + gains * off[:, None]
+    after = np.empty_like(covariance)
+    after[:, :2] = covariance[:, :2] * (1.0 - gains[:, :1])
+    after[:, 2] = covariance[:, 2] - gains[:, 1] * covariance[:, 1]
     votes = FORGETTING * facing + np.where(against, -1.0, 1.0)
     corrected[:, 0] = wrap_angle(np.where(votes < 0.0, corrected[:, 0] + math.pi, corrected[:, 0]))
     return corrected, after, np.abs(votes)
@@ -70,10 +70,12 @@ def joined_heading(yaw: Array, weights: Array, starts: NDArray[np.intp], velocit
     for the front. The front is where the greater weight says it is; where both ends have the same, where the object
     drives to, `velocity` (G, 2), NaN where unknown.
     """
-    doubled = np.stack([weights * np.cos(2.0 * yaw), weights * np.sin(2.0 * yaw)], axis=1)
-    sums = np.add.reduceat(doubled, starts, axis=0)
-    axis = 0.5 * np.arctan2(sums[:, 1], sums[:, 0])
-    counts = np.diff(np.append(starts, len(yaw)))
+    counts = np.diff(starts, append=len(yaw))
+    if len(counts) == len(yaw):
+        return yaw
+    x = np.add.reduceat(weights * np.cos(2.0 * yaw), starts)
+    y = np.add.reduceat(weights * np.sin(2.0 * yaw), starts)
+    axis = 0.5 * np.arctan2(y, x)
     votes = np.add.reduceat(weights * np.sign(np.cos(yaw - np.repeat(axis, counts))), starts)
     total = np.add.reduceat(weights, starts)
     ahead = velocity[:, 0] * np.cos(axis) + velocity[:, 1] * np.sin(axis)

@@ -9,6 +9,10 @@ from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY
 
 Array = NDArray[np.float64]
 
+_PLACE = np.diag([1.0, 1.0, 0.0, 0.0])
+_SPEED = np.diag([0.0, 0.0, 1.0, 1.0])
+_BOTH = np.eye(4, k=2) + np.eye(4, k=-2)
+
 
 def predicted(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
     """States (N, 4) x y vx vy and covariances (N, 4, 4), each `step` (N,) [s] later, turning by `turn` (N,) [rad/s].
@@ -31,15 +35,7 @@ def predicted(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple
         forward[:, 2, 3], forward[:, 3, 2] = -sin, sin
     later = forward @ covariance @ np.swapaxes(forward, 1, 2)
     length = np.abs(step)
-    noise = ACCELERATION_DENSITY * length
-    later[:, 2, 2] += noise
-    later[:, 3, 3] += noise
-    cross = 0.5 * noise * step
-    later[:, 0, 2] += cross
-    later[:, 1, 3] += cross
-    later[:, 2, 0] += cross
-    later[:, 3, 1] += cross
-    own = noise * length * length / 3.0
-    later[:, 0, 0] += own
-    later[:, 1, 1] += own
+    noise = (ACCELERATION_DENSITY * length)[:, None, None]
+    across = step[:, None, None]
+    later += noise * (_SPEED + across * (0.5 * _BOTH + (across / 3.0) * _PLACE))
     return (forward @ mean[:, :, None])[:, :, 0], later

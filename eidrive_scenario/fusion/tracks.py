@@ -106,6 +106,8 @@ def predicted_to(tracks: Table, time: Array) -> Table:
     """The tracks at other times (N,) [s]."""
     later = tracks.copy()
     step = time - tracks["time"]
+    if not step.any():
+        return later
     turn = known_turn(tracks["heading"], tracks["heading_covariance"])
     later["mean"], later["covariance"] = predicted(tracks["mean"], tracks["covariance"], step, turn)
     later["heading"], later["heading_covariance"] = predicted_heading(
