@@ -15,7 +15,7 @@ from eidrive_scenario.world.actor import ActorSpec
 
 Array = NDArray[np.float64]
 
-BEFORE_LINE = 1.0
+BEFORE_LINE = 1.5
 """Where the front comes to a stand before the line [m]."""
 TOO_LATE = 5.0
 """A vehicle that would have to brake harder than this passes a light that has just turned [m/s²]."""

@@ -12,7 +12,7 @@ from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
-from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.view import WorldView
@@ -30,12 +30,12 @@ BEFORE = 0.4
 class SignalLookout:
     """Reads traffic lights and stop signs that face the station, within range and in the line of sight.
 
-    It looks from where the front camera sits by default. A stop sign is a reading without a state, and so is a light
+    It looks from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign is a reading without a state, and so is a light
     that shows nothing.
     """
 
     def __init__(self, spec: ActorSpec, roads: RoadNetwork | None) -> None:
-        self._mounting = mounting(CameraSettings(), spec, "front")
+        self._mounting = mounting(TruthSettings(), spec, "roof")
         heads = [] if roads is None else signal_heads(roads)
         heads = [head for head in heads if head.signal.dynamic or is_stop_sign(head.signal)]
         self._ids = [head.signal.id for head in heads]
