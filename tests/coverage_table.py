@@ -33,56 +33,47 @@ class Row:
     name: str
     types: tuple[str, ...] = ()
     note: str = ""
-    """Why it is accepted without effect, in part or as a whole."""
+    """Why it is accepted without effect, in part or as a whole; or refused."""
     without_effect: bool = False
+    refused: bool = False
+    begins: str = ""
+    """The version that brought it, where that does not follow from the types."""
 
 
 def _rows(*names: str) -> tuple[Row, ...]:
     return tuple(Row(name) for name in names)
 
 
+OF_1_2 = "1.2 defines it, with no place for it in the schema"
+EXACTLY = "the dynamics' followingMode is not used: the curve is driven exactly, within the Performance"
+
 SECTIONS: dict[str, tuple[Row, ...]] = {
     "Private actions": (
-        *_rows(
-            "SpeedAction",
-            "SpeedProfileAction",
-            "LongitudinalDistanceAction",
-            "LaneChangeAction",
-            "LaneOffsetAction",
-            "LateralDistanceAction",
-            "VisibilityAction",
-            "SynchronizeAction",
-            "ActivateControllerAction",
-            "AssignControllerAction",
-            "OverrideControllerValueAction",
-            "TeleportAction",
-            "AssignRouteAction",
-            "FollowTrajectoryAction",
-            "AcquirePositionAction",
-            "RandomRouteAction",
-            "LightStateAction",
-            "AnimationAction",
-            "ConnectTrailerAction",
-            "DisconnectTrailerAction",
-        ),
+        Row("SpeedAction", note=EXACTLY),
+        *_rows("SpeedProfileAction", "LongitudinalDistanceAction"),
+        Row("LaneChangeAction", note=EXACTLY),
+        *_rows("LaneOffsetAction", "LateralDistanceAction"),
+        Row("VisibilityAction", note="counts for all sensors of others: its SensorReferenceSet is not used"),
+        Row("SynchronizeAction"),
+        Row("ActivateControllerAction", note="controllers of other tools mean the default controller"),
+        Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),
+        Row("OverrideControllerValueAction", note="of a scripted vehicle it is recorded only: that one has no pedals"),
+        Row("TeleportAction"),
+        Row("AssignRouteAction", note="a closed route is driven once, as in esmini"),
+        *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
+        Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is recorded only: nothing says where it is"),
+        Row("AnimationAction", note=f"{OF_1_2}; pedestrians' motions are drawn, all others are recorded only"),
+        *_rows("ConnectTrailerAction", "DisconnectTrailerAction"),
     ),
-    "Global and user-defined actions": _rows(
-        "EnvironmentAction",
-        "AddEntityAction",
-        "DeleteEntityAction",
-        "ParameterSetAction",
-        "ParameterModifyAction",
-        "VariableSetAction",
-        "VariableModifyAction",
-        "TrafficSignalStateAction",
-        "TrafficSignalControllerAction",
-        "TrafficSwarmAction",
-        "TrafficSourceAction",
-        "TrafficSinkAction",
-        "TrafficAreaAction",
-        "TrafficStopAction",
-        "SetMonitorAction",
-        "CustomCommandAction",
+    "Global and user-defined actions": (
+        Row("EnvironmentAction", note="pictures, sensors and grip; temperature, pressure, dome image: recorded only"),
+        *_rows("AddEntityAction", "DeleteEntityAction", "ParameterSetAction", "ParameterModifyAction"),
+        *_rows(
+            "VariableSetAction", "VariableModifyAction", "TrafficSignalStateAction", "TrafficSignalControllerAction"
+        ),
+        *_rows("TrafficSwarmAction", "TrafficSourceAction", "TrafficSinkAction", "TrafficAreaAction"),
+        *_rows("TrafficStopAction", "TrafficDefinition", "TrafficDistribution", "SetMonitorAction"),
+        Row("CustomCommandAction", note="never starts a program; types that nobody knows are reported"),
     ),
     "Entity conditions": _rows(
         "EndOfRoadCondition",
@@ -127,11 +118,11 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
     "Trajectories": _rows("Polyline", "Clothoid", "ClothoidSpline", "Nurbs", "Timing"),
     "Storyboard": (
         Row("priority overwrite", ("Event",)),
-        Row("priority override", ("Event",)),
+        Row("priority override", ("Event",), begins="1.2"),
         Row("priority parallel", ("Event",)),
         Row("priority skip", ("Event",)),
         Row("Event maximumExecutionCount", ("Event",)),
-        Row("Event without StartTrigger", ("Event",)),
+        Row("Event without StartTrigger", ("Event",), begins="1.1"),
         Row("ManeuverGroup maximumExecutionCount", ("ManeuverGroup",)),
         Row("edge rising", ("Condition",)),
         Row("edge none", ("Condition",)),
@@ -141,6 +132,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("triggeringEntitiesRule", ("TriggeringEntities",)),
         Row("selectTriggeringEntities", ("Actors",)),
         Row("several condition groups", ("Trigger",)),
+        Row("Act StartTrigger", ("Act",)),
         Row("Act StopTrigger", ("Act",)),
         Row("Storyboard StopTrigger", ("Storyboard",)),
         Row("conflicting actions", ("PrivateAction",)),
@@ -149,7 +141,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("CatalogReference"),
         Row("ParameterAssignment"),
         Row("$parameter", ("ParameterDeclaration",)),
-        Row("${expression}", ("ParameterDeclaration",)),
+        Row("${expression}", ("ParameterDeclaration",), begins="1.1"),
         Row("ConstraintGroup", ("ValueConstraintGroup",)),
         Row("VariableDeclaration"),
         Row("MonitorDeclaration"),
@@ -165,8 +157,36 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("PoissonDistribution"),
         Row("Histogram"),
         Row("ProbabilityDistributionSet"),
+        Row("UserDefinedDistribution", note="its meaning is left to a tool", refused=True),
     ),
 }
+
+SHORTEST = "roads are followed by the shortest way, as in esmini"
+LIGHTS = "no controller here steers lights or animations, so that there is nothing to switch on or off"
+WITHOUT_EFFECT = {
+    "ActivateControllerAction.lighting": LIGHTS,
+    "AnimationFile.timeOffset": "files of animations are recorded, not played",
+    "AssignControllerAction.activateAnimation": LIGHTS,
+    "AssignControllerAction.activateLighting": LIGHTS,
+    "Axle.positionZ": "wheels stand on the road",
+    "Axle.trackWidth": "the body's box says how wide a vehicle is; one track is driven",
+    "Controller.controllerType": "its property `module` says whose it is",
+    "DistanceCondition.routingAlgorithm": SHORTEST,
+    "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
+    "OverrideSteeringWheelAction.maxTorque": "a wheel is held at an angle, without forces at the rim",
+    "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are seen as pedestrians",
+    "RelativeDistanceCondition.routingAlgorithm": SHORTEST,
+    "Sensor.horizontalFOV": "sensors are those of the station's controller",
+    "Sensor.sensorCategory": "sensors are those of the station's controller",
+    "Sensor.verticalFOV": "sensors are those of the station's controller",
+    "SensorAttachment.sensorRef": "sensors are those of the station's controller",
+    "TimeHeadwayCondition.routingAlgorithm": SHORTEST,
+    "TimeToCollisionCondition.routingAlgorithm": SHORTEST,
+    "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
+    "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
+    "Waypoint.routeStrategy": "the shortest way is taken between waypoints, whatever strategy is asked for",
+}
+"""Attributes of the standard that are read and checked, and that nothing else in the engine looks at."""
 
 
 def marked_tests() -> dict[str, list[str]]:
@@ -191,7 +211,7 @@ def _marks(function: ast.FunctionDef) -> Iterator[str]:
 def since(row: Row) -> str:
     """The first version of the standard that has a row's types somewhere below the root element."""
     versions = _versions()
-    return max(versions.get(name, "1.0") for name in row.types or (row.name,))
+    return row.begins or max(versions.get(name, "1.0") for name in row.types or (row.name,))
 
 
 @cache
@@ -218,6 +238,26 @@ def _elements() -> Iterator[type[Element]]:
             yield value
 
 
+def unread_attributes() -> set[str]:
+    """The attributes in the model whose names stand nowhere else in the engine, less what is about the file itself."""
+    code = (path for room in ("eidrive_scenario", "behaviors", "criteria") for path in (ROOT / room).rglob("*.py"))
+    texts = (path.read_text(encoding="utf-8") for path in code if path.parent.name != "model")
+    words = {word for text in texts for word in re.findall(r"\w+", text)} | {"line", "source"}
+    elements = {element.__name__ for element in _elements()}
+    return {
+        f"{element.__name__}.{field.metadata.get(USAGE, Usage()).name or _spelling(field.name)}"
+        for element in _elements()
+        if element.__name__ not in ("FileHeader", "License")
+        for field in dataclasses.fields(element)
+        if field.name not in words and not elements & set(re.findall(r"\w+", str(field.type)))
+    }
+
+
+def _spelling(name: str) -> str:
+    first, *rest = name.split("_")
+    return first + "".join(word.capitalize() for word in rest)
+
+
 def table() -> str:
     """The table in Markdown."""
     tests = marked_tests()
@@ -227,13 +267,17 @@ def table() -> str:
         lines += [f"### {title}", "", "| element | since | status | shown by |", "|---|---|---|---|"]
         for row in rows:
             status = "accepted without effect" if row.without_effect else "executed"
+            if row.refused:
+                status = "refused"
             if row.note:
-                status += f": {row.note}" if row.without_effect else f"; {row.note}"
+                status += f"; {row.note}" if status == "executed" else f": {row.note}"
             if row.name.endswith(("Action", "Condition")) and row.name not in registered:
                 status = "**missing**"
             shown = "<br>".join(f"`{place}`" for place in tests.get(row.name, [])[:2]) or "**no test**"
             lines.append(f"| {row.name} | {since(row)} | {status} | {shown} |")
         lines.append("")
+    lines += ["### Attributes without effect", "", "| attribute | why |", "|---|---|"]
+    lines += [f"| {name} | {why} |" for name, why in WITHOUT_EFFECT.items()]
     return "\n".join(lines)
 
 
@@ -241,7 +285,7 @@ def page(text: str) -> str:
     """The page with its table made anew."""
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
-    return f"{before}{BEGIN}\n\n{table()}\n{END}{after}"
+    return f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}"
 
 
 if __name__ == "__main__":

@@ -1,0 +1,70 @@
+"""Trailers that come and go during a run: the hitch is 1 m behind the truck's axle, the bar 3 m long."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from street_scene import after, everywhere, private
+
+BODY = """<BoundingBox><Center x="{middle}" y="0" z="1"/><Dimensions width="2" length="4" height="2"/></BoundingBox>
+  <Performance maxSpeed="30" maxAcceleration="5" maxDeceleration="8"/>
+  <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.8" positionX="3" positionZ="0.3"/>
+  <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.8" positionX="0" positionZ="0.3"/></Axles>"""
+TRAIN = f"""<ScenarioObject name="Truck"><Vehicle name="truck" vehicleCategory="truck">{BODY.format(middle=1.5)}
+    <TrailerHitch dx="-1"/></Vehicle></ScenarioObject>
+  <ScenarioObject name="Trailer"><Vehicle name="trailer" vehicleCategory="trailer">{BODY.format(middle=0)}
+    <TrailerCoupler dx="3"/></Vehicle></ScenarioObject>"""
+PLACE = """<EntityAction entityRef="{}"><AddEntityAction><Position>
+  <LanePosition roadId="1" laneId="-1" s="{}"/></Position></AddEntityAction></EntityAction>"""
+COUPLE = private('<TrailerAction><ConnectTrailerAction trailerRef="Trailer"/></TrailerAction>')
+UNCOUPLE = private("<TrailerAction><DisconnectTrailerAction/></TrailerAction>")
+DRIVE = private(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
+    '<SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+)
+ASIDE = private("""<LateralAction><LaneChangeAction>
+  <LaneChangeActionDynamics dynamicsShape="cubic" dynamicsDimension="time" value="3"/>
+  <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
+
+
+def play(run: Any, end: float, *steps: tuple[str, ...]) -> Any:
+    placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
+    return run(end, *steps, driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed)
+
+
+@pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
+def test_a_trailer_follows_from_its_coupling_to_its_uncoupling(run: Any) -> None:
+    """The trailer's axle is 1 m + 3 m behind the truck's; at 10 m/s from 1 s on, uncoupled just after 3 s."""
+    played = play(
+        run, 4, ("Truck", COUPLE, after(0.5)), ("Truck", DRIVE, after(0.975)), ("Truck", UNCOUPLE, after(3.0))
+    )
+    truck, trailer = played.x("Truck"), played.x("Trailer")
+    assert trailer[:21] == pytest.approx([196.0] * 21)
+    assert [front - back for front, back in zip(truck, trailer, strict=True)][:61] == pytest.approx([4.0] * 61)
+    assert truck[60] == pytest.approx(220.0)
+    assert truck[-1] == pytest.approx(230.0)
+    assert trailer[-1] == trailer[62] < 217.0
+    assert played.of("Trailer", "speed")[-1] == 0.0
+
+
+def test_a_trailer_that_is_not_coupled_stays(run: Any) -> None:
+    played = play(run, 2, ("Truck", DRIVE))
+    assert played.x("Trailer") == [196.0] * len(played.frames)
+
+
+@pytest.mark.element("ConnectTrailerAction")
+def test_the_bar_always_ends_at_the_hitch(run: Any) -> None:
+    """In a change of lanes too: hitch and coupler are one point, and the trailer cuts the corner."""
+    played = play(run, 5, ("Truck", COUPLE), ("Truck", DRIVE), ("Truck", ASIDE, after(0.5)))
+    bent = 0.0
+    for frame in played.frames[2:]:
+        front, back = (frame.view.row(name) for name in ("Truck", "Trailer"))
+        (x, y), yaw = frame.view.position[front, :2], frame.view.yaw[front]
+        (u, v), turn = frame.view.position[back, :2], frame.view.yaw[back]
+        assert x - math.cos(yaw) == pytest.approx(u + 3.0 * math.cos(turn), abs=1e-6)
+        assert y - math.sin(yaw) == pytest.approx(v + 3.0 * math.sin(turn), abs=1e-6)
+        bent = max(bent, abs(yaw - turn))
+    assert bent > 0.05
+    assert played.frames[-1].view.position[played.frames[-1].view.row("Trailer"), 1] == pytest.approx(-6.0, abs=0.05)
