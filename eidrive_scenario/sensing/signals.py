@@ -30,8 +30,8 @@ BEFORE = 0.4
 class SignalLookout:
     """Reads traffic lights and stop signs that face the station, within range and in the line of sight.
 
-    It looks from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign is a reading without a state, and so is a light
-    that shows nothing.
+    It looks ahead and aside from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign
+    is a reading without a state, and so is a light that shows nothing.
     """
 
     def __init__(self, spec: ActorSpec, roads: RoadNetwork | None) -> None:
@@ -53,7 +53,9 @@ class SignalLookout:
         way = eye - self._faces
         distance = np.linalg.norm(way, axis=1)
         before = np.einsum("ni,ni->n", way, self._facing) >= math.cos(ASIDE) * distance
-        near = np.flatnonzero((distance <= RANGE) & before)
+        heading = float(view.yaw[row])
+        ahead = way[:, 0] * math.cos(heading) + way[:, 1] * math.sin(heading) < 0.0
+        near = np.flatnonzero((distance <= RANGE) & before & ahead)
         if not near.size:
             return ()
         hits = scene.cast(np.broadcast_to(eye, (near.size, 3)).copy(), self._faces[near])

@@ -101,10 +101,7 @@ class Blind(Detector):
         self.installed = installation
 
     def detect(self, readings: Readings) -> Detections:
-        found = OracleDetector().detect(readings)
-        return Detections(
-            found.time, found.boxes, found.scores, found.classes, np.full((1, 2), np.nan), found.covariance
-        )
+        return replace(OracleDetector().detect(readings), velocity=np.full((1, 2), np.nan))
 
     def signals(self) -> tuple[SignalReading, ...]:
         return (SignalReading("own", "green"),)
