@@ -45,7 +45,7 @@ def _rows(*names: str) -> tuple[Row, ...]:
 
 
 OF_1_2 = "1.2 defines it, with no place for it in the schema"
-EXACTLY = "the dynamics' followingMode is not used: the curve is driven exactly, within the Performance"
+EXACTLY = "a gap: followingMode of the dynamics is not used, curves are driven exactly, within the Performance"
 
 SECTIONS: dict[str, tuple[Row, ...]] = {
     "Private actions": (
@@ -53,13 +53,13 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         *_rows("SpeedProfileAction", "LongitudinalDistanceAction"),
         Row("LaneChangeAction", note=EXACTLY),
         *_rows("LaneOffsetAction", "LateralDistanceAction"),
-        Row("VisibilityAction", note="counts for all sensors of others: its SensorReferenceSet is not used"),
+        Row("VisibilityAction", note="a gap: counts for all sensors of others, whatever its SensorReferenceSet says"),
         Row("SynchronizeAction"),
         Row("ActivateControllerAction", note="controllers of other tools mean the default controller"),
         Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),
         Row("OverrideControllerValueAction", note="of a scripted vehicle it is recorded only: that one has no pedals"),
         Row("TeleportAction"),
-        Row("AssignRouteAction", note="a closed route is driven once, as in esmini"),
+        Row("AssignRouteAction", note="a gap: a closed route is driven once, as in esmini"),
         *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
         Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is recorded only: nothing says where it is"),
         Row("AnimationAction", note=f"{OF_1_2}; pedestrians' motions are drawn, all others are recorded only"),
@@ -161,7 +161,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
     ),
 }
 
-SHORTEST = "roads are followed by the shortest way, as in esmini"
+SHORTEST = "a gap: roads are followed by the shortest way, as in esmini"
 LIGHTS = "no controller here steers lights or animations, so that there is nothing to switch on or off"
 WITHOUT_EFFECT = {
     "ActivateControllerAction.lighting": LIGHTS,
@@ -184,7 +184,7 @@ WITHOUT_EFFECT = {
     "TimeToCollisionCondition.routingAlgorithm": SHORTEST,
     "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
     "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
-    "Waypoint.routeStrategy": "the shortest way is taken between waypoints, whatever strategy is asked for",
+    "Waypoint.routeStrategy": "a gap: the shortest way is taken between waypoints, whatever strategy is asked for",
 }
 """Attributes of the standard that are read and checked, and that nothing else in the engine looks at."""
 
