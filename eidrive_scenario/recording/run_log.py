@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.link_words import OFF_THE_AIR, link_in_words
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.storyboard.elements import EMPTY
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
@@ -38,11 +39,17 @@ class RunLog:
         self._told: set[tuple[str, str]] = set()
 
     def observe(self, frame: Frame) -> None:
-        """A line for each change of this frame; who starts at once need not be said to stand by."""
+        """A line for each change of this frame; who starts at once need not be said to stand by.
+
+        And one for each message that a radio carried: when it was said, its fate, and what the radio did.
+        """
         started = {change.path for change in frame.changes if change.transition is Transition.START}
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {in_words(change)}\n")
+        for link in frame.links:
+            if link.path_loss_db is not None or link.reason in OFF_THE_AIR:
+                self._stream.write(f"{link.sent:9.3f} s  {link_in_words(link)}\n")
 
     def close(self) -> None:
         """Finish the file."""

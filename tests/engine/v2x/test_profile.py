@@ -11,6 +11,7 @@ from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.delay import ConstantDelay
 from eidrive_scenario.v2x.loss import BernoulliLoss, NoLoss
 from eidrive_scenario.v2x.profile import build_channel, load_profile, profile_names
+from eidrive_scenario.v2x.radio.channel import RadioChannel
 
 LIBRARY = Path(__file__).parents[3] / "xosc" / "channels"
 
@@ -24,6 +25,7 @@ def composed(source: object, folders: tuple[Path, ...] = (LIBRARY,)) -> Composed
 def test_every_profile_of_the_library_makes_a_channel() -> None:
     names = profile_names(LIBRARY)
     assert {"none", "ideal", "latency_300ms", "error_30pct", "paper_latency_300ms", "paper_error_30pct"} <= set(names)
+    assert {"80211p_urban", "cv2x_highway", "5g_uu", "bursty", "congested"} <= set(names)
     for name in names:
         profile = load_profile(name, [LIBRARY])
         channel = build_channel(profile, 0)
@@ -34,7 +36,7 @@ def test_every_profile_of_the_library_makes_a_channel() -> None:
             assert profile is not None
             assert profile.name == name
             assert profile.description
-            assert isinstance(channel, ComposedChannel)
+            assert isinstance(channel, RadioChannel if profile.model == "radio" else ComposedChannel)
             assert channel.own_perception == name.startswith("paper_")
 
 
