@@ -59,7 +59,7 @@ def parse_settings(
 
 
 def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
-    """The keys allowed at `path` inside `model`; all of them when the path leads through a union."""
+    """The keys allowed at `path` inside `model`; none where the path leads to one of several models."""
     current: Any = model
     for part in path:
         if isinstance(current, type) and issubclass(current, BaseModel):
@@ -67,6 +67,9 @@ def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str
             current = field.annotation if field is not None else current
         else:
             current = next((member for member in _members(current) if _tagged(member, part)), current)
+    models = [member for member in _members(current) if isinstance(member, type) and issubclass(member, BaseModel)]
+    if len(models) == 1:
+        current = models[0]
     if isinstance(current, type) and issubclass(current, BaseModel):
         return [name for name, field in current.model_fields.items()] + [
             field.alias for field in current.model_fields.values() if field.alias

@@ -1,0 +1,161 @@
+"""Properties of a controller about perception: what is wrong is told with file and line, before the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed
+
+Write = Callable[..., Path]
+MODULE = '<Property name="module" value="eidrive"/>'
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Scenario 1 with more properties for the ego (or the roadside unit), each in a line of its own."""
+
+    def write(rsu: bool = False, **properties: str) -> Path:
+        original = resolve_scenario("coop/scenario_1")
+        folder = original.parent.parent
+        head, ego, mast = original.read_text().replace('"../', f'"{folder}/').split(MODULE)
+        more = "".join(f'\n<Property name="{name}" value="{value}"/>' for name, value in properties.items())
+        text = MODULE.join([head, ego, more + mast] if rsu else [head, more + ego, mast])
+        path = tmp_path / "scenario.xosc"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def told(path: Path, **options: str) -> list[str]:
+    with pytest.raises(InputError) as error:
+        Simulation(load_for_seed(path, 1, {}), settings=RunSettings(**options))  # type: ignore[arg-type]
+    return [str(problem) for problem in error.value.problems]
+
+
+def line_of(path: Path, word: str) -> int:
+    return next(number for number, line in enumerate(path.read_text().splitlines(), 1) if f'"{word}"' in line)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("tracker", "ukf", "'none', 'cv' or 'ctrv'"),
+        ("tracker", "{kind: cv, confirm: [3, 2]}", "3 of 2 detections can never be"),
+        ("tracker", "{kind: cv, coasting: 1}", "did you mean 'coast'?"),
+        ("localization", "slam", "'oracle' or 'ekf'"),
+        ("detector_latency", "-0.1", "greater than or equal to 0"),
+        ("obey_signals", "sometimes", "valid boolean"),
+        ("detector_settings", "{least_points: 4}", "has no settings of its own"),
+        ("trackr", "cv", "did you mean 'tracker'?"),
+    ],
+)
+def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: str, words: str) -> None:
+    path = write(**{name: value})
+    (problem,) = told(path)
+    assert problem.startswith(f"{path}:{line_of(path, name)}: ")
+    assert words in problem
+
+
+def test_a_latency_as_long_as_reports_live_makes_no_sense(write: Write) -> None:
+    (problem,) = told(write(detector_latency="1.5"))
+    assert "report_timeout is 1 s" in problem
+
+
+def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> None:
+    path = write(rsu=True, detector_settings="{least_points: 0, of_road: 3}")
+    text = path.read_text().replace(
+        '<Property name="detector" value="oracle"/>', '<Property name="detector" value="lidar"/>'
+    )
+    path.write_text(text)
+    problems = told(path)
+    line = line_of(path, "detector_settings")
+    assert all(problem.startswith(f"{path}:{line}: ") for problem in problems if "detector_settings" not in problem)
+    assert any("'least_points' is 0" in problem for problem in problems)
+    assert any("did you mean 'off_road'?" in problem for problem in problems)
+
+
+def test_settings_of_the_detector_in_the_file_do_not_bother_one_by_option(write: Write) -> None:
+    """The file tunes `lidar`; the option asks for the oracle, which has nothing to tune."""
+    path = write(detector_settings="{least_points: 4}")
+    path.write_text(path.read_text().replace('name="detector" value="oracle"', 'name="detector" value="lidar"'))
+    Simulation(load_for_seed(path, 1, {}), settings=RunSettings(detector="oracle")).close()
+
+
+def test_a_sensor_that_the_detector_lacks_is_told_with_the_line_of_the_sensors(write: Write) -> None:
+    path = write(sensors="[truth]")
+    (problem,) = told(path, detector="lidar")
+    assert problem.startswith(f"{path}:{line_of(path, 'sensors')}: ")
+    assert "needs a sensor of kind lidar" in problem
+
+
+def test_an_unknown_detector_by_option_names_the_option(write: Write) -> None:
+    (problem,) = told(write(), detector="ldiar")
+    assert problem.startswith("--detector: ")
+    assert "did you mean 'lidar'?" in problem
+
+
+class Collector:
+    """Keeps the frames of a run."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+
+    def observe(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+    def close(self) -> None:
+        pass
+
+
+def run(path: Path, **options: object) -> tuple[RunResult, list[Frame]]:
+    collector = Collector()
+    settings = RunSettings(**options)  # type: ignore[arg-type]
+    simulation = Simulation(load_for_seed(path, 1, {}), seed=1, settings=settings, observers=[collector])
+    return simulation.run(), collector.frames
+
+
+def test_the_defaults_spelled_out_change_nothing(write: Write) -> None:
+    plain, _ = run(write(), time_limit=4.0)
+    spelled, _ = run(
+        write(tracker="none", localization="oracle", detector_latency="0", obey_signals="false"), time_limit=4.0
+    )
+    assert plain.trace_hash == spelled.trace_hash
+
+
+def test_runs_with_a_filter_tracker_and_latency_are_repeatable(write: Write) -> None:
+    path = write(localization="ekf", tracker="ctrv", detector_latency="0.1")
+    (one, frames), (other, _) = run(path, time_limit=3.0), run(path, time_limit=3.0)
+    assert one.trace_hash == other.trace_hash
+    step = frames[-1].steps["Ego"]
+    assert step.estimate is not None
+    row = frames[-1].view.row("Ego")
+    off = step.estimate.position[:2] - frames[-1].view.position[row, :2]
+    assert 1e-6 < float((off**2).sum()) ** 0.5 < 1.0
+    assert step.detections.tracks
+    assert step.detections.time == pytest.approx(frames[-1].view.time - 0.1)
+    assert frames[-1].steps["RSU"].estimate is None
+
+
+@pytest.mark.parametrize(("scenario", "helper"), [("coop/scenario_1", "RSU"), ("coop/scenario_2", "Spectator")])
+def test_the_lidar_detector_sees_the_incoming_car_in_time(scenario: str, helper: str) -> None:
+    """LiDAR alone: no collision, and the helper has the hidden car no later than the ego can see it at the crossing."""
+    result, frames = run(resolve_scenario(scenario), detector="lidar", time_limit=6.5)
+    assert {verdict.name: verdict.passed for verdict in result.criteria} == {"collision": True, "min_distance": True}
+    first: dict[str, float] = {}
+    for frame in frames:
+        place = frame.view.centres[frame.view.row("Incoming"), :2]
+        truck = frame.view.centres[frame.view.row("Firetruck"), :2]
+        if ((place - truck) ** 2).sum() > 12.0**2:
+            continue
+        for name, step in frame.steps.items():
+            boxes = step.detections.boxes[:, :2]
+            if len(boxes) and ((boxes - place) ** 2).sum(axis=1).min() < 1.0:
+                first.setdefault(name, frame.view.time)
+    assert first[helper] <= first["Ego"]
