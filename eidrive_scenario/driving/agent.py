@@ -135,7 +135,9 @@ class Agent:
             if self.points is not None and message.points is not None and sender != self.name:
                 self.points.hear(sender, message.points, self._own_body(message.points.time))
                 continue
-            detections = message.detections if sender == self.name else self._without_own_body(message.detections)
+            detections = _numbered(message)
+            if sender != self.name:
+                detections = self._without_own_body(detections)
             station = sender if message.kind == "cpm" else sender + ITSELF
             report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
             self._take(report, None if report.complete else self._all_said(message))
@@ -198,6 +200,13 @@ class Agent:
     def _state(self, ego: EgoState) -> StationState:
         x, y, z = ego.position.tolist()
         return StationState(ego.time, x, y, z, ego.yaw, ego.speed, self.perception.pose_covariance)
+
+
+def _numbered(message: Message) -> Detections:
+    """What a message says, with the sender's numbers of its objects as those of tracks, unless it has such."""
+    if message.objects is None or message.detections.tracks:
+        return message.detections
+    return replace(message.detections, tracks=message.objects)
 
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:

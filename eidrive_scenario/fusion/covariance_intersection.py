@@ -29,14 +29,14 @@ class CovarianceIntersectionSettings(Settings):
 
     gate           probability that two estimates of one object are within the gate
     gate_distance  centres of one object are nearer than this where a report does not say how exact it is [m]
-    max_age        an object that its station has not seen for so long is forgotten, and a message that is late by more
-                   comes too late [s]
+    max_age        an object of which its station has said nothing for so long is forgotten, and a message later than
+                   this comes too late [s]. Objects at rest are told once a second (ETSI TS 103 324, T_GenCpmMax)
     existence      an object is reported from this probability on that there is one
     """
 
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
     gate_distance: PositiveFloat = 4.0
-    max_age: PositiveFloat = 1.0
+    max_age: PositiveFloat = 1.5
     existence: float = Field(default=0.5, ge=0.0, le=1.0)
 
 

@@ -36,8 +36,8 @@ def readings(time: float, at: tuple[float, float], cars: tuple[Moving, ...]) -> 
 class Conversation:
     """Stations on a channel, in the order of a run: deliver, act, send."""
 
-    def __init__(self, places: dict[str, tuple[float, float]], channel: str | None) -> None:
-        settings = AgentSettings(fusion="covariance_intersection")
+    def __init__(self, places: dict[str, tuple[float, float]], channel: str | None, **more: object) -> None:
+        settings = AgentSettings.model_validate({"fusion": "covariance_intersection", **more})
         self.places = places
         self.agents: dict[str, Agent] = {
             name: build_agent(settings, spec(name), None, seed=0, dt=DT) for name in places
@@ -148,4 +148,16 @@ def test_messages_that_overtake_each_other_and_get_lost_leave_one_car() -> None:
                 sorted(fused.boxes[:, 0].tolist()),
                 sorted(x + speed * tick * DT for x, _, speed in (CROSSING, HIDDEN)),
                 atol=1e-3,
+            )
+
+
+def test_messages_by_the_rules_of_etsi_lose_no_car_between_them() -> None:
+    """Cars at rest are told once a second, moving ones after 4 m; a list that leaves one out denies nothing."""
+    rest, slow = (30.0, 10.0, 0.0), (-20.0, 20.0, 6.0)
+    talk = Conversation(PLACES, "{delay: {kind: constant, seconds: 0.3}}", generation="etsi")
+    for tick in range(100):
+        fused = talk.step({"B": (rest, slow)})["A"]
+        if tick > 12:
+            np.testing.assert_allclose(
+                sorted(fused.boxes[:, 0].tolist()), [slow[0] + slow[2] * tick * DT, rest[0]], atol=1e-3
             )

@@ -192,8 +192,8 @@ def test_a_list_that_is_not_complete_denies_nothing(report: Make, fuse: Fuse) ->
     both = report("A", 0.0, [(10.0, 0.0), (20.0, 0.0)], tracks=(1, 2))
     rest = [report("A", 0.05 * tick, [(20.0, 0.0)], tracks=(2,), complete=False) for tick in range(1, 8)]
     assert len(fuse([both, *rest], 0.35)) == 2
-    later = [report("A", 0.05 * tick, [(20.0, 0.0)], tracks=(2,), complete=False) for tick in range(8, 23)]
-    assert len(fuse([both, *rest, *later], 1.1)) == 1, "but after a second nobody has seen it"
+    later = [report("A", 0.05 * tick, [(20.0, 0.0)], tracks=(2,), complete=False) for tick in range(8, 33)]
+    assert len(fuse([both, *rest, *later], 1.6)) == 1, "but after a second and a half nobody has seen it"
 
 
 def test_the_stations_own_number_tells_that_it_is_the_same_object(report: Make, fuse: Fuse) -> None:
@@ -203,8 +203,8 @@ def test_the_stations_own_number_tells_that_it_is_the_same_object(report: Make, 
 
 def test_old_reports_are_forgotten_and_silent_stations_with_them(report: Make, fuse: Fuse) -> None:
     seen = report("A", 0.0, [(10.0, 0.0)], velocity=(1.0, 0.0))
-    assert len(fuse([seen], 1.0)) == 1
-    assert len(fuse([seen], 1.01)) == 0
+    assert len(fuse([seen], 1.5)) == 1
+    assert len(fuse([seen], 1.51)) == 0
     brief = CovarianceIntersectionFusion(CovarianceIntersectionSettings(max_age=0.2))
     assert len(fuse([seen], 0.25, brief)) == 0
     assert len(CovarianceIntersectionFusion().fuse([], 1.0)) == 0
