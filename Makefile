@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint docs bench clean
+.PHONY: help install demo test lint docs bench eval clean
 
 help:           ## this list
 	@grep -E '^[a-z]+: .*##|^[a-z]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -37,6 +37,9 @@ bench: install  ## simulated seconds per wall second, and where the time goes
 	$(BIN)/python benchmarks/bench_fusion.py
 	@test -z "$$EIDRIVE_MAPS" && echo 'EIDRIVE_MAPS is not set: no bench_traffic' || $(BIN)/python benchmarks/bench_traffic.py
 	@test -z "$$EIDRIVE_CORPORA" && echo 'EIDRIVE_CORPORA is not set: no bench_corpora' || $(BIN)/python benchmarks/bench_corpora.py
+
+eval: install   ## what the learned detectors see: held-out pictures, library scenes, reports/detection.md
+	$(BIN)/python -m training.evaluate
 
 clean:          ## remove the virtual environment and everything generated
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -117,7 +117,7 @@ def centre_errors(kind: type[LearnedDetector], scenes: Iterable[Seen], use_lidar
             for label, enough in zip(seen.labels, objects.to_find, strict=True)
             if enough and IMAGE_CLASSES[label.number] in VEHICLES
         ]
-        centres = np.array([label.place[:2] for label in vehicles]).reshape(-1, 2)
+        centres = np.array([label.place[:2] for label in vehicles], dtype=float).reshape(-1, 2)
         free = np.ones(len(vehicles), dtype=bool)
         for row in np.argsort(-detections.scores, kind="stable"):
             away = np.linalg.norm(centres - detections.boxes[row, :2], axis=1)
@@ -252,7 +252,8 @@ def evaluate(options: argparse.Namespace) -> None:
         )
     )
     print(f"{len(dataset)} held-out pictures, {len(scenes)} of the library's scenes", flush=True)
-    tables += tables_of({name: judge_dataset(networks[name], dataset) for name in names}, "Held-out pictures")
+    judged = {name: judge_dataset(networks[name], dataset) for name in names}
+    tables += tables_of(judged, "Held-out pictures")
     tables += tables_of({name: judge_scenes(networks[name], scenes) for name in names}, "Library scenes")
     for of, some in (
         ("Library scenes, clear", [s for s in scenes if s.weather == "clear"]),
@@ -261,7 +262,7 @@ def evaluate(options: argparse.Namespace) -> None:
         for sensor, use_lidar in (("camera and LiDAR", True), ("camera alone", False)):
             errors = {name: centre_errors(DETECTORS[name], some, use_lidar) for name in names}
             tables.append(error_table(errors, f"{of}, {sensor}"))
-    curves = sweeps({name: time_of[name] for name in names}, options.seed, options.sweep_worlds)
+    curves = sweeps(time_of, options.seed, options.sweep_worlds)
     text = as_markdown(tables)
     print(text)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -272,7 +273,25 @@ def evaluate(options: argparse.Namespace) -> None:
     }
     (options.out / "detection.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     plot_sweeps(curves, options.out / "detection.png")
+    if options.cards:
+        for name in names:
+            add_to_card(name, judged[name], len(dataset))
     print(f"written: {options.out / 'detection.md'}, .json, .png")
+
+
+def add_to_card(name: str, judged: Sequence[Judged], pictures: int) -> None:
+    """What shipped weights reach on the held-out pictures, into the card beside them."""
+    path = SHIPPED / f"{name}.json"
+    card = json.loads(path.read_text(encoding="utf-8"))
+    card["held_out"] = {"script": "training/evaluate.py", "pictures": pictures}
+    for weather in WEATHERS:
+        part = Part(VEHICLES, farthest=40.0, height=15.0, weather=weather)
+        card["held_out"][f"vehicles_within_40_m_ap50_{weather}"] = round(score(judged, part).precision, 4)
+    for each in IMAGE_CLASSES:
+        card["held_out"][f"{each.replace(' ', '_')}_ap50_clear"] = round(
+            score(judged, Part((each,), weather="clear")).precision, 4
+        )
+    path.write_text(json.dumps(card, indent=1) + "\n", encoding="utf-8")
 
 
 def _parameters(path: Path) -> int:
@@ -290,6 +309,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=30, help="random scenes with LiDAR")
     parser.add_argument("--sweep-worlds", type=int, default=20, help="scenes in each weather of the curves")
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--cards", action="store_true", help="write the results into the cards of the shipped weights")
     evaluate(parser.parse_args())
 
 

@@ -102,18 +102,19 @@ class Average:
 
     def __init__(self, network: nn.Module) -> None:
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
+        self._own = _numbers(self.network)
         self._steps = 0
 
     @torch.no_grad()
     def update(self, network: nn.Module) -> None:
         self._steps += 1
         keep = AVERAGE * (1.0 - math.exp(-self._steps / 300.0))
-        new = network.state_dict()
-        for name, value in self.network.state_dict().items():
-            if value.dtype.is_floating_point:
-                value.mul_(keep).add_(new[name].detach(), alpha=1.0 - keep)
-            else:
-                value.copy_(new[name])
+        torch._foreach_lerp_(self._own, _numbers(network), 1.0 - keep)
+
+
+def _numbers(network: nn.Module) -> list[torch.Tensor]:
+    """Weights and running statistics; what counts batches is left out."""
+    return [value for value in network.state_dict().values() if value.dtype.is_floating_point]
 
 
 @torch.no_grad()
