@@ -8,6 +8,7 @@ from eidrive_scenario.storyboard.lint.survey import RoadSurvey
 
 ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
     Rule("no-such-place", Level.ERROR, "a position that the road network does not have", places.missing_places),
+    Rule("beyond-the-road", Level.WARNING, "an s beyond the end of its road", places.beyond_ends),
     Rule("no-route", Level.ERROR, "a route between whose waypoints no lanes lead", paths.impossible_routes),
     Rule("no-such-lane", Level.WARNING, "a change to a lane that no road has", places.missing_lanes),
     Rule("no-such-signal", Level.WARNING, "a traffic signal that no road has", places.missing_signals),

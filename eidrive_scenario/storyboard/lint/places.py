@@ -8,24 +8,39 @@ from eidrive_scenario.errors import Problem, suggestion
 from eidrive_scenario.openscenario.lint import at
 from eidrive_scenario.openscenario.model import (
     LaneChangeAction,
+    LanePosition,
+    RoadPosition,
     TrafficSignalCondition,
     TrafficSignalState,
     TrafficSignalStateAction,
 )
 from eidrive_scenario.storyboard.lint.survey import RoadSurvey
 
+BEYOND = 0.01
+"""Roads are as long as their files round them [m]."""
 _ADDRESS = "="
 """ScenarioRunner addresses signals as `pos=x,y` or `id=7`."""
 
 
 def missing_places(survey: RoadSurvey) -> Iterator[Problem]:
-    """A position on a road or lane that is not there, or beyond the end of its road."""
+    """A position on a road or lane that is not there."""
     seen: set[Problem] = set()
     for error in survey.lost.values():
         for problem in error.problems:
             if problem not in seen:
                 seen.add(problem)
                 yield problem
+
+
+def beyond_ends(survey: RoadSurvey) -> Iterator[Problem]:
+    """An s before the start or beyond the end of its road: the engine takes the end, as others do."""
+    for element in survey.elements:
+        if survey.roads is None or not isinstance(element, LanePosition | RoadPosition):
+            continue
+        road = survey.roads.roads.get(element.road_id)
+        if road is not None and not -BEYOND <= element.s <= road.length + BEYOND:
+            what = f"s = {element.s:g} lies beyond road {road.id!r}, which is {road.length:.2f} m long"
+            yield at(element, what, "its end is meant; give an s on the road")
 
 
 def missing_lanes(survey: RoadSurvey) -> Iterator[Problem]:

@@ -30,7 +30,7 @@ EXAMINED = {
     "esmini/xosc/cut-in_cr.xosc": {
         "impossible-state": "it waits for the end of a continuous LaneOffsetAction, which by the standard has none"
     },
-    "esmini/xosc/ltap-od-relative-speed.xosc": {"no-such-place": "s = 455 on a road of 304 m"},
+    "esmini/xosc/ltap-od-relative-speed.xosc": {"beyond-the-road": "s = 455 on a road of 304 m"},
     "scenario_runner/CatalogExample.xosc": {"coinciding-edges": EDGES_APART, "swallowed-edge": AFTER_TIME_0},
     "scenario_runner/CyclistCrossing.xosc": {"coinciding-edges": EDGES_APART},
     "scenario_runner/FollowLeadingVehicle.xosc": {"swallowed-edge": AT_TIME_0},
