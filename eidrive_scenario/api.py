@@ -3,6 +3,9 @@
 from eidrive_scenario import traffic
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.overrides import Override
+from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import (
     EidriveError,
@@ -16,12 +19,14 @@ from eidrive_scenario.errors import (
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import box_distance, footprint_distance, overlap, wrap_angle
 from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.lifting import lift
+from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
-from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
@@ -41,7 +46,9 @@ from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 from eidrive_scenario.storyboard.transition import Transition as ValueTransition
 from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.link_channel import LinkChannel
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.environment import Environment
@@ -53,10 +60,13 @@ __all__ = [
     "ActionBehaviour",
     "Actor",
     "ActorSpec",
+    "AgentSettings",
     "AgentStep",
     "AnimationState",
     "Appearance",
+    "CameraReading",
     "Channel",
+    "ChannelProfile",
     "Commands",
     "Condition",
     "Contact",
@@ -67,6 +77,7 @@ __all__ = [
     "Detections",
     "Detector",
     "Domain",
+    "EgoState",
     "EidriveError",
     "EntityCondition",
     "Environment",
@@ -74,9 +85,12 @@ __all__ = [
     "FusionMethod",
     "Goal",
     "InputError",
+    "Installation",
     "LaneLocation",
     "Layout",
+    "LidarReading",
     "LightState",
+    "LinkChannel",
     "LinkEvent",
     "Measure",
     "Message",
@@ -85,6 +99,7 @@ __all__ = [
     "Place",
     "Placement",
     "Plan",
+    "Planner",
     "Pose",
     "Problem",
     "Progress",
@@ -93,16 +108,19 @@ __all__ = [
     "Report",
     "RoadNetwork",
     "Route",
+    "RoutePlanner",
     "Scenario",
     "ScenarioError",
     "SettingError",
     "Settings",
+    "SignalReading",
     "SimulationError",
     "Stage",
     "StandIn",
     "State",
     "StateChange",
     "Steering",
+    "Surroundings",
     "Transition",
     "ValueTransition",
     "Verdict",
@@ -125,6 +143,7 @@ __all__ = [
     "judge",
     "kind_of",
     "lay_out",
+    "lift",
     "load_yaml",
     "model",
     "never_appeared",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
@@ -73,7 +73,7 @@ class Tracker:
             raise ValueError("a tracker of kind 'none' is no tracker")
         self.settings = settings
         self._model = MODELS[settings.kind]()
-        self._gate = float(chi2.ppf(settings.gate, 2))
+        self._gate = float(chdtri(2, 1.0 - settings.gate))
         self._time: float | None = None
         self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
         self._shape = np.empty((0, 5))

@@ -149,7 +149,7 @@ class Builder:
     def _behaviours(self, wrapper: model.Element, actor: str | None) -> list[ActionBehaviour]:
         behaviours = []
         for leaf, parent in _leaves(wrapper, wrapper):
-            name = type(leaf).__name__
+            name = _registered(leaf, self._actions)
             if name not in self._actions:
                 self._problems.append(
                     Problem(
@@ -184,7 +184,7 @@ class Builder:
         by_entity = entry.by_entity_condition
         chosen = entry.chosen() if by_entity is None else by_entity.entity_condition
         leaf = chosen.chosen()
-        name = type(leaf).__name__
+        name = _registered(leaf, self._conditions)
         if name not in self._conditions:
             self._problems.append(
                 Problem(
@@ -243,3 +243,10 @@ def _without_criteria(trigger: model.Trigger | None) -> model.Trigger | None:
         if kept:
             groups.append(model.ConditionGroup(condition=kept, line=group.line, source=group.source))
     return model.Trigger(condition_group=tuple(groups), line=trigger.line, source=trigger.source)
+
+
+def _registered(leaf: model.Element, registry: Registry) -> str:
+    """Under which name an action or condition is registered: its type, or what a user-defined one calls itself."""
+    own = {model.CustomCommandAction: "type", model.UserDefinedValueCondition: "name"}.get(type(leaf))
+    name = getattr(leaf, own) if own is not None else None
+    return name if name is not None and name in registry else type(leaf).__name__

@@ -1,0 +1,111 @@
+"""docs/extending.md word by word: its files are written, its package installed, its commands typed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+GUIDE = Path(__file__).parents[2] / "docs" / "extending.md"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCKS = BLOCK.findall(GUIDE.read_text(encoding="utf-8"))
+NAMED = re.compile(r"\A(?:# (\S+\.py)|<!-- (\S+) -->)\n")
+LONGEST = 30
+"""Lines of a worked example."""
+
+
+def commands() -> list[tuple[str, tuple[str, ...]]]:
+    """What is typed, and what must be read then."""
+    found: list[tuple[str, list[str]]] = []
+    for kind, text in BLOCKS:
+        if kind == "console":
+            for line in text.splitlines():
+                if line.startswith("$ "):
+                    found.append((line[2:], []))
+                else:
+                    found[-1][1].append(line)
+    return [(command, tuple(lines)) for command, lines in found]
+
+
+def files() -> dict[str, str]:
+    """By name, what the page shows of them; the pieces of pyproject.toml put together."""
+    found = {"pyproject.toml": "\n".join(text for kind, text in BLOCKS if kind == "toml")}
+    for kind, text in BLOCKS:
+        name = NAMED.match(text)
+        if name is not None:
+            found[name[1] or name[2]] = text if kind == "python" else text[name.end() :]
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files, and beside them the metadata that `pip install -e .` would make of pyproject.toml."""
+    folder = tmp_path_factory.mktemp("acme")
+    for name, text in files().items():
+        (folder / name).write_text(text, encoding="utf-8")
+    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    metadata = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
+    points = [
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
+        for group, entries in project["entry-points"].items()
+    ]
+    (metadata / "entry_points.txt").write_text("\n".join(points))
+    return folder
+
+
+def test_every_kind_of_extension_has_its_section_and_example() -> None:
+    project = tomllib.loads(files()["pyproject.toml"])
+    kinds = {group.removeprefix("eidrive_scenario.") for group in project["project"]["entry-points"]}
+    assert kinds == {"detectors", "channels", "fusion", "planners", "actions", "conditions", "criteria"}
+    modules = {
+        value.partition(":")[0] for entries in project["project"]["entry-points"].values() for value in entries.values()
+    }
+    assert modules == set(project["tool"]["setuptools"]["py-modules"])
+    assert {f"{module}.py" for module in modules} == {name for name in files() if name.endswith(".py")}
+
+
+@pytest.mark.parametrize("name", sorted(name for name in files() if name.endswith(".py")))
+def test_examples_are_short_and_use_the_api_alone(name: str) -> None:
+    lines = files()[name].splitlines()
+    code = [line for line in lines[1:] if line.strip()]
+    assert len(code) <= LONGEST
+    ours = [line for line in lines if "eidrive" in line and "import" in line]
+    assert all(line.startswith("from eidrive_scenario.api import ") for line in ours)
+
+
+@pytest.mark.parametrize(("command", "expected"), commands(), ids=[command for command, _ in commands()])
+def test_what_is_typed_works(folder: Path, command: str, expected: tuple[str, ...]) -> None:
+    """A run that is shown to fail exits with 1, one that is cut short with 3."""
+    program, *arguments = shlex.split(command)
+    if program == "pip":
+        assert arguments == ["install", "-e", "."]  # what it makes is there already: tests do without a network
+        return
+    assert program == "eidrive"
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]),
+        "COLUMNS": "160",
+    }
+    done = subprocess.run(
+        [sys.executable, "-m", "eidrive_scenario", *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    shown = " ".join(expected)
+    assert done.returncode == (1 if "failed" in shown else 3 if "time limit" in shown else 0), done.stdout + done.stderr
+    printed = " ".join(done.stdout.split())
+    for line in expected:
+        assert " ".join(line.split()) in printed
