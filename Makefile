@@ -4,10 +4,10 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint docs bench eval clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval clean
 
 help:           ## this list
-	@grep -E '^[a-z]+: .*##|^[a-z]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
 
 install: $(STAMP)  ## create .venv and install the project with its development tools
 
@@ -32,9 +32,13 @@ lint: install   ## style, types, import arrows
 docs: install   ## make the coverage table of docs/openscenario.md anew
 	$(BIN)/python tests/coverage_table.py
 
+reproduce-trends: install  ## known trends, measured and expected: reports/trends/*.png
+	$(BIN)/python -m eidrive_scenario.reporting.trends --out reports/trends
+
 bench: install  ## simulated seconds per wall second, and where the time goes
 	$(BIN)/python benchmarks/bench_scenario_1.py
 	$(BIN)/python benchmarks/bench_fusion.py
+	$(BIN)/python benchmarks/bench_radio.py
 	@test -z "$$EIDRIVE_MAPS" && echo 'EIDRIVE_MAPS is not set: no bench_traffic' || $(BIN)/python benchmarks/bench_traffic.py
 	@test -z "$$EIDRIVE_CORPORA" && echo 'EIDRIVE_CORPORA is not set: no bench_corpora' || $(BIN)/python benchmarks/bench_corpora.py
 
