@@ -59,7 +59,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),
         Row("OverrideControllerValueAction", note="of a scripted vehicle it is recorded only: that one has no pedals"),
         Row("TeleportAction"),
-        Row("AssignRouteAction", note="a gap: a closed route is driven once, as in esmini"),
+        Row("AssignRouteAction"),
         *_rows("FollowTrajectoryAction", "AcquirePositionAction", "RandomRouteAction"),
         Row("LightStateAction", note=f"{OF_1_2}; a UserDefinedLight is recorded only: nothing says where it is"),
         Row("AnimationAction", note=f"{OF_1_2}; pedestrians' motions are drawn, all others are recorded only"),
@@ -184,7 +184,6 @@ WITHOUT_EFFECT = {
     "TimeToCollisionCondition.routingAlgorithm": SHORTEST,
     "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
     "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
-    "Waypoint.routeStrategy": "a gap: the shortest way is taken between waypoints, whatever strategy is asked for",
 }
 """Attributes of the standard that are read and checked, and that nothing else in the engine looks at."""
 

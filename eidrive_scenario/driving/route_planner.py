@@ -34,6 +34,8 @@ BEHIND = 5
 class RoutePlanner(Planner):
     """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
 
+    A lap that follows the path is driven round and round.
+
     Without either it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
     joined by a smooth curve. Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that
     it has seen. Raises RouteError if no road leads to a waypoint.
@@ -44,7 +46,7 @@ class RoutePlanner(Planner):
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         self._path: Path | None = None
-        self._way: tuple[Array | None, Array | None] = (None, None)
+        self._way: tuple[Array | None, Array | None, Array | None] = (None, None, None)
         self._progress = 0
         self._lane: list[LaneLocation] = []
         self._first_speed: float | None = None
@@ -64,7 +66,9 @@ class RoutePlanner(Planner):
             path = self._path = self._lane_ahead(x, y, ego.yaw)
             self._progress = path.project(x, y)
         if not path.ends and len(path) - self._progress < 2 * HORIZON:
-            path = self._path = self._lane_ahead(x, y, ego.yaw)
+            behind = path.points[max(self._progress - BEHIND, 0) :]
+            lap = self._way[2]
+            path = self._path = self._lane_ahead(x, y, ego.yaw) if lap is None else _with_laps(behind, lap)
             self._progress = path.project(x, y)
         part = slice(self._progress, self._progress + HORIZON)
         target = self._target_speed(ego, goal)
@@ -98,15 +102,17 @@ class RoutePlanner(Planner):
         return self._first_speed
 
     def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> Path:
-        way = (None, None) if goal is None else (goal.path, goal.waypoints)
+        way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
         if self._path is None or not all(map(_same, way, self._way)):
             self._way, self._progress, self._lane = way, 0, []
             self._path = self._laid_out(x, y, yaw, *way)
         return self._path
 
-    def _laid_out(self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None) -> Path:
+    def _laid_out(
+        self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
+    ) -> Path:
         if path is not None and len(path) > 1:
-            return Path(path[:, :2], ends=True)
+            return Path(path[:, :2], ends=True) if lap is None else _with_laps(path, lap)
         if waypoints is not None and len(waypoints):
             line = self._by_road(x, y, waypoints)
             return Path(_curve(x, y, yaw, waypoints) if line is None else line, ends=True)
@@ -149,6 +155,13 @@ class RoutePlanner(Planner):
         heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
         direction = self.roads.driving_direction(place.road, place.lane)
         return [place] if direction * math.cos(yaw - heading) > 0.0 else []
+
+
+def _with_laps(line: Array, lap: Array) -> Path:
+    """The line and as many laps after it as are looked at ahead."""
+    length = float(np.hypot(*np.diff(lap[:, :2], axis=0).T).sum())
+    laps = [lap[1:, :2]] * math.ceil(LOOK_AHEAD * SPACING / length)
+    return Path(np.concatenate([line[:, :2], *laps]), ends=False)
 
 
 def _same(first: Array | None, second: Array | None) -> bool:

@@ -22,6 +22,7 @@ class Goal:
     speed      to have now [m/s]
     acceleration  with which that speed is changing [m/s²]
     path       (M, 3) points of a line to drive along, to its end [m], world frame
+    lap        (M, 3) points that follow the path's end, again and again [m]; its end is its start
     waypoints  (M, 3) points to pass where there is no path, the last is the destination [m]; the agent finds the way
     """
 
@@ -29,6 +30,7 @@ class Goal:
     acceleration: float = 0.0
     path: Array | None = None
     waypoints: Array | None = None
+    lap: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from eidrive_scenario.roads.model import (
 from eidrive_scenario.roads.movement import Branch, Choose
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
+from eidrive_scenario.roads.preferences import Cost, by_chance, fastest, fewest_junctions
 from eidrive_scenario.roads.route import Route
 from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
 
@@ -22,6 +23,7 @@ __all__ = [
     "KINDS",
     "Branch",
     "Choose",
+    "Cost",
     "Junction",
     "Lane",
     "LaneKey",
@@ -41,6 +43,9 @@ __all__ = [
     "SignalController",
     "SignalPlace",
     "SurfaceMesh",
+    "by_chance",
+    "fastest",
+    "fewest_junctions",
     "outlines",
     "placed_objects",
     "surface_meshes",

@@ -16,6 +16,7 @@ from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.movement import driving_direction
 from eidrive_scenario.roads.poses import lane_at
+from eidrive_scenario.roads.preferences import Cost
 from eidrive_scenario.roads.tables import RoadTables
 
 if TYPE_CHECKING:
@@ -99,9 +100,12 @@ def _usable(lane: Lane, section: LaneSection) -> bool:
 
 
 def find_lanes(
-    graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation
+    graph: LaneGraph, roads: Mapping[str, Road], start: LaneLocation, end: LaneLocation, cost: Cost | None = None
 ) -> tuple[LaneKey, ...]:
-    """The lanes of the cheapest way by A*, the straight line to the end as the bound. Raises RouteError."""
+    """The lanes of the cheapest way: by A*, the straight line to the end as the bound; by Dijkstra with a `cost`.
+
+    Raises RouteError.
+    """
     source, target = _key(roads, start), _key(roads, end)
     goal = graph.nodes[target]["end"] if target in graph else (0.0, 0.0)
     last = graph.nodes[target]["length"] if target in graph else 0.0
@@ -115,7 +119,11 @@ def find_lanes(
     if source[:2] == target[:2] and behind and source in graph:
         graph, source = _started(graph, source)
     try:
-        found: Sequence[LaneKey] = nx.astar_path(graph, source, target, heuristic=bound, weight="weight")
+        found: Sequence[LaneKey]
+        if cost is None:
+            found = nx.astar_path(graph, source, target, heuristic=bound, weight="weight")
+        else:
+            found = nx.dijkstra_path(graph, source, target, weight=cost)
     except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
         raise RouteError(
             Problem(

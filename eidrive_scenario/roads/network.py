@@ -40,6 +40,7 @@ from eidrive_scenario.roads.model import (
     SignalPlace,
 )
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
+from eidrive_scenario.roads.preferences import Cost
 from eidrive_scenario.roads.reading import read_road_map
 from eidrive_scenario.roads.reading.document import parse_road_map
 from eidrive_scenario.roads.route import Route, joined
@@ -287,10 +288,24 @@ class RoadNetwork:
         """
         return self.movement.advance(location, distance, route, choose)
 
-    def route(self, start: LaneLocation, end: LaneLocation, via: Sequence[LaneLocation] = ()) -> Route:
-        """The cheapest way over the lanes from start to end, by A*. Raises RouteError if there is none."""
+    def route(
+        self,
+        start: LaneLocation,
+        end: LaneLocation,
+        via: Sequence[LaneLocation] = (),
+        costs: Sequence[Cost | None] | None = None,
+    ) -> Route:
+        """The cheapest way over the lanes from start to end. Raises RouteError if there is none.
+
+        `costs` says for the way to each place of `via` and to the end what counts; None is the length, as everywhere
+        without `costs`.
+        """
         stops = [start, *via, end]
-        parts = [Route(self.roads, find_lanes(self.graph, self.roads, a, b), a, b) for a, b in pairwise(stops)]
+        wanted = costs if costs is not None else [None] * (len(stops) - 1)
+        parts = [
+            Route(self.roads, find_lanes(self.graph, self.roads, a, b, cost), a, b)
+            for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
+        ]
         return parts[0] if len(parts) == 1 else joined(parts)
 
     def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:

@@ -40,12 +40,23 @@ class Leg:
 
 @dataclass(frozen=True)
 class Route:
-    """The way from `start` to `end` over `lanes`; distances along it count from the start [m]."""
+    """The way from `start` to `end` over `lanes`; distances along it count from the start [m].
+
+    A closed route ends where it starts, and is followed again and again; `lap` is the closed route to which this one
+    leads.
+    """
 
     roads: Mapping[str, Road] = field(repr=False)
     lanes: tuple[LaneKey, ...]
     start: LaneLocation
     end: LaneLocation
+    closed: bool = False
+    lap: Route | None = field(default=None, repr=False)
+
+    @property
+    def onward(self) -> Route | None:
+        """What follows where it ends: the lap to which it leads, or a closed route itself."""
+        return self if self.closed else self.lap
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
@@ -156,7 +167,7 @@ class Route:
         for branch in branches:
             if branch.lane.road in self._road_set:
                 return branch
-        return None
+        return None if self.lap is None else self.lap.pick(branches)
 
     @cached_property
     def _lane_set(self) -> frozenset[LaneKey]:

@@ -176,12 +176,23 @@ class Motion:
                 if self.end_of_road:
                     self.speed = 0.0
                 self.end_of_road = True
+            self._begin_lap(here, there)
             here = there
         if steering is not None:
             self.heading = wrap_angle((0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance))
         self.location = here
         pose = self.pose_on(here, self.heading)
         self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
+
+    def _begin_lap(self, before: LaneLocation, after: LaneLocation) -> None:
+        """Where a step passes the start of the route's lap, the lap is the route from then on."""
+        lap = self.route.lap if self.route is not None else None
+        if lap is None or self.roads is None or after.road != lap.start.road:
+            return
+        way = self.roads.driving_direction(after.road, after.lane)
+        reached = (after.s - lap.start.s) * way >= 0.0
+        if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
+            self.route = lap
 
     def _turn(self, steering: Steering, left: float, distance: float) -> float:
         if steering.heading is not None:

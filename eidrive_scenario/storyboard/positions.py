@@ -125,7 +125,7 @@ def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place
     roads = _roads(frame, stage)
     within = frame.in_route_position.chosen()
     route = frame.route_ref.route or stage.catalog_entry(frame.route_ref.catalog_reference, model.Route)
-    path = route_of(route, roads, lambda position: resolve(position, stage, actor))
+    path = route_of(route, roads, lambda position: resolve(position, stage, actor), seed=stage.seed)
     if isinstance(within, model.PositionOfCurrentEntity):
         here = _origin(within, stage)
         return _in_lane(roads, here.road, here.lane, here.s, here.offset, frame.orientation)

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.roads import (
+    Cost,
+    LaneLocation,
+    RoadNetwork,
+    Route,
+    RouteError,
+    by_chance,
+    fastest,
+    fewest_junctions,
+)
 from eidrive_scenario.storyboard.motion import Place
+
+HERE = 0.01
+"""Who is this near to the first waypoint of a closed route is on it [m]."""
 
 
 def route_of(
@@ -17,11 +31,18 @@ def route_of(
     roads: RoadNetwork | None,
     resolve: Callable[[model.Position], Place],
     start: LaneLocation | None = None,
+    *,
+    seed: int = 0,
+    again: bool = False,
 ) -> Route:
-    """The way through the waypoints of a route, from `start` if given. Raises ScenarioError, RouteError."""
+    """The way through the waypoints of a route, from `start` if given. Raises ScenarioError, RouteError.
+
+    Each waypoint's strategy chooses the way to it; of the random one the seed and the route's name decide. With `again`
+    a closed route comes back to its first waypoint; from `start` a way leads there, and the closed route is its lap.
+    """
     if roads is None:
         raise ScenarioError(Problem(f"route {route.name!r} needs a road network", "", route.source, route.line))
-    places = [] if start is None else [start]
+    places = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
@@ -29,7 +50,32 @@ def route_of(
                 Problem("the waypoint is not on a road", "move it onto a lane", waypoint.source, waypoint.line)
             )
         places.append(here)
-    return roads.route(places[0], places[-1], places[1:-1])
+    costs = [_cost(route, number, roads, seed) for number in range(len(places))]
+    if not (again and route.closed):
+        if start is not None:
+            return roads.route(start, places[-1], places[:-1], costs)
+        return roads.route(places[0], places[-1], places[1:-1], costs[1:])
+    try:
+        lap = replace(roads.route(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
+    except RouteError as error:
+        message = f"no way leads round the closed route {route.name!r}: {error.problems[0].message}"
+        remedy = 'change its waypoints, or say closed="false"'
+        raise ScenarioError(Problem(message, remedy, route.source, route.line)) from error
+    if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < HERE):
+        return lap
+    return replace(roads.route(start, places[0], costs=costs[:1]), lap=lap)
+
+
+def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cost | None:
+    """What counts on the way to a waypoint; None is the length."""
+    strategy = route.waypoint[number].route_strategy
+    if strategy is model.RouteStrategy.FASTEST:
+        return fastest(roads)
+    if strategy is model.RouteStrategy.LEAST_INTERSECTIONS:
+        return fewest_junctions(roads)
+    if strategy is model.RouteStrategy.RANDOM:
+        return by_chance(roads, generator(seed, "route", route.name, number))
+    return None
 
 
 def waypoints_of(route: Route, spacing: float = 2.0) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

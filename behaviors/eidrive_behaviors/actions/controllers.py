@@ -7,7 +7,7 @@ import math
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Actor, Goal, Override, Stage, is_ours, model
+from eidrive_scenario.api import ActionBehaviour, Actor, Goal, Override, Pose, Route, Stage, is_ours, model
 
 POINTS_APART = 2.0
 """Of a route that a controller takes over [m]."""
@@ -156,15 +156,33 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         actor.lateral = lateral
     if longitudinal is not None:
         actor.longitudinal = longitudinal
+    if before is not actor.driven and actor.present:
+        _join_lap(actor)
     if before and not actor.driven and actor.present:
         actor.motion.land()
     if actor.driven and not before and actor.present:
-        actor.goal = Goal(speed=actor.motion.speed, path=_rest_of_route(actor))
+        onward = actor.motion.route.onward if actor.motion.route is not None else None
+        lap = None if onward is None else onward.polyline(POINTS_APART)
+        rest = _rest_of_route(actor)
+        actor.goal = Goal(speed=actor.motion.speed, path=lap if rest is None else rest, lap=lap)
 
 
 def _left_to_ours(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:
     """What the switching of another tool's controller means for ours: what that one takes, ours lose."""
     return False if lateral else None, False if longitudinal else None
+
+
+def _join_lap(actor: Actor) -> None:
+    """Who changes hands on the lap of its route has left the way there behind."""
+    route, pose = actor.motion.route, actor.motion.pose
+    if route is not None and route.lap is not None and _gap(route.lap, pose) <= _gap(route, pose):
+        actor.motion.route = route.lap
+
+
+def _gap(route: Route, pose: Pose) -> float:
+    done, _ = route.project(pose.x, pose.y)
+    x, y, _ = route.points_at(np.array([done]))[0].tolist()
+    return math.hypot(x - pose.x, y - pose.y)
 
 
 def _rest_of_route(actor: Actor) -> np.ndarray[tuple[int, int], np.dtype[np.float64]] | None:

@@ -138,7 +138,7 @@ class LaneChangeAction(ActionBehaviour):
                 points.append(self._roads.pose(lane)[:3])
         if points:
             goal = self.actor.goal
-            self.actor.goal = replace(goal or Goal(), path=np.array(points))
+            self.actor.goal = replace(goal or Goal(), path=np.array(points), lap=None)
         return Status.RUNNING
 
     def describe(self) -> str:

@@ -29,7 +29,10 @@ ARRIVED = 2.0
 
 
 class AssignRouteAction(ActionBehaviour):
-    """Gives the actor a route over the lanes. At forks it takes the route's way; who drives itself gets its points."""
+    """Gives the actor a route over the lanes. At forks it takes the route's way; who drives itself gets its points.
+
+    A closed route goes on from its last waypoint to its first, again and again.
+    """
 
     action: model.AssignRouteAction
 
@@ -37,16 +40,17 @@ class AssignRouteAction(ActionBehaviour):
         """Lay the route out, from where the actor is if there is a way from there."""
         route = self.action.route or self.stage.catalog_entry(self.action.catalog_reference, model.Route)
         here = self.stage.location(self.actor.name) if self.actor.present else None
+        roads, seed = self.stage.roads, self.stage.seed
 
         def place(position: model.Position) -> object:
             return resolve(position, self.stage, self.actor.name)
 
         try:
-            found = route_of(route, self.stage.roads, place, here)  # type: ignore[arg-type]
+            found = route_of(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
         except EidriveError:
             if here is None:
                 raise
-            found = route_of(route, self.stage.roads, place)  # type: ignore[arg-type]
+            found = route_of(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
         follow(self, found)
         return Status.SUCCESS
 
@@ -70,7 +74,7 @@ class AcquirePositionAction(ActionBehaviour):
             follow(self, self.stage.roads.route(here, place.location))
         elif self.actor.driven:
             goal = self.actor.goal
-            self.actor.goal = replace(goal or Goal(), path=None, waypoints=np.array([place.pose[:3]]))
+            self.actor.goal = replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]]))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -111,7 +115,7 @@ class RandomRouteAction(ActionBehaviour):
         here = self.stage.location(actor.name)
         if actor.driven and roads is not None and here is not None:
             way = random_route(roads, here, RANDOM_WAY, choose)
-            actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0))
+            actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -124,4 +128,5 @@ def follow(behaviour: ActionBehaviour, route: Route) -> None:
     actor = behaviour.actor
     actor.motion.route, actor.motion.choose = route, None
     if actor.driven:
-        actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0))
+        lap = None if route.onward is None else route.onward.polyline(2.0)
+        actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0), lap=lap)

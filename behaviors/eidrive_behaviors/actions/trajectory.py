@@ -101,7 +101,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         count = max(2, math.ceil(self._layout.length / 2.0) + 1)
         points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
         goal = self.actor.goal
-        self.actor.goal = replace(goal or Goal(), path=points)
+        self.actor.goal = replace(goal or Goal(), path=points, lap=None)
         here = self.actor.motion.pose
         return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
 

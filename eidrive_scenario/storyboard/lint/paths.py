@@ -110,7 +110,7 @@ def impossible_routes(survey: RoadSurvey) -> Iterator[Problem]:
         if any(id(position) in survey.lost or survey.place(position) is None for position in positions):
             continue
         try:
-            route_of(route, survey.roads, survey.place)  # type: ignore[arg-type]
+            route_of(route, survey.roads, survey.place, again=True)  # type: ignore[arg-type]
         except InputError as error:
             for problem in error.problems:
                 yield at(route, f"route {route.name!r}: {problem.message}", problem.remedy or "change its waypoints")

@@ -1,0 +1,94 @@
+"""Closed routes: round and round a ring with an exit, which is the straightest way on at its fork."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from street_scene import after, private
+from test_random_routes import road
+
+from eidrive_scenario.errors import ScenarioError
+
+LAP = 200.0 + 2 * 22.0 * math.pi
+"""Along lane -1, 2 m outside the reference line: two straights of 100 m, two half circles of 22 m radius [m]."""
+
+
+def ring() -> str:
+    """Road 1 east, the junction's road 12 round to the left, road 2 west, road 4 round to road 1; 11 leads out to 3."""
+    half = 20.0 * math.pi
+    both = '<predecessor id="-1"/><successor id="-1"/>'
+    before = '<predecessor elementType="road" elementId="{}" contactPoint="end"/>'
+    after = '<successor elementType="road" elementId="{}" contactPoint="start"/>'
+    turn = '<arc curvature="0.05"/>'
+    junction = '<successor elementType="junction" elementId="9"/>'
+    behind = '<predecessor elementType="junction" elementId="9"/>'
+    roads = (
+        road(1, (0, 0, 0), 100, "<line/>", before.format(4) + junction, both)
+        + road(11, (100, 0, 0), half, "<line/>", before.format(1) + after.format(3), both)
+        + road(12, (100, 0, 0), half, turn, before.format(1) + after.format(2), both)
+        + road(2, (100, 40, math.pi), 100, "<line/>", behind + after.format(4), both)
+        + road(3, (100 + half, 0, 0), 900, "<line/>", behind, both)
+        + road(4, (0, 40, math.pi), half, turn, before.format(2) + after.format(1), both).replace(
+            'junction="9"', 'junction="-1"'
+        )
+    )
+    connections = "".join(
+        f'<connection id="{number}" incomingRoad="1" connectingRoad="{number}" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection>'
+        for number in (11, 12)
+    )
+    return f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>{roads}
+      <junction id="9" name="">{connections}</junction></OpenDRIVE>"""
+
+
+def assign(closed: str, *places: tuple[int, float]) -> str:
+    position = '<Position><LanePosition roadId="{}" laneId="-1" s="{}"/></Position>'
+    waypoint = f'<Waypoint routeStrategy="shortest">{position}</Waypoint>'
+    waypoints = "".join(waypoint.format(*place) for place in places)
+    route = f'<Route name="round" closed="{closed}">{waypoints}</Route>'
+    return private(f"<RoutingAction><AssignRouteAction>{route}</AssignRouteAction></RoutingAction>")
+
+
+def played(run: Any, end: float, action: str, *steps: tuple[str, ...], **more: Any) -> Any:
+    return run(end, ("Ego", action), *steps, street=ring(), ego=(-1, 50.0, 20.0), **more)
+
+
+@pytest.mark.element("AssignRouteAction")
+@pytest.mark.parametrize("start", [(1, 70.0), (2, 30.0)], ids=["a way to it", "past the fork"])
+def test_a_closed_route_is_driven_again_and_again(run: Any, start: tuple[int, float]) -> None:
+    """After 35 s at 20 m/s: two laps from road 1, s 50, and what is left of 700 m."""
+    action = assign("true", start, (4, 30.0))
+    watched = played(run, 35.0, action, driven=False)
+    rest = 35.0 * 20.0 - 2 * LAP
+    position = watched.frames[-1].view.position[0]
+    assert position[:2] == pytest.approx((50.0 + rest, -2.0), abs=0.1)
+
+
+def test_an_open_one_ends(run: Any) -> None:
+    """From road 1, s 50, to s 70: at the fork the straightest way leads out."""
+    watched = played(run, 10.0, assign("false", (1, 60.0), (1, 70.0)), driven=False)
+    assert watched.frames[-1].view.position[0][:2] == pytest.approx((250.0, -2.0), abs=0.1)
+
+
+@pytest.mark.element("AssignRouteAction")
+@pytest.mark.parametrize("relieved", [False, True], ids=["alone", "switched off for two seconds"])
+def test_who_drives_itself_goes_round_too(run: Any, relieved: bool) -> None:
+    """In the half circles sqrt(5 · 22) = 10.5 m/s at most: in 60 s it is once round and more, and never out."""
+    switch = '<ControllerAction><ActivateControllerAction lateral="{0}" longitudinal="{0}"/></ControllerAction>'
+    off, on = (private(switch.format(word)) for word in ("false", "true"))
+    steps = (("Ego", off, after(20.0)), ("Ego", on, after(22.0))) if relieved else ()
+    watched = played(run, 60.0, assign("true", (1, 70.0), (4, 30.0)), *steps)
+    x, y = (np.array([frame.view.position[0][axis] for frame in watched.frames]) for axis in (0, 1))
+    beyond = np.hypot(x - np.clip(x, 0.0, 100.0), y - 20.0)
+    assert beyond == pytest.approx(np.full(len(x), 22.0), abs=1.0)
+    angle = np.unwrap(np.arctan2(y - 20.0, x - 50.0))
+    assert angle[-1] - angle[0] > 2 * math.pi
+    assert min(watched.of("Ego", "speed")) > 5.0
+
+
+def test_a_closed_route_without_a_way_back_is_an_error(run: Any) -> None:
+    with pytest.raises(ScenarioError, match="no way leads round the closed route 'round'"):
+        played(run, 1.0, assign("true", (1, 70.0), (3, 30.0)), driven=False)

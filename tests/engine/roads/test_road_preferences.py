@@ -1,0 +1,115 @@
+"""What counts on the way from place to place: length, time, junctions or chance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.roads import RoadNetwork, by_chance, fastest, fewest_junctions
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.route import route_of
+
+Text = Callable[..., str]
+LANE = (
+    '<laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving"><link><predecessor id="-1"/>'
+    '<successor id="-1"/></link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
+)
+WAYS = {
+    "a": (300.0, 10.0, ((20, 9), (140, None), (160, 8), (280, None), (300, 7))),
+    "b": (360.0, 30.0, ((20, 9), (180, None), (200, 6), (340, None), (360, 7))),
+    "c": (420.0, 10.0, ((20, 9), (210, None), (400, None), (420, 7))),
+}
+"""Length [m], limit [m/s], and where each piece ends, of which junction it is."""
+
+
+@pytest.fixture
+def three_ways(road: Text, map_of: Text) -> RoadNetwork:
+    """From `start` to `end`, whose ends are 300 m apart: a is the shortest way, b the fastest, c has the fewest
+    junctions (two, the others three). b and c go up and down again."""
+
+    def link(tag: str, other: str) -> str:
+        kind = "junction" if other.isdigit() else "road"
+        contact = "" if kind == "junction" else f'contactPoint="{"end" if tag == "predecessor" else "start"}"'
+        return f'<{tag} elementType="{kind}" elementId="{other}" {contact}/>'
+
+    roads = [
+        road("start", length=100.0, lanes=LANE, link=link("successor", "9")),
+        road("end", length=100.0, x=400.0, lanes=LANE, link=link("predecessor", "7")),
+    ]
+    connections: dict[int, str] = {}
+    for way, (length, limit, pieces) in WAYS.items():
+        slope = math.acos(300.0 / length)
+        names = ["start", *(f"{way}{number}" for number in range(len(pieces))), "end"]
+        owners = [None, *(junction for _, junction in pieces), None]
+        begin = 0.0
+        for number, (stop, junction) in enumerate(pieces, 1):
+            up = begin < length / 2
+            x = 100.0 + begin * math.cos(slope)
+            y = (begin if up else length - begin) * math.sin(slope)
+            before, after = (
+                str(owners[n]) if junction is None and owners[n] else names[n] for n in (number - 1, number + 1)
+            )
+            links = link("predecessor", before) + link("successor", after)
+            speed = f'<type s="0" type="town"><speed max="{limit}" unit="m/s"/></type>'
+            roads.append(
+                road(names[number], length=stop - begin, x=x, y=y, hdg=slope if up else -slope, lanes=LANE, link=links,
+                     junction=str(junction or -1), extra=speed)
+            )  # fmt: skip
+            if junction is not None:
+                connections[junction] = connections.get(junction, "") + (
+                    f'<connection id="{way}" incomingRoad="{names[number - 1]}" connectingRoad="{names[number]}" '
+                    'contactPoint="start"><laneLink from="-1" to="-1"/></connection>'
+                )
+            begin = float(stop)
+    junctions = "".join(f'<junction id="{one}" name="">{text}</junction>' for one, text in connections.items())
+    return RoadNetwork.parse(map_of(*roads, rest=junctions))
+
+
+def test_each_preference_has_its_way(three_ways: RoadNetwork) -> None:
+    """a: 300 m in 30 s, b: 360 m in 12 s, c: 420 m in 42 s; 50 m of `start` and 50 m of `end` belong to all."""
+    here, there = three_ways.location("start", -1, 50.0), three_ways.location("end", -1, 50.0)
+
+    def way(cost: object) -> str:
+        return three_ways.route(here, there, costs=[cost]).lanes[1].road[0]  # type: ignore[list-item]
+
+    assert [way(cost) for cost in (None, fastest(three_ways), fewest_junctions(three_ways))] == ["a", "b", "c"]
+    by_seed = [way(by_chance(three_ways, generator(seed, "route", "r"))) for seed in range(40)]
+    assert set(by_seed) == {"a", "b", "c"}
+    assert by_seed[7] == way(by_chance(three_ways, generator(7, "route", "r")))
+
+
+def test_each_leg_has_a_cost_of_its_own(three_ways: RoadNetwork) -> None:
+    places = [three_ways.location(*place) for place in (("start", -1, 50.0), ("b1", -1, 50.0), ("end", -1, 50.0))]
+    route = three_ways.route(places[0], places[2], [places[1]], [fewest_junctions(three_ways), None])
+    assert [key.road for key in route.lanes] == ["start", "b0", "b1", "b2", "b3", "b4", "end"]
+
+
+def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwork) -> None:
+    def place(position: model.Position) -> Place:
+        assert position.lane_position is not None
+        location = three_ways.location(position.lane_position.road_id, -1, position.lane_position.s)
+        return Place(three_ways.pose(location), location)
+
+    def waypoint(road: str, strategy: model.RouteStrategy) -> model.Waypoint:
+        there = model.Position(lane_position=model.LanePosition(road_id=road, lane_id="-1", s=50.0))
+        return model.Waypoint(route_strategy=strategy, position=there)
+
+    def way(strategy: model.RouteStrategy, seed: int = 0, begun: bool = False) -> str:
+        last = waypoint("end", strategy)
+        points = (last, last) if begun else (waypoint("start", model.RouteStrategy.SHORTEST), last)
+        route = model.Route(closed=False, name="way", waypoint=points)
+        start = three_ways.location("start", -1, 10.0) if begun else None
+        return route_of(route, three_ways, place, start, seed=seed).lanes[1].road[0]
+
+    strategies = model.RouteStrategy
+    for begun in (False, True):
+        assert way(strategies.SHORTEST, begun=begun) == "a"
+        assert way(strategies.FASTEST, begun=begun) == "b"
+        assert way(strategies.LEAST_INTERSECTIONS, begun=begun) == "c"
+    by_seed = [way(strategies.RANDOM, seed) for seed in range(30)]
+    assert set(by_seed) == {"a", "b", "c"}
+    assert by_seed == [way(strategies.RANDOM, seed) for seed in range(30)]
