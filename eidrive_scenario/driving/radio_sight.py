@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,8 +29,8 @@ def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Pla
     """
     row = view.rows[spec.name]
     x, y, z = view.position[row].tolist()
-    yaw = view.yaw[row]
-    cos, sin = float(np.cos(yaw)), float(np.sin(yaw))
+    yaw = float(view.yaw[row])
+    cos, sin = math.cos(yaw), math.sin(yaw)
     ahead, aside, up = spec.offset
     over = up + spec.size[2] / 2.0 if height is None else height
     return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + over)

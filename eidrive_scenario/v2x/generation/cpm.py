@@ -96,7 +96,7 @@ class CpmTriggers:
     def _utility(self, number: int, present: _Said, score: float) -> float:
         """How much an object is worth its place: new ones first, then the better seen and the more changed.
 
-        The terms are those of Artery's CpService: quality, and changes of place, speed, direction and age, up to 1 each.
+        The terms are those of Artery's CpService: quality, changes of place, speed and direction, age; up to 1 each.
         """
         last = self._said.get(number)
         if last is None:

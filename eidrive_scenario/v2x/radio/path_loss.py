@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Between:
-    """M links and what stands on them.
+    """M links and what stands on them; LOS is 0 among the states.
 
     distance  (M,) between the antennas [m];  states  (M,) LOS, NLOSV or NLOS;  lower, upper  (M,) heights of the
     antennas, tops  (M,) and of the highest vehicle in between [m];  vehicles  (M,) how many there are
@@ -55,6 +55,8 @@ class Tr37885(Settings):
         """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
         los = urban_los if self.environment == "urban" else highway_los
         clear = los(between.distance, frequency_ghz)
+        if not between.states.any():
+            return clear
         mean, spread = blockage_moments(between.distance, between.lower, between.upper, between.tops)
         return np.select(
             [between.states == LOS, between.states == NLOSV],
@@ -96,6 +98,8 @@ class WinnerB1(Settings):
         """(M,) path loss without shadowing [dB]; nothing is drawn."""
         height = 1.5 - self.environment_height
         clear = winner_b1(between.distance, frequency_ghz, height, height)
+        if not between.states.any():
+            return clear
         return np.select(
             [between.states == LOS, between.states == NLOSV],
             [clear, clear + self.per_vehicle_db * between.vehicles],
