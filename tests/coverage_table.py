@@ -161,7 +161,6 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
     ),
 }
 
-SHORTEST = "a gap: roads are followed by the shortest way, as in esmini"
 LIGHTS = "no controller here steers lights or animations, so that there is nothing to switch on or off"
 WITHOUT_EFFECT = {
     "ActivateControllerAction.lighting": LIGHTS,
@@ -171,17 +170,13 @@ WITHOUT_EFFECT = {
     "Axle.positionZ": "wheels stand on the road",
     "Axle.trackWidth": "the body's box says how wide a vehicle is; one track is driven",
     "Controller.controllerType": "its property `module` says whose it is",
-    "DistanceCondition.routingAlgorithm": SHORTEST,
     "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
     "OverrideSteeringWheelAction.maxTorque": "a wheel is held at an angle, without forces at the rim",
     "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are seen as pedestrians",
-    "RelativeDistanceCondition.routingAlgorithm": SHORTEST,
     "Sensor.horizontalFOV": "sensors are those of the station's controller",
     "Sensor.sensorCategory": "sensors are those of the station's controller",
     "Sensor.verticalFOV": "sensors are those of the station's controller",
     "SensorAttachment.sensorRef": "sensors are those of the station's controller",
-    "TimeHeadwayCondition.routingAlgorithm": SHORTEST,
-    "TimeToCollisionCondition.routingAlgorithm": SHORTEST,
     "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
     "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
 }

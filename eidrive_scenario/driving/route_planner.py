@@ -34,11 +34,9 @@ BEHIND = 5
 class RoutePlanner(Planner):
     """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
 
-    A lap that follows the path is driven round and round.
-
-    Without either it follows its lane straight on, to the end of the road at most. Off the roads, waypoints are
-    joined by a smooth curve. Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that
-    it has seen. Raises RouteError if no road leads to a waypoint.
+    A lap that follows the path is driven round and round. Without path and waypoints it follows its lane straight on,
+    to the end of the road at most. Off the roads, waypoints are joined by a smooth curve.
+    Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that it has seen. Raises RouteError if no road leads to a waypoint.
     """
 
     def __init__(

@@ -1,5 +1,6 @@
 """OpenDRIVE roads: lane and road coordinates to x, y, z and back, and routes over lanes."""
 
+from eidrive_scenario.roads.distance import Chain
 from eidrive_scenario.roads.graph import RouteError
 from eidrive_scenario.roads.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.model import (
@@ -22,6 +23,7 @@ from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
 __all__ = [
     "KINDS",
     "Branch",
+    "Chain",
     "Choose",
     "Cost",
     "Junction",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.roads import poses
-from eidrive_scenario.roads.distance import RoadDistances
+from eidrive_scenario.roads.distance import Chain, RoadDistances
 from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
@@ -40,7 +40,7 @@ from eidrive_scenario.roads.model import (
     SignalPlace,
 )
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
-from eidrive_scenario.roads.preferences import Cost
+from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import read_road_map
 from eidrive_scenario.roads.reading.document import parse_road_map
 from eidrive_scenario.roads.route import Route, joined
@@ -63,7 +63,7 @@ class RoadNetwork:
         self.objects: tuple[RoadObject, ...] = road_map.objects
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
-        self._distances = RoadDistances(self.roads, self.links)
+        self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
 
     @classmethod
     def load(cls, path: str | Path) -> RoadNetwork:
@@ -308,12 +308,20 @@ class RoadNetwork:
         ]
         return parts[0] if len(parts) == 1 else joined(parts)
 
-    def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
+    def distance(
+        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None
+    ) -> tuple[float, float] | None:
         """How far b lies ahead of a and to its left [m], in road coordinates along connected roads, or None.
 
-        Seen in the driving direction of a's lane; negative for behind and right.
+        Seen in the driving direction of a's lane; negative for behind and right. With a route along that one, None
+        where it does not pass both places.
         """
-        return self._distances.between(a, b)
+        if route is None:
+            return self._distances.between(a, b, by)
+        return route.distance(a, b)
+
+    def _usual_speed(self, road: str) -> float:
+        return speed_on(self, road, 0.5 * self.road(road).length)
 
     def bounds(self) -> tuple[float, float, float, float]:
         """The smallest rectangle around all lane centres: least x, least y, greatest x, greatest y [m]."""

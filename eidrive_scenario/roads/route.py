@@ -132,6 +132,32 @@ class Route:
                 return float(np.interp(location.s * leg.direction, order, along[mine]))
         return None
 
+    def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
+        """How far b lies ahead of a and to its left along the route's reference lines, None if it misses one of them.
+
+        Seen in the driving direction of a's lane. Round a closed route the nearer way counts.
+        """
+        here, there = self._passes(a), self._passes(b)
+        if here is None or there is None:
+            return None
+        sense = here[1] * driving_direction(self.roads[a.road], a.lane)
+        along = there[0] - here[0]
+        if self.closed:
+            total = sum(abs(leg.s_end - leg.s) for leg in self.legs)
+            along = (along + 0.5 * total) % total - 0.5 * total
+        return along * sense, (b.t * there[1] - a.t * here[1]) * sense
+
+    def _passes(self, location: LaneLocation) -> tuple[float, int] | None:
+        """Where the route (or its lap, after it) passes a place: metres of reference line, and in which direction."""
+        done = 0.0
+        for leg in self.legs:
+            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
+            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+                return done + abs(location.s - leg.s), leg.direction
+            done += high - low
+        onward = None if self.lap is None else self.lap._passes(location)
+        return None if onward is None else (done + onward[0], onward[1])
+
     def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
         """The distance along the route that is nearest to a point, and how far left of the route the point lies [m].
 

@@ -6,12 +6,18 @@ import math
 
 from eidrive_scenario.geometry import footprint_distance
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
 
 Box = tuple[float, float, float, float, float, float, float]
 """x y z of the centre, length, width, height [m], yaw [rad]"""
+
+CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
+    model.RoutingAlgorithm.FASTEST: "fastest",
+    model.RoutingAlgorithm.LEAST_INTERSECTIONS: "leastIntersections",
+}
+"""The ways that an algorithm chooses, where it is not the shortest."""
 
 
 def box_of(stage: Stage, name: str) -> Box:
@@ -43,15 +49,25 @@ def frame_of(system: model.CoordinateSystem | None) -> str:
     return "entity" if system is None else str(system.value)
 
 
-def distance(stage: Stage, a: str, b: str | Place, *, frame: str, kind: str, freespace: bool) -> float:
+def distance(
+    stage: Stage,
+    a: str,
+    b: str | Place,
+    *,
+    frame: str,
+    kind: str,
+    freespace: bool,
+    algorithm: model.RoutingAlgorithm | None = None,
+) -> float:
     """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
 
     Longitudinal distances are positive ahead, lateral ones to the left, both as `a` looks; free space is at least 0 in
-    amount, and 0 where the two overlap along that axis.
+    amount, and 0 where the two overlap along that axis. In the frames of lane and road the algorithm says which way of
+    several is measured.
     """
     if kind == "euclidianDistance":
         return _straight(stage, a, b, freespace)
-    along, across = _offsets(stage, a, b, frame)
+    along, across = _offsets(stage, a, b, frame, algorithm)
     value = along if kind == "longitudinal" else across
     if not freespace or math.isnan(value):
         return value
@@ -68,13 +84,19 @@ def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
     return footprint_distance(box_of(stage, a), point)
 
 
-def _offsets(stage: Stage, a: str, b: str | Place, frame: str) -> tuple[float, float]:
+def _offsets(
+    stage: Stage, a: str, b: str | Place, frame: str, algorithm: model.RoutingAlgorithm | None
+) -> tuple[float, float]:
     here, there = stage.pose(a), _pose(stage, b)
     if frame in ("lane", "road") and stage.roads is not None:
         start, end = stage.location(a), _location(stage, b)
         if start is None or end is None:
             return math.nan, math.nan
-        found = stage.roads.distance(start, end)
+        if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:
+            route = stage.actors[a].motion.route
+            found = None if route is None else stage.roads.distance(start, end, route=route)
+        else:
+            found = stage.roads.distance(start, end, CHAINS.get(algorithm, "shortest"))
         if found is None:
             return math.nan, math.nan
         lane = stage.roads.pose(start)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from street_scene import after, private
+from street_scene import NOTHING, after, private
 from test_random_routes import road
 
 from eidrive_scenario.errors import ScenarioError
@@ -92,3 +92,16 @@ def test_who_drives_itself_goes_round_too(run: Any, relieved: bool) -> None:
 def test_a_closed_route_without_a_way_back_is_an_error(run: Any) -> None:
     with pytest.raises(ScenarioError, match="no way leads round the closed route 'round'"):
         played(run, 1.0, assign("true", (1, 70.0), (3, 30.0)), driven=False)
+
+
+@pytest.mark.element("DistanceCondition")
+@pytest.mark.parametrize(("algorithm", "far"), [("assignedRoute", True), ("shortest", False), ("undefined", False)])
+def test_along_the_assigned_route_it_may_be_further(run: Any, algorithm: str, far: bool) -> None:
+    """The end of road 2 is 50 + 62.8 + 100 m ahead along the route, and 50 + 62.8 m behind by road 4."""
+    position = '<Position><LanePosition roadId="2" laneId="-1" s="100"/></Position>'
+    condition = f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
+      </TriggeringEntities><EntityCondition><DistanceCondition freespace="false" rule="greaterThan" value="200"
+      coordinateSystem="road" relativeDistanceType="longitudinal" routingAlgorithm="{algorithm}">{position}
+      </DistanceCondition></EntityCondition></ByEntityCondition>"""
+    watched = played(run, 0.5, assign("false", (1, 70.0), (4, 30.0)), ("Ego", NOTHING, condition), driven=False)
+    assert bool(watched.begun("event 1")) is far

@@ -43,6 +43,7 @@ def measured(
             frame=frame,
             kind=kind,
             freespace=element.freespace,
+            algorithm=element.routing_algorithm,
         )
     except Absent:
         return math.nan

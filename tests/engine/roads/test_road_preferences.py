@@ -113,3 +113,15 @@ def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwor
     by_seed = [way(strategies.RANDOM, seed) for seed in range(30)]
     assert set(by_seed) == {"a", "b", "c"}
     assert by_seed == [way(strategies.RANDOM, seed) for seed in range(30)]
+
+
+def test_distances_along_the_way_that_is_asked_for(three_ways: RoadNetwork) -> None:
+    """From 50 m before the fork to 50 m behind the merge; an assigned route leads along b though a is shorter."""
+    here, there = three_ways.location("start", -1, 50.0), three_ways.location("end", -1, 50.0)
+    assert three_ways.distance(here, there) == pytest.approx((400.0, 0.0))
+    assert three_ways.distance(here, there, "fastest") == pytest.approx((460.0, 0.0))
+    assert three_ways.distance(there, here, "leastIntersections") == pytest.approx((-520.0, 0.0))
+    route = three_ways.route(here, there, costs=[fastest(three_ways)])
+    assert three_ways.distance(here, there, route=route) == pytest.approx((460.0, 0.0))
+    assert three_ways.distance(there, here, route=route) == pytest.approx((-460.0, 0.0))
+    assert three_ways.distance(here, three_ways.location("a1", -1, 10.0), route=route) is None
