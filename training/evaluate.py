@@ -63,7 +63,7 @@ def held_out(folder: Path, seed: int, pictures: int, processes: int) -> Dataset:
     return Dataset.load(folder)
 
 
-def judge_dataset(network: ImageNetwork, dataset: Dataset) -> list[Judged]:
+def judge_dataset(network: ImageNetwork, dataset: Dataset, confidence: float) -> list[Judged]:
     """What a network finds in the pictures of a dataset."""
     to_find = dataset.to_find()
     judged = []
@@ -76,14 +76,14 @@ def judge_dataset(network: ImageNetwork, dataset: Dataset) -> list[Judged]:
             distance=dataset.distance[rows].astype(float),
             to_find=to_find[rows],
         )
-        judged.append(Judged(objects, network.find(picture), str(dataset.weather[number])))
+        judged.append(Judged(objects, network.find(picture), str(dataset.weather[number]), confidence))
     return judged
 
 
-def judge_scenes(network: ImageNetwork, scenes: Sequence[Seen]) -> list[Judged]:
+def judge_scenes(network: ImageNetwork, scenes: Sequence[Seen], confidence: float) -> list[Judged]:
     """The same for scenes."""
     return [
-        Judged(_objects(seen.labels), network.find(seen.readings.cameras["camera"].rgb), seen.weather)
+        Judged(_objects(seen.labels), network.find(seen.readings.cameras["camera"].rgb), seen.weather, confidence)
         for seen in scenes
     ]
 
@@ -235,7 +235,7 @@ def evaluate(options: argparse.Namespace) -> None:
     scenes = list(library_scenes([clear, fog]))
     others = list(random_scenes(options.seed, "held_out lidar", options.worlds, clear))
     picture = scenes[0].readings.cameras["camera"].rgb
-    time_of = {name: build_network(name, LearnedSettings()) for name in names}
+    own = {name: build_network(name, LearnedSettings()) for name in names}
     tables.append(
         (
             "Size and time, one core, pictures of 800 x 600",
@@ -245,16 +245,18 @@ def evaluate(options: argparse.Namespace) -> None:
                     name,
                     f"{_parameters(SHIPPED / f'{name}.npz'):,}",
                     f"{(SHIPPED / f'{name}.npz').stat().st_size / 1e6:.2f}",
-                    f"{milliseconds(time_of[name], picture):.1f}",
+                    f"{milliseconds(own[name], picture):.1f}",
                 ]
                 for name in names
             ],
         )
     )
     print(f"{len(dataset)} held-out pictures, {len(scenes)} of the library's scenes", flush=True)
-    judged = {name: judge_dataset(networks[name], dataset) for name in names}
+    judged = {name: judge_dataset(networks[name], dataset, own[name].confidence) for name in names}
     tables += tables_of(judged, "Held-out pictures")
-    tables += tables_of({name: judge_scenes(networks[name], scenes) for name in names}, "Library scenes")
+    tables += tables_of(
+        {name: judge_scenes(networks[name], scenes, own[name].confidence) for name in names}, "Library scenes"
+    )
     for of, some in (
         ("Library scenes, clear", [s for s in scenes if s.weather == "clear"]),
         ("Random scenes, clear", others),
@@ -262,7 +264,7 @@ def evaluate(options: argparse.Namespace) -> None:
         for sensor, use_lidar in (("camera and LiDAR", True), ("camera alone", False)):
             errors = {name: centre_errors(DETECTORS[name], some, use_lidar) for name in names}
             tables.append(error_table(errors, f"{of}, {sensor}"))
-    curves = sweeps(time_of, options.seed, options.sweep_worlds)
+    curves = sweeps(own, options.seed, options.sweep_worlds)
     text = as_markdown(tables)
     print(text)
     options.out.mkdir(parents=True, exist_ok=True)

@@ -16,8 +16,6 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 VEHICLES = ("car", "truck", "bus")
-CONFIDENCE = 0.35
-"""At which recall is told: the detectors' own."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +37,8 @@ class Judged:
     objects: Objects
     found: ImageDetections
     weather: str
+    confidence: float
+    """From which on the detector itself believes its boxes; recall is told for that."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,8 @@ def score(pictures: Sequence[Judged], part: Part) -> Score:
             match(picture.found.boxes[detected], picture.found.scores[detected], objects.boxes[mine], ~asked[mine])
         )
         count += int(asked.sum())
-    return Score(average_precision(matches, count), recall_at(matches, count, CONFIDENCE), count)
+    confidence = pictures[0].confidence if pictures else 0.0
+    return Score(average_precision(matches, count), recall_at(matches, count, confidence), count)
 
 
 def mean_precision(pictures: Sequence[Judged], names: Sequence[str], weather: str) -> float:
@@ -112,6 +113,7 @@ def as_one_light(pictures: Sequence[Judged]) -> list[Judged]:
             ),
             ImageDetections(entry.found.boxes, entry.found.scores, plain(entry.found.classes)),
             entry.weather,
+            entry.confidence,
         )
         for entry in pictures
     ]

@@ -12,6 +12,7 @@ import datetime
 import json
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, match
+from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.boxes import centred
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
 from eidrive_scenario.perception.learned.ssd import default_boxes
@@ -118,8 +119,8 @@ def _numbers(network: nn.Module) -> list[torch.Tensor]:
 
 
 @torch.no_grad()
-def scores(network: nn.Module, samples: Samples, autocast: bool) -> dict[str, float]:
-    """AP at overlap 0.5 of each class, and their mean over the classes that occur."""
+def scores(network: nn.Module, samples: Samples, autocast: bool) -> tuple[dict[str, float], float]:
+    """AP at overlap 0.5 of each class, their mean over the classes that occur, and the confidence of the best F1."""
     width, height = INPUT_SIZE
     device = samples.pictures.device
     groups = suppression_groups(IMAGE_CLASSES)
@@ -154,7 +155,10 @@ def scores(network: nn.Module, samples: Samples, autocast: bool) -> dict[str, fl
         for number, name in enumerate(IMAGE_CLASSES)
         if present[number]
     }
-    return {"mean": float(np.mean(list(result.values()))), **result}
+    everything = [entry for entries in found.values() for entry in entries]
+    sure = any(entry.correct.any() for entry in everything)
+    believed = best_confidence(everything, int(present.sum())) if sure else Description.confidence
+    return {"mean": float(np.mean(list(result.values()))), **result}, believed
 
 
 def train(options: argparse.Namespace) -> None:
@@ -216,7 +220,8 @@ def train(options: argparse.Namespace) -> None:
         over = passed > limit
         line = f"epoch {epoch + 1}/{options.epochs} {passed:.0f} s " + " ".join(f"{k} {v:.3f}" for k, v in sums.items())
         if over or epoch + 1 == options.epochs or (epoch + 1) % options.check == 0:
-            reached = scores(average.network, checks, autocast)
+            reached, confidence = scores(average.network, checks, autocast)
+            description = replace(description, confidence=round(confidence, 3))
             line += f" | AP50 {reached['mean']:.4f}"
             if reached["mean"] > best:
                 best = reached["mean"]
@@ -245,6 +250,7 @@ def card_text(
         "classes": list(description.classes),
         "input_size": list(description.input_size),
         "anchors": description.anchors,
+        "confidence": description.confidence,
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "torch": torch.__version__,
         "data": {

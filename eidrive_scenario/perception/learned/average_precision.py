@@ -99,6 +99,19 @@ def precision_recall(matches: Sequence[Matches], objects: int) -> tuple[Array, A
     return right / max(objects, 1), right / np.arange(1, len(order) + 1)
 
 
+def best_confidence(matches: Sequence[Matches], objects: int) -> float:
+    """The score from which on to believe detections so that F1, the harmonic mean of precision and recall, is largest.
+
+    Raises ValueError where nothing was found.
+    """
+    recall, precision = precision_recall(matches, objects)
+    if not len(recall) or recall[-1] == 0.0:
+        raise ValueError("without any right detection there is no best confidence")
+    scores = np.concatenate([entry.scores[entry.counted] for entry in matches])
+    f1 = 2.0 * precision * recall / np.maximum(precision + recall, 1e-12)
+    return float(np.sort(scores)[::-1][int(np.argmax(f1))])
+
+
 def recall_at(matches: Sequence[Matches], objects: int, score: float) -> float:
     """Share of the objects found by detections of at least this score; NaN without any object."""
     if objects == 0:

@@ -27,6 +27,7 @@ from eidrive_scenario.settings import Settings
 SHIPPED = Path(__file__).parents[1] / "weights"
 OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", ".pt")
 
+USUAL_CONFIDENCE = 0.35
 SAME_PLACE = 0.1
 """Lifted boxes that overlap this much in plan view are one object; the surer one counts."""
 
@@ -38,7 +39,7 @@ class LearnedSettings(Settings):
                  a TorchScript model (.pt); None is what is shipped
     classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
                  and how its output is laid out, where the shape does not tell
-    confidence   below which a box does not count
+    confidence   below which a box does not count; None is what suits shipped weights best, and 0.35 for others
     threads      of the network's computation, in the whole process
     """
 
@@ -46,7 +47,7 @@ class LearnedSettings(Settings):
     classes: tuple[str, ...] | None = None
     input_size: tuple[PositiveInt, PositiveInt] | None = None
     layout: Layout | None = None
-    confidence: float = Field(default=0.35, gt=0.0, lt=1.0)
+    confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
     threads: PositiveInt = 1
 
     @model_validator(mode="after")
@@ -152,8 +153,9 @@ def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
         message = f"detector {name!r} needs torch, which is not installed"
         raise SettingError(Problem(message, "run: pip install eidrive-scenario[learned]"))
     if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
+        confidence = settings.confidence or USUAL_CONFIDENCE
         return ForeignNetwork(
-            path, settings.classes, settings.input_size, settings.confidence, settings.layout, settings.threads
+            path, settings.classes, settings.input_size, confidence, settings.layout, settings.threads
         )
     from eidrive_scenario.perception.learned.torch_network import TorchNetwork
 

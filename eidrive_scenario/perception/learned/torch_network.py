@@ -21,12 +21,13 @@ from eidrive_scenario.perception.learned.yolov5 import STRIDES, YoloV5
 class TorchNetwork(ImageNetwork):
     """`yolov5` or `ssd`, by what the file of weights says. Raises SettingError if that does not fit.
 
-    On a given machine and number of threads the same picture gives the same bits.
+    Without a confidence, that of the weights counts. On a given machine and number of threads the same picture gives
+    the same bits.
     """
 
-    def __init__(self, path: Path, confidence: float, threads: int = 1) -> None:
+    def __init__(self, path: Path, confidence: float | None = None, threads: int = 1) -> None:
         description, network = load(path)
-        super().__init__(description.classes, description.input_size, confidence)
+        super().__init__(description.classes, description.input_size, confidence or description.confidence)
         torch.set_num_threads(threads)
         fold(network)
         self.name = description.network

@@ -22,13 +22,18 @@ _DESCRIPTION = "description"
 
 @dataclass(frozen=True)
 class Description:
-    """What a file of weights is for: network `yolov5` or `ssd`, its classes, the width and height of its input [px],
-    and the anchors of yolov5 [px]."""
+    """What a file of weights is for.
+
+    network     `yolov5` or `ssd`;  classes  in the order of its outputs
+    input_size  width and height of its input [px];  anchors  of yolov5 [px]
+    confidence  from which on its boxes are believed, where nobody says another
+    """
 
     network: str
     classes: tuple[str, ...]
     input_size: tuple[int, int]
     anchors: Anchors | None = None
+    confidence: float = 0.35
 
     def build(self) -> YoloV5 | Ssd:
         """The network, untrained. Raises ValueError if the description fits none."""
@@ -88,5 +93,6 @@ def _described(data: dict[str, Any]) -> Description:
         network=str(data["network"]),
         classes=tuple(data["classes"]),
         input_size=(int(width), int(height)),
+        confidence=float(data.get("confidence", Description.confidence)),
         anchors=None if anchors is None else tuple(tuple((w, h) for w, h in scale) for scale in anchors),
     )

@@ -8,6 +8,7 @@ import pytest
 from eidrive_scenario.perception.learned.average_precision import (
     Matches,
     average_precision,
+    best_confidence,
     match,
     precision_recall,
     recall_at,
@@ -42,6 +43,15 @@ def test_nothing_found_and_nothing_there() -> None:
     assert average_precision([], 3) == 0.0
     assert np.isnan(average_precision([told((0.9, False))], 0))
     assert np.isnan(recall_at([], 0, 0.5))
+
+
+def test_the_best_confidence_has_the_largest_f1() -> None:
+    # of four objects: F1 after each detection 2/5, 2/6, 4/7, 4/8, 6/9
+    single = told((0.9, True), (0.8, False), (0.7, True), (0.6, False), (0.5, True))
+    assert best_confidence([single], 4) == 0.5
+    assert best_confidence([told((0.9, True), (0.8, False)), told((0.7, False))], 4) == 0.9
+    with pytest.raises(ValueError, match="without any right detection"):
+        best_confidence([told((0.9, False))], 4)
 
 
 def test_each_object_is_found_once_by_the_surest_detection() -> None:
