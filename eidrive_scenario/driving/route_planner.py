@@ -36,7 +36,8 @@ class RoutePlanner(Planner):
 
     A lap that follows the path is driven round and round. Without path and waypoints it follows its lane straight on,
     to the end of the road at most. Off the roads, waypoints are joined by a smooth curve.
-    Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that it has seen. Raises RouteError if no road leads to a waypoint.
+    Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that it has seen.
+    Raises RouteError if no road leads to a waypoint.
     """
 
     def __init__(
