@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +16,12 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.signal_stops import WAIT
 from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
+from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.signals import SignalLookout
+from eidrive_scenario.simulation import run_file
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 
@@ -209,3 +212,67 @@ def test_a_car_stops_at_a_stop_sign_waits_and_goes_on() -> None:
     assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
     assert fronts[-1] > 110.0
     drive.world.close()
+
+
+SCENARIO = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" description="" author=""/><CatalogLocations/>
+<RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
+<Entities><ScenarioObject name="Ego"><Vehicle name="car" vehicleCategory="car">
+<BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
+<Performance maxSpeed="50" maxAcceleration="5" maxDeceleration="9"/>
+<Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
+<RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles></Vehicle>
+<ObjectController><Controller name="stack"><Properties><Property name="module" value="eidrive"/>
+<Property name="target_speed" value="10"/><Property name="obey_signals" value="{obeys}"/></Properties></Controller>
+</ObjectController></ScenarioObject></Entities>
+<Storyboard><Init><Actions>
+<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="7" state="red"/>
+</TrafficSignalAction></InfrastructureAction></GlobalAction>
+<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>
+<LanePosition roadId="1" laneId="-1" s="20"/></Position></TeleportAction></PrivateAction></Private></Actions></Init>
+<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"/><Maneuver name="maneuver"><Event name="turns" priority="parallel">
+<Action name="green"><GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="7"
+ state="green"/></TrafficSignalAction></InfrastructureAction></GlobalAction></Action>
+<StartTrigger><ConditionGroup><Condition name="later" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="18" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+</StartTrigger>
+</Event></Maneuver></ManeuverGroup></Act></Story>
+<StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
+<SimulationTimeCondition value="26" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+</StopTrigger>
+</Storyboard></OpenSCENARIO>"""
+
+
+class Track:
+    """Where the ego's front was, by time."""
+
+    def __init__(self) -> None:
+        self.fronts: dict[float, float] = {}
+
+    def observe(self, frame: Frame) -> None:
+        place = float(frame.view.position[frame.view.row("Ego"), 0])
+        self.fronts[round(frame.view.time, 2)] = place + 1.4 + 2.25
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_in_a_scenario_the_light_holds_who_obeys_until_it_turns(tmp_path: Path, obeys: bool) -> None:
+    """The storyboard's light, at 80 m: red from the start, green from 18 s on."""
+    road = (
+        '<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="400" id="1" junction="-1"><planView>'
+        f'<geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry></planView>{LANES}'
+        f"<signals>{light('7', 80.0)}</signals></road></OpenDRIVE>"
+    )
+    (tmp_path / "street.xodr").write_text(road)
+    path = tmp_path / "light.xosc"
+    path.write_text(SCENARIO.replace("{obeys}", str(obeys).lower()))
+    track = Track()
+    assert run_file(path, seed=0, observers=[track]).end == "stop trigger"
+    if obeys:
+        assert 78.0 < track.fronts[17.95] < 80.0
+        assert track.fronts[26.0] > 95.0
+    else:
+        assert track.fronts[17.95] > 95.0
