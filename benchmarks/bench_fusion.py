@@ -1,6 +1,6 @@
 """How long late fusion takes: stations that each report the same objects at 20 Hz, told at once.
 
-    python benchmarks/bench_fusion.py [--objects 10] [--stations 4] [--ticks 400]
+python benchmarks/bench_fusion.py [--objects 10] [--stations 4] [--ticks 400]
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def reports_of(tick: int, stations: int, objects: int, *, velocities: bool) -> l
 
 
 def measured(build: Callable[[], FusionMethod], ticks: list[list[Report]], objects: int) -> tuple[float, float, float]:
-    """Median and least time of a tick [ms], by the clock of this thread, and the share of ticks with the right count."""
+    """Median and least time of a tick [ms] on this thread, and the share of ticks with the right count."""
     fusion = build()
     times, right = [], 0
     for number, reports in enumerate(ticks):
@@ -73,9 +73,7 @@ def main() -> None:
         ("covariance_intersection", CovarianceIntersectionFusion, True),
         ("  of positions alone", CovarianceIntersectionFusion, False),
     ):
-        ticks = [
-            reports_of(tick, given.stations, given.objects, velocities=velocities) for tick in range(given.ticks)
-        ]
+        ticks = [reports_of(tick, given.stations, given.objects, velocities=velocities) for tick in range(given.ticks)]
         middle, least, right = measured(build, ticks, given.objects)
         print(f"  {name:26} median {middle:7.3f} ms   least {least:7.3f} ms   right count {100 * right:5.1f} %")
 

@@ -82,7 +82,7 @@ def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> N
     with street() as world:
         for weather in weathers:
             world.set_weather(weather)
-            row = []
+            row: list[NDArray[np.uint8]] = []
             for number, (view, pose, own) in enumerate(_VIEWS):
                 reading = photographer.take(
                     world,
