@@ -60,12 +60,14 @@ class Links:
             book.fate(distance, False)
         return LinkEvent(message.sender, receiver, message.number, now, "lost", None, reason, message.size)
 
-    def carry(self, entry: Entry, receiver: str) -> None:
+    def carry(self, entry: Entry, *receivers: str) -> None:
         """Put a message on its way whose sending is in the books."""
-        queue = self._queues.get(receiver)
-        if queue is None:
-            queue = self._queues[receiver] = []
-        queue.append(entry)
+        queues = self._queues
+        for receiver in receivers:
+            if receiver in queues:
+                queues[receiver].append(entry)
+            else:
+                queues[receiver] = [entry]
 
     def _enter(self, message: Message, receiver: str) -> Book:
         book = self.book(message.sender, receiver)

@@ -24,7 +24,7 @@ from eidrive_scenario.v2x.radio.access import Access, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import Gate
 from eidrive_scenario.v2x.radio.csma import Csma
-from eidrive_scenario.v2x.radio.events import Batch, LinkEvents
+from eidrive_scenario.v2x.radio.events import Batch, Dropped, LinkEvents
 from eidrive_scenario.v2x.radio.ledger import Ledger
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.profile import RadioProfile
@@ -34,8 +34,8 @@ from eidrive_scenario.v2x.surroundings import Surroundings
 
 Array = NDArray[np.float64]
 
-QUEUE, ABSENT = "queue", "absent"
-"""Reasons of loss beside those of the reception: thrown out while waiting; sender or receiver has left the world."""
+ABSENT = "absent"
+"""The reason of loss where sender or receiver has left the world."""
 
 
 class RadioChannel(LinkChannel):
@@ -77,7 +77,7 @@ class RadioChannel(LinkChannel):
         self._jitter_keys: Keys = np.zeros(0, dtype=np.uint64)
         self._budget: Budget | None = None
         self._open: list[Transmission] = []
-        self._told: list[Batch] = []
+        self._told: list[Batch | Dropped] = []
         self._dropped: list[LinkEvent] = []
         self._since: float | None = None
         self._until = 0.0
@@ -188,14 +188,22 @@ class RadioChannel(LinkChannel):
         power = self.profile.radiated - self._budget.loss
         started, dropped = self._access.advance(now, power)
         for entry in dropped:
-            for receiver in entry.receivers:
-                self._lose(entry, receiver, QUEUE)
+            self._drop(entry)
         under_way = [*self._open, *started]
         ended = [entry for entry in under_way if entry.end <= now]
         self._open = [entry for entry in under_way if entry.end > now]
         if ended:
             self._receive(ended, power, self._budget)
         self._access.forget(min((entry.start for entry in self._open), default=now))
+
+    def _drop(self, entry: Transmission) -> None:
+        """A queue has thrown a message out."""
+        present = [name for name in entry.receivers if name in self._rows]
+        self._ledger.drop(self._rows[entry.message.sender], [self._rows[name] for name in present])
+        self._told.append(Dropped(entry, present))
+        for name in entry.receivers:
+            if name not in self._rows:
+                self._lose(entry, name, ABSENT)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Decide who hears the messages that have left the air, and put them on their way."""
@@ -227,8 +235,7 @@ class RadioChannel(LinkChannel):
             arrives = entry.end + delay.seconds
             batch.arrivals[place] = arrives
             parcel = (arrives, message.sender, message.number, entry.sent, Received(message, arrives))
-            for row in heard:
-                self._links.carry(parcel, budget.names[row])
+            self._links.carry(parcel, *[budget.names[row] for row in heard])
             return
         for row in heard:
             name = budget.names[row]

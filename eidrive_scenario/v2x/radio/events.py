@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
-from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, Receptions
+from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Receptions
 from eidrive_scenario.v2x.surroundings import STATES
 
 
@@ -68,10 +68,26 @@ class Batch:
         return self.budget.blockers.get((receiver, sender), ())[::-1]
 
 
+class Dropped:
+    """A message that its queue threw out."""
+
+    def __init__(self, entry: Transmission, receivers: Sequence[str]) -> None:
+        self._entry = entry
+        self._receivers = receivers
+
+    def __len__(self) -> int:
+        return len(self._receivers)
+
+    def __iter__(self) -> Iterator[LinkEvent]:
+        message, sent = self._entry.message, self._entry.sent
+        for name in self._receivers:
+            yield LinkEvent(message.sender, name, message.number, sent, "lost", None, CAUSES[QUEUE], message.size)
+
+
 class LinkEvents(Sequence[LinkEvent]):
     """A sequence of events that are made at the first look; a run of hundreds of stations need not look."""
 
-    def __init__(self, made: Sequence[LinkEvent], batches: Sequence[Batch]) -> None:
+    def __init__(self, made: Sequence[LinkEvent], batches: Sequence[Batch | Dropped]) -> None:
         self._made = list(made)
         self._batches = list(batches)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.v2x.books import DISTANCE_BIN
 from eidrive_scenario.v2x.links import Links
-from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED
+from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -33,6 +33,10 @@ class Ledger:
         """A message of `size` bytes was said."""
         self._sent[row, receivers] += 1
         self._bytes[row, receivers] += size
+
+    def drop(self, row: int, receivers: Sequence[int]) -> None:
+        """A message never went on the air."""
+        self._causes[row, receivers, QUEUE] += 1
 
     def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
         """Fates of messages, one entry per message and receiver."""

@@ -16,10 +16,12 @@ from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
+Bools = NDArray[np.bool_]
+Rows = NDArray[np.int64]
 
-CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision")
-"""In the order in which they strike; codes in arrays are places here."""
-DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION = range(len(CAUSES))
+CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")
+"""In the order in which they strike; codes in arrays are places here. `queue`: it never went on the air."""
+DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION, QUEUE = range(len(CAUSES))
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
 """What traffic that is not simulated adds; signal strength is known, and so not among them."""
 
@@ -77,26 +79,37 @@ class Receiver:
         lost_alone = self._errors(snr, states, sizes)
 
         causes = np.zeros(snr.shape, dtype=np.int8)
+        interference, busy, deaf = self._together(together, same_band, start, own, rows, power)
         if same_band.any():
-            milliwatts = 10.0 ** (power[rows] / 10.0)
             noise = 10.0 ** (self.noise_dbm / 10.0)
-            disturbed = signal - 10.0 * np.log10(noise + same_band.astype(float) @ milliwatts)
+            disturbed = signal - 10.0 * np.log10(noise + interference)
             causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
         causes[draws < lost_alone] = PROPAGATION
-        if together.any():
-            if self.locks:
-                earlier = same_band & (start[None, :] < start[own, None])
-                causes[(earlier.astype(float) @ (power[rows] >= self.sensing_dbm).astype(float)) > 0.0] = BUSY
-            talking = np.zeros((len(on_air), len(budget.names)))
-            talking[np.arange(len(on_air)), rows] = 1.0
-            deaf = together.astype(float) @ talking > 0.0
-        else:
-            deaf = np.zeros(snr.shape, dtype=bool)
+        causes[busy] = BUSY
         causes[signal < self.sensing_dbm] = SENSING
         causes[deaf] = HALF_DUPLEX
         if self.background is not None:
             self._add_background(causes, budget.mean_loss[senders], keys[senders], numbers)
         return Receptions(causes, snr, senders)
+
+    def _together(
+        self, together: Bools, same_band: Bools, start: Array, own: Rows, rows: Rows, power: Array
+    ) -> tuple[Array, Bools, Bools]:
+        """Of each message at each station: the interference [mW], whether the receiver is taken by an earlier message,
+        and whether it talks itself. Sums go in the order of the stations, not as a library of matrices likes it."""
+        shape = (len(own), power.shape[1])
+        interference, busy, deaf = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        milliwatts, sensed = 10.0 ** (power / 10.0), power >= self.sensing_dbm
+        for place in np.flatnonzero(together.any(axis=1)).tolist():
+            deaf[place, rows[together[place]]] = True
+            others = np.flatnonzero(same_band[place])
+            if len(others):
+                senders = np.sort(rows[others])
+                interference[place] = milliwatts[senders].sum(axis=0)
+                if self.locks:
+                    earlier = others[start[others] < start[own[place]]]
+                    busy[place] = sensed[rows[earlier]].any(axis=0)
+        return interference, busy, deaf
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
         if len({id(curve) for curve in self.curves}) == 1:
