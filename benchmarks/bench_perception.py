@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
+from random_scenes import random_scenes
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import points_in_box
@@ -31,6 +32,7 @@ SCENARIOS = {"coop/scenario_1": ("Ego", "RSU"), "coop/scenario_2": ("Ego", "Spec
 FOUND = 2.5
 """A detection this near to an object is of that object [m]."""
 LEAST_POINTS = 3
+RANDOM_SEED = 20261120
 
 
 @dataclass
@@ -89,6 +91,35 @@ def judge(
         found.false += bool(np.hypot(*(boxes[:, :2] - place).T).min() > FOUND)
 
 
+def look_at_random(count: int, seed: int) -> None:
+    """Print what the detector finds in scenes of which nothing was chosen by."""
+    errors: dict[str, list[float]] = defaultdict(list)
+    named: dict[str, int] = defaultdict(int)
+    false = 0
+    detector = LidarDetector()
+    for scene in random_scenes(count, seed):
+        found, sweep = detector.detect(scene.readings), scene.readings.lidars["lidar"]
+        points = sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
+        points = points[points[:, 2] > 0.25]
+        for kind, box in zip(scene.kinds, scene.boxes, strict=True):
+            if np.count_nonzero(points_in_box(points, box + np.array([0, 0, 0, 0.1, 0.1, 0.1, 0]))) < LEAST_POINTS:
+                continue
+            away = np.hypot(*(found.boxes[:, :2] - box[:2]).T)
+            hit = len(away) > 0 and away.min() < FOUND
+            errors[kind].append(float(away.min()) if hit else math.inf)
+            named[kind] += bool(hit and found.classes[int(away.argmin())] == kind)
+        for place in found.boxes[:, :2]:
+            false += bool(np.hypot(*(scene.boxes[:, :2] - place).T).min() > FOUND)
+    for kind, all_of in sorted(errors.items()):
+        hits = [error for error in all_of if math.isfinite(error)]
+        share, right = 100 * len(hits) / len(all_of), 100 * named[kind] / max(len(hits), 1)
+        off, most = median(hits), float(np.percentile(hits, 90))
+        print(
+            f"{kind:11} {share:5.1f} % of {len(all_of):4}   {off:.2f} m, 90 % within {most:.2f} m   class {right:.0f} %"
+        )
+    print(f"false detections per sweep {false / count:.2f}")
+
+
 def tracker_milliseconds(kind: str, count: int = 10, ticks: int = 200) -> float:
     """The median of an update with so many objects."""
     rng, spent = np.random.default_rng(0), []
@@ -111,6 +142,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=5, help="look on at every n-th tick")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
+    print("scenarios 1 and 2, by which thresholds were chosen")
     found = Findings()
     for name, stations in SCENARIOS.items():
         look(name, stations, arguments.every, arguments.seed, found)
@@ -119,6 +151,8 @@ def main() -> None:
         share, middle = 100 * len(hits) / len(errors), median(hits)
         print(f"{kind:13} found {share:5.1f} % of {len(errors):4}   median error of the centre {middle:.2f} m")
     print(f"false detections per sweep {found.false / found.frames:.2f}")
+    print("random scenes, by which nothing was chosen")
+    look_at_random(150, RANDOM_SEED)
     print(
         f"LiDAR {1e3 * median(found.sensor):.1f} ms, detector {1e3 * median(found.detector):.1f} ms per sweep (medians)"
     )
