@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from eidrive_scenario.fusion.association import matched
 
@@ -15,7 +14,7 @@ Array = NDArray[np.float64]
 Table = NDArray[np.void]
 Integers = NDArray[np.intp]
 
-LEFT_OVER = float(chi2.isf(1e-6, 2))
+LEFT_OVER = -2.0 * math.log(1e-6)
 """One true pair in a hundred lies beyond a gate of 99 %, which would make two objects of one many times a second. What
 finds no partner within the gate is paired up to this squared Mahalanobis distance."""
 CERTAIN = -1e3
@@ -35,7 +34,7 @@ class Gate(NamedTuple):
     @classmethod
     def of(cls, probability: float, distance: float) -> Gate:
         """The gate that holds an estimate of the same object with this probability; in the plane, chi-square of 2."""
-        return cls(float(chi2.ppf(probability, 2)), distance)
+        return cls(-2.0 * math.log1p(-probability), distance)
 
 
 class Pairs(NamedTuple):
