@@ -158,14 +158,19 @@ def tables_of(judged: dict[str, list[Judged]], of: str) -> list[Table]:
 
     weathers = sorted({entry.weather for entry in next(iter(judged.values()))}, key=WEATHERS.index)
     head = [f"{name} {what}" for name in judged for what in ("AP50", "recall")] + ["objects"]
-    aim = Part(VEHICLES, farthest=40.0, height=15.0)
     found: list[Table] = [
         (
             f"{of}: vehicles within 40 m and at least 15 px high",
             ["weather", *head],
             [
-                row(weather, Part(aim.names, farthest=40.0, height=15.0, weather=weather), all_of)
-                for weather in weathers
+                *(
+                    row(weather, Part(VEHICLES, farthest=40.0, height=15.0, weather=weather), all_of)
+                    for weather in weathers
+                ),
+                *(
+                    row(f"clear, {name} alone", Part((name,), farthest=40.0, height=15.0, weather="clear"), all_of)
+                    for name in VEHICLES
+                ),
             ],
         )
     ]
