@@ -7,6 +7,7 @@ constant curvature (closed form), spirals (Fresnel integrals) and parametric cub
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -33,7 +34,7 @@ class CurvePoint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(ABC):
     """One geometry of a plan view: starts at x, y with heading h, runs from `s` over `length` [m]."""
 
     s: float
@@ -48,9 +49,9 @@ class Curve:
         object.__setattr__(self, "cos", math.cos(self.h))
         object.__setattr__(self, "sin", math.sin(self.h))
 
+    @abstractmethod
     def at(self, ds: float) -> CurvePoint:
         """The point `ds` metres behind the start."""
-        raise NotImplementedError
 
     def bend(self, ds: float) -> tuple[float, float]:
         """Curvature and metres of path per metre of s there: `at` without the place."""
