@@ -4,75 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated
 
-from pydantic import Field
-
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+from eidrive_criteria.pair import PairCriterion, PairSettings
+from eidrive_scenario.api import WorldView
 
 
-class TimeToCollisionSettings(CriterionSettings):
+class TimeToCollisionSettings(PairSettings):
     """`{of: Ego, to: Incoming, at_least: 1.5}` [s]; without `at_least` it measures and passes."""
 
-    of: str
-    to: str
-    at_least: Annotated[float, Field(ge=0)] | None = None
 
-
-class TimeToCollision(Criterion):
+class TimeToCollision(PairCriterion):
     """Fails where the time to collision falls below `at_least`; no course towards each other is no violation."""
 
     settings_type = TimeToCollisionSettings
     name = "time_to_collision"
+    unit = "s"
 
-    def __init__(self, settings: TimeToCollisionSettings) -> None:
-        super().__init__(settings)
-        self._settings = settings
-        self.subjects = (settings.of, settings.to)
-        self._missing = set(self.subjects)
-        self._together = False
-        self._smallest, self._when = math.inf, math.nan
-        self._violated: float | None = None
-
-    def observe(self, frame: Frame) -> None:
-        view = frame.view
-        if self._missing:
-            self._missing.difference_update(view.names)
-        of, to = view.rows.get(self._settings.of), view.rows.get(self._settings.to)
-        if of is None or to is None:
-            return
-        self._together = True
+    def measure(self, view: WorldView, of: int, to: int) -> float:
         velocity = (view.velocity[to] - view.velocity[of]).tolist()
-        soon = time_to_contact(view.boxes[of].tolist(), view.boxes[to].tolist(), velocity)
-        if soon < self._smallest:
-            self._smallest, self._when = soon, view.time
-        limit = self._settings.at_least
-        if self._violated is None and limit is not None and soon < limit:
-            self._violated = view.time
+        return time_to_contact(view.boxes[of].tolist(), view.boxes[to].tolist(), velocity)
 
-    def verdict(self) -> Verdict:
-        of, to, found = self._settings.of, self._settings.to, math.isfinite(self._smallest)
-        if found:
-            reason = f"{of} and {to} were {self._smallest:.2f} s from a collision at {self._when:.2f} s"
-        elif self._together:
-            reason = f"{of} and {to} were never on a collision course"
-        else:
-            reason = never_appeared(self._missing) if self._missing else f"{of} and {to} were never there together"
-        return Verdict(
-            name=self.name,
-            passed=self._together and self._violated is None,
-            value=self._smallest if found else None,
-            limit=self._settings.at_least,
-            unit="s",
-            first_violation=self._violated,
-            reason=reason,
-            fatal=self.fatal and self._violated is not None,
-        )
+    def words(self) -> str:
+        if not math.isfinite(self.smallest):
+            return f"{self.of} and {self.to} were never on a collision course"
+        return f"{self.of} and {self.to} were {self.smallest:.2f} s from a collision at {self.when:.2f} s"
 
     def metrics(self) -> Mapping[str, float]:
         """The smallest time to collision [s], where there was one."""
-        pair = f"time_to_collision.{self._settings.of}.{self._settings.to}"
-        return {pair: self._smallest} if math.isfinite(self._smallest) else {}
+        pair = f"time_to_collision.{self.of}.{self.to}"
+        return {pair: self.smallest} if math.isfinite(self.smallest) else {}
 
 
 def time_to_contact(a: Sequence[float], b: Sequence[float], velocity: Sequence[float]) -> float:
