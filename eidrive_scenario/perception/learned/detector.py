@@ -39,6 +39,7 @@ class LearnedSettings(Settings):
                  a TorchScript model (.pt); None is what is shipped
     classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
                  and how its output is laid out, where the shape does not tell
+    letterbox    of an .onnx or .pt: whether it takes pictures in their own shape, with grey margins; else stretched
     confidence   below which a box does not count; None is what suits shipped weights best, and 0.35 for others
     threads      of the network's computation, in the whole process
     """
@@ -47,6 +48,7 @@ class LearnedSettings(Settings):
     classes: tuple[str, ...] | None = None
     input_size: tuple[PositiveInt, PositiveInt] | None = None
     layout: Layout | None = None
+    letterbox: bool = False
     confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
     threads: PositiveInt = 1
 
@@ -60,8 +62,8 @@ class LearnedSettings(Settings):
                 raise ValueError("none of `classes` is an object on the road such as car, truck, bus or pedestrian")
         elif self.weights is not None and suffix != OWN_SUFFIX:
             raise ValueError(f"weights end in .npz, .onnx or .pt, not in {suffix!r}")
-        elif self.classes is not None or self.input_size is not None or self.layout is not None:
-            raise ValueError("`classes`, `input_size` and `layout` are for weights .onnx and .pt")
+        elif self.classes is not None or self.input_size is not None or self.layout is not None or self.letterbox:
+            raise ValueError("`classes`, `input_size`, `layout` and `letterbox` are for weights .onnx and .pt")
         return self
 
 
@@ -155,7 +157,13 @@ def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
     if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         confidence = settings.confidence or USUAL_CONFIDENCE
         return ForeignNetwork(
-            path, settings.classes, settings.input_size, confidence, settings.layout, settings.threads
+            path,
+            settings.classes,
+            settings.input_size,
+            confidence,
+            settings.layout,
+            settings.threads,
+            settings.letterbox,
         )
     from eidrive_scenario.perception.learned.torch_network import TorchNetwork
 

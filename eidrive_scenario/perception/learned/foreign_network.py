@@ -41,8 +41,9 @@ class ForeignNetwork(ImageNetwork):
         confidence: float,
         layout: Layout | None = None,
         threads: int = 1,
+        letterbox: bool = False,
     ) -> None:
-        super().__init__(classes, input_size, confidence)
+        super().__init__(classes, input_size, confidence, letterbox)
         self._path = path
         self._compute = (_onnx if path.suffix == ".onnx" else _torchscript)(path, threads)
         blank = np.zeros((input_size[1], input_size[0], 3), dtype=np.uint8)

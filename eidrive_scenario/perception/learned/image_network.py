@@ -19,6 +19,8 @@ Integers = NDArray[np.int64]
 LARGEST_OVERLAP = 0.5
 """Of two boxes of like class that overlap by more, the better one counts."""
 MOST_CANDIDATES = 1000
+MARGIN_GREY = 114
+"""What is beside a letterboxed picture, in the networks of Ultralytics and those trained like them."""
 
 
 @dataclass(frozen=True)
@@ -43,28 +45,36 @@ class Candidates:
 
 
 class ImageNetwork(ABC):
-    """Finds objects in pictures of any size, which it takes to its own size without keeping their shape.
+    """Finds objects in pictures of any size, which it takes to its own size.
 
     classes  names in the order of the outputs;  input_size  width and height of the network's input [px]
+    letterbox  whether pictures keep their shape, with grey margins; else they are stretched
     """
 
-    def __init__(self, classes: Sequence[str], input_size: tuple[int, int], confidence: float) -> None:
+    def __init__(
+        self, classes: Sequence[str], input_size: tuple[int, int], confidence: float, letterbox: bool = False
+    ) -> None:
         self.classes = tuple(classes)
         self.input_size = input_size
         self.confidence = confidence
+        self.letterbox = letterbox
         self._groups = suppression_groups(self.classes)
 
     def find(self, picture: NDArray[np.uint8]) -> ImageDetections:
         """The objects in a picture (H, W, 3), red green blue."""
         height, width = picture.shape[:2]
-        candidates = self.candidates(resized(picture, self.input_size))
+        if self.letterbox:
+            own, scale, corner = letterboxed(picture, self.input_size)
+        else:
+            own, corner = resized(picture, self.input_size), np.zeros(2)
+            scale = np.array([self.input_size[0] / width, self.input_size[1] / height])
+        candidates = self.candidates(own)
         if len(candidates.scores) > MOST_CANDIDATES:
             best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
             candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
         groups = self._groups[candidates.classes]
         kept = suppress(candidates.boxes, candidates.scores, groups, LARGEST_OVERLAP)
-        scale = np.array([width / self.input_size[0], height / self.input_size[1]] * 2)
-        boxes = candidates.boxes[kept] * scale
+        boxes = (candidates.boxes[kept] - np.tile(corner, 2)) / np.tile(scale, 2)
         boxes[:, 0::2] = boxes[:, 0::2].clip(0.0, width)
         boxes[:, 1::2] = boxes[:, 1::2].clip(0.0, height)
         names = tuple(self.classes[number] for number in candidates.classes[kept].tolist())
@@ -84,3 +94,15 @@ def resized(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uin
     return np.asarray(
         cv2.resize(picture, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR), np.uint8
     )
+
+
+def letterboxed(picture: NDArray[np.uint8], size: tuple[int, int]) -> tuple[NDArray[np.uint8], Array, Array]:
+    """The picture in its own shape as large as fits into the size, in its middle; (2,) the scales by which it shrank
+    in x and y, and (2,) where its corner is [px]."""
+    height, width = picture.shape[:2]
+    ratio = min(size[0] / width, size[1] / height)
+    inner = max(round(width * ratio), 1), max(round(height * ratio), 1)
+    left, top = (size[0] - inner[0]) // 2, (size[1] - inner[1]) // 2
+    canvas = np.full((size[1], size[0], 3), MARGIN_GREY, dtype=np.uint8)
+    canvas[top : top + inner[1], left : left + inner[0]] = resized(picture, inner)
+    return canvas, np.array([inner[0] / width, inner[1] / height]), np.array([left, top], dtype=float)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork
+from eidrive_scenario.perception.learned.image_network import MARGIN_GREY, letterboxed
 
 ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
 CLASSES = ("truck", "car")
@@ -69,6 +70,21 @@ def test_an_onnx_model_finds_what_it_was_made_for() -> None:
 
 def test_a_torchscript_model_finds_the_same(torchscript: Path) -> None:
     assert_finds_the_square(ForeignNetwork(torchscript, CLASSES, SIZE, 0.5))
+
+
+def test_a_letterboxed_picture_keeps_its_shape_and_its_boxes_their_place() -> None:
+    """A square picture in the middle of a network's input of 96 x 64: 16 pixels of margin at either side."""
+    picture = np.full((128, 128, 3), 90, dtype=np.uint8)
+    picture[48:64, 48:64] = (255, 0, 0)
+    found = ForeignNetwork(ONNX, CLASSES, SIZE, 0.5, letterbox=True).find(picture)
+    assert found.classes == ("car",)
+    np.testing.assert_allclose(found.boxes, [[40.0, 40.0, 72.0, 72.0]], atol=1e-3)
+    small, scale, corner = letterboxed(np.full((50, 300, 3), 7, dtype=np.uint8), SIZE)
+    assert small.shape == (64, 96, 3)
+    np.testing.assert_allclose((scale, corner), [(0.32, 0.32), (0, 24)])
+    assert (small[24:40] == 7).all()
+    assert (small[:24] == MARGIN_GREY).all()
+    assert (small[40:] == MARGIN_GREY).all()
 
 
 def test_weights_that_do_not_fit_are_told_with_a_remedy(tmp_path: Path) -> None:

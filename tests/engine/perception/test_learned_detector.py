@@ -163,6 +163,7 @@ def test_own_weights_come_through_the_same_door(readings: Readings) -> None:
         ({"weights": str(ONNX)}, "need `classes: [...]` and `input_size: [width, height]`"),
         ({"weights": str(ONNX), "classes": ["cat"], "input_size": [96, 64]}, "none of `classes` is an object"),
         ({"classes": ["car"]}, "are for weights .onnx and .pt"),
+        ({"letterbox": True}, "are for weights .onnx and .pt"),
         ({"weights": str(ONNX), "classes": ["car"], "input_size": [96, 64]}, "fits no layout for 1 classes"),
         ({"confidence": 1.5}, "setting 'confidence' is 1.5"),
         ({"wieghts": "own.onnx"}, "did you mean 'weights'"),
