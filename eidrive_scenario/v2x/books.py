@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+
+from eidrive_scenario.v2x.hearings import Heard
 
 DISTANCE_BIN = 25.0
 """Width of the classes of distance between antennas in which receptions are counted [m]."""
@@ -52,25 +53,14 @@ class LinkStatistics:
 
 @dataclass(slots=True)
 class Book:
-    """What is written down as a link is used.
-
-    floors  ages of the newest information just after each update [s];  peaks  just before, from the second update on.
-            Age rises at slope 1 in between, so these say all of it
-    """
+    """What is written down of one link as it is used; what was heard stands in the Hearings of all links."""
 
     sent: int = 0
-    received: int = 0
     lost: int = 0
     bytes_sent: int = 0
-    delay_sum: float = 0.0
-    delay_max: float = 0.0
     lost_by: dict[str, int] = field(default_factory=dict)
     fates: dict[int, list[int]] = field(default_factory=dict)
     """By class of distance: how many fates are known, and how many of them are deliveries."""
-    newest: float | None = None
-    """When the newest information at the receiver was said [s]."""
-    peaks: array[float] = field(default_factory=lambda: array("d"))
-    floors: array[float] = field(default_factory=lambda: array("d"))
 
     def lose(self, reason: str, count: int = 1) -> None:
         """Messages were lost."""
@@ -83,57 +73,41 @@ class Book:
         known[0] += 1
         known[1] += delivered
 
-    def arrive(self, said: float, sent: float, arrived: float) -> None:
-        """A message was heard."""
-        self.received += 1
-        delay = arrived - sent
-        self.delay_sum += delay
-        if delay > self.delay_max:
-            self.delay_max = delay
-        newest = self.newest
-        if newest is None:
-            self.floors.append(arrived - said)
-            self.newest = said
-        elif said > newest:
-            self.peaks.append(arrived - newest)
-            self.floors.append(arrived - said)
-            self.newest = said
-
-    def statistics(self, now: float, busy_ratio: float | None = None) -> LinkStatistics:
-        """The books as they stand."""
-        mean_age, p95_age = self._ages(now)
+    def statistics(self, now: float, heard: Heard | None, busy_ratio: float | None = None) -> LinkStatistics:
+        """The books as they stand; `heard` is None where nothing was yet."""
+        received = 0 if heard is None else heard.received
+        mean_age, p95_age = (None, None) if heard is None else ages(heard, now)
         return LinkStatistics(
             sent=self.sent,
-            received=self.received,
+            received=received,
             lost=self.lost,
-            in_flight=self.sent - self.received - self.lost,
+            in_flight=self.sent - received - self.lost,
             bytes_sent=self.bytes_sent,
-            mean_delay=self.delay_sum / self.received if self.received else None,
-            max_delay=self.delay_max if self.received else None,
-            age=None if self.newest is None else now - self.newest,
+            mean_delay=None if heard is None else heard.delay_sum / received,
+            max_delay=None if heard is None else heard.delay_max,
+            age=None if heard is None else now - heard.newest,
             mean_age=mean_age,
-            peak_age=sum(self.peaks) / len(self.peaks) if self.peaks else None,
+            peak_age=sum(heard.peaks.tolist()) / len(heard.peaks) if heard is not None and len(heard.peaks) else None,
             p95_age=p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple((DISTANCE_BIN * place, known, kept) for place, (known, kept) in sorted(self.fates.items())),
             busy_ratio=busy_ratio,
         )
 
-    def _ages(self, now: float) -> tuple[float | None, float | None]:
-        """Mean and 95th percentile over the time since the first arrival [s], exactly; None before that.
 
-        The time spent below an age x is piecewise linear in x, and bends at floors and peaks.
-        """
-        if self.newest is None:
-            return None, None
-        floors = np.array(self.floors)
-        peaks = np.maximum(np.array([*self.peaks, now - self.newest]), floors)
-        span = float(np.sum(peaks - floors))
-        if span <= 0.0:
-            return None, None
-        levels = np.concatenate([floors, peaks])
-        order = np.argsort(levels, kind="stable")
-        at_once = np.cumsum(np.repeat([1.0, -1.0], len(floors))[order])
-        spent = np.concatenate([[0.0], np.cumsum(at_once[:-1] * np.diff(levels[order]))])
-        mean = float(np.sum(peaks**2 - floors**2)) / (2.0 * span)
-        return mean, float(np.interp(0.95 * spent[-1], spent, levels[order]))
+def ages(heard: Heard, now: float) -> tuple[float | None, float | None]:
+    """Mean and 95th percentile of the age over the time since the first arrival [s], exactly; None before that.
+
+    The time spent below an age x is piecewise linear in x, and bends at floors and peaks.
+    """
+    floors = heard.floors
+    peaks = np.maximum(np.append(heard.peaks, now - heard.newest), floors)
+    span = float(np.sum(peaks - floors))
+    if span <= 0.0:
+        return None, None
+    levels = np.concatenate([floors, peaks])
+    order = np.argsort(levels, kind="stable")
+    at_once = np.cumsum(np.repeat([1.0, -1.0], len(floors))[order])
+    spent = np.concatenate([[0.0], np.cumsum(at_once[:-1] * np.diff(levels[order]))])
+    mean = float(np.sum(peaks**2 - floors**2)) / (2.0 * span)
+    return mean, float(np.interp(0.95 * spent[-1], spent, levels[order]))

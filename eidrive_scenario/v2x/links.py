@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from eidrive_scenario.v2x.books import Book, LinkStatistics
+from eidrive_scenario.v2x.hearings import Entry, Hearings
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 
 TIME_TOLERANCE = 1e-9
 """Two instants nearer than this are one: sums of time steps do not meet exactly in floating point [s]."""
 
 __all__ = ["TIME_TOLERANCE", "LinkStatistics", "Links"]
-
-Entry = tuple[float, str, int, float, Received]
-"""Arrival, sender, number, sending, and what the receiver gets; several receivers may share one."""
 
 
 class Links:
@@ -26,6 +24,7 @@ class Links:
         self._queues: dict[str, list[Entry]] = {}
         self._books: dict[str, dict[str, Book]] = {}
         """By receiver and sender."""
+        self._hearings = Hearings()
 
     def book(self, sender: str, receiver: str) -> Book:
         """The book of a link, opened if there is none."""
@@ -89,10 +88,7 @@ class Links:
         else:
             queue[:] = [entry for entry in queue if entry[0] > latest or entry[3] > oldest]
         due.sort()
-        books = self._books.setdefault(receiver, {})
-        for arrives, sender, _, sent, received in due:
-            book = books.get(sender) or self.book(sender, receiver)
-            book.arrive(received.message.generated, sent, arrives)
+        self._hearings.take(receiver, due)
         return tuple([entry[4] for entry in due])
 
     def in_flight(self) -> int:
@@ -106,6 +102,12 @@ class Links:
 
         `busy_ratio` says how busy a station found the channel.
         """
+        heard = self._hearings.by_link()
         links = sorted((sender, receiver) for receiver, books in self._books.items() for sender in books)
         busy = {receiver: busy_ratio(receiver) for receiver in self._books}
-        return {link: self._books[link[1]][link[0]].statistics(now, busy[link[1]]) for link in links}
+        return {
+            (sender, receiver): self._books[receiver][sender].statistics(
+                now, heard.get((sender, receiver)), busy[receiver]
+            )
+            for sender, receiver in links
+        }

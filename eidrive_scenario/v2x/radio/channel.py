@@ -33,6 +33,7 @@ from eidrive_scenario.v2x.radio.sidelink import Sidelink
 from eidrive_scenario.v2x.surroundings import Surroundings
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 ABSENT = "absent"
 """The reason of loss where sender or receiver has left the world."""
@@ -71,6 +72,7 @@ class RadioChannel(LinkChannel):
         self._losses = LossDraws(profile.loss, seed)
         self._draws = LinkDraws(seed)
         self._rows: dict[str, int] = {}
+        self._listeners: dict[str, tuple[list[str], Rows]] = {}
         self._access = self._new_access(())
         self._ledger = Ledger(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
@@ -102,13 +104,18 @@ class RadioChannel(LinkChannel):
 
     def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
         self._advance(now)
+        senders = np.array([self._row(message.sender) for message, _ in outbox], dtype=np.int64)
+        numbers = np.array([message.number for message, _ in outbox], dtype=np.int64)
+        waits = self.profile.jitter * uniforms(self._jitter_keys[senders], numbers)
         offered = []
-        for message, receivers in outbox:
-            row = self._row(message.sender)
-            wait = self.profile.jitter * float(uniforms(self._jitter_keys[row : row + 1], message.number)[0])
+        for (message, receivers), row, wait in zip(outbox, senders.tolist(), waits.tolist(), strict=True):
             duration = self.profile.airtime(message.size)
             offered.append(Transmission(message, receivers, now, now + wait, duration))
-            self._ledger.send(row, self._rows_of(receivers), message.size)
+            rows = self._rows_of(message.sender, receivers)
+            if len(rows) < len(receivers):
+                missing = next(name for name in receivers if name not in self._rows)
+                raise ValueError(f"the radio was not told where {missing!r} is")
+            self._ledger.send(row, rows, message.size)
         self._access.offer(offered)
         return self.untold()
 
@@ -141,12 +148,13 @@ class RadioChannel(LinkChannel):
         self._told, self._dropped = [], []
         return told
 
-    def _rows_of(self, names: Sequence[str]) -> list[int]:
-        rows = self._rows
-        try:
-            return [rows[name] for name in names]
-        except KeyError as error:
-            raise ValueError(f"the radio was not told where {error.args[0]!r} is") from None
+    def _rows_of(self, sender: str, receivers: Sequence[str]) -> Rows:
+        """The rows of those among the receivers who are there; the same ones listen to a sender most of the time."""
+        held = self._listeners.get(sender)
+        if held is None or held[0] != list(receivers):
+            rows = np.array([self._rows[name] for name in receivers if name in self._rows], dtype=np.int64)
+            held = self._listeners[sender] = (list(receivers), rows)
+        return held[1]
 
     def _row(self, name: str) -> int:
         row = self._rows.get(name)
@@ -162,6 +170,7 @@ class RadioChannel(LinkChannel):
         self._open = [entry for entry in self._open if entry not in gone]
         self._access.on_air = [entry for entry in self._access.on_air if entry.message.sender in names]
         self._rows = {name: row for row, name in enumerate(names)}
+        self._listeners.clear()
         self._ledger = Ledger(names)
         own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
         self._keys = joined(own[:, None], own[None, :])
@@ -198,12 +207,11 @@ class RadioChannel(LinkChannel):
 
     def _drop(self, entry: Transmission) -> None:
         """A queue has thrown a message out."""
-        present = [name for name in entry.receivers if name in self._rows]
-        self._ledger.drop(self._rows[entry.message.sender], [self._rows[name] for name in present])
-        self._told.append(Dropped(entry, present))
-        for name in entry.receivers:
-            if name not in self._rows:
-                self._lose(entry, name, ABSENT)
+        message = entry.message
+        rows = self._rows_of(message.sender, entry.receivers)
+        self._ledger.drop(self._rows[message.sender], rows)
+        self._told.append(Dropped(entry, [self._access.names[row] for row in rows.tolist()]))
+        self._lose_absent(entry, rows)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Decide who hears the messages that have left the air, and put them on their way."""
@@ -211,14 +219,11 @@ class RadioChannel(LinkChannel):
         batch = Batch(ended, receptions, budget)
         plain = isinstance(self.profile.loss, NoLoss)
         for place, entry in enumerate(ended):
-            present = [self._rows[name] for name in entry.receivers if name in self._rows]
-            for name in entry.receivers:
-                if name not in self._rows:
-                    self._lose(entry, name, ABSENT)
-            if not plain:
-                present = self._spared(entry, present, receptions.causes[place], budget)
-            batch.receivers.append(np.array(present, dtype=np.int64))
-            self._carry(entry, place, batch, budget)
+            present = self._rows_of(entry.message.sender, entry.receivers)
+            self._lose_absent(entry, present)
+            batch.receivers.append(present if plain else self._spared(entry, present, receptions.causes[place], budget))
+        for place in sorted(range(len(ended)), key=lambda place: ended[place].end):
+            self._carry(ended[place], place, batch, budget)
         counts = [len(rows) for rows in batch.receivers]
         places, receivers = np.repeat(np.arange(len(ended)), counts), np.concatenate(batch.receivers)
         senders = receptions.senders[places]
@@ -243,11 +248,11 @@ class RadioChannel(LinkChannel):
             batch.arrivals[place, row] = arrives
             self._links.carry((arrives, message.sender, message.number, entry.sent, Received(message, arrives)), name)
 
-    def _spared(self, entry: Transmission, rows: Sequence[int], causes: NDArray[np.int8], budget: Budget) -> list[int]:
+    def _spared(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
         """Those among the receivers for whom the loss that comes on top of the radio does not strike."""
         spared = []
         sender = self._rows[entry.message.sender]
-        for row in rows:
+        for row in rows.tolist():
             distance = float(budget.distance[sender, row])
             reason = None
             if causes[row] == DELIVERED:
@@ -256,7 +261,13 @@ class RadioChannel(LinkChannel):
                 spared.append(row)
             else:
                 self._lose(entry, budget.names[row], reason, distance)
-        return spared
+        return np.array(spared, dtype=np.int64)
+
+    def _lose_absent(self, entry: Transmission, present: Rows) -> None:
+        if len(present) < len(entry.receivers):
+            for name in entry.receivers:
+                if name not in self._rows:
+                    self._lose(entry, name, ABSENT)
 
     def _lose(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
         """A message that was written down as sent is lost for a reason that the reception does not know."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.counter_draws import key, uniforms
+from eidrive_scenario.v2x.counter_draws import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import Access, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.congestion import Gate
 
@@ -35,11 +35,15 @@ class Csma(Access):
         """How many free slots the first message of each station waits for; NaN while it found no busy medium."""
         self._fixed = np.full(len(names), math.nan)
         """Starts that no later transmission delays any more [s]."""
+        self._keys = self._backoff_keys()
+
+    def _backoff_keys(self) -> Keys:
+        return np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)
 
     def starts(self) -> Array:
         met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
-        for row in np.flatnonzero(met_busy).tolist():
-            self._slots[row] = self._drawn(row)
+        if met_busy.any():
+            self._draw(np.flatnonzero(met_busy))
         waited = np.maximum(self.ready, self.free_from) + AIFS + self._slots * SLOT
         contending = np.where(np.isnan(self._slots), self.ready, waited)
         return np.where(np.isnan(self._fixed), contending, self._fixed)
@@ -59,10 +63,10 @@ class Csma(Access):
 
     def reorder(self, rows: Sequence[int | None]) -> None:
         self._slots, self._fixed = moved(self._slots, rows, math.nan), moved(self._fixed, rows, math.nan)
+        self._keys = self._backoff_keys()
 
-    def _drawn(self, row: int) -> float:
-        head = self._head[row]
-        assert head is not None
-        own = key(self._seed, "backoff", self.names[row])
-        drawn = float(uniforms(np.array([own], dtype=np.uint64), head.message.number)[0])
-        return math.floor(drawn * (CONTENTION_WINDOW + 1))
+    def _draw(self, rows: NDArray[np.int64]) -> None:
+        """How many free slots these stations wait for, anew for each message."""
+        heads = [self._head[row] for row in rows.tolist()]
+        numbers = np.array([head.message.number for head in heads if head is not None])
+        self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,20 +27,21 @@ class Ledger:
         self._causes = np.zeros((count, count, len(CAUSES)), dtype=np.int64)
         self._fates = np.zeros((count, count, _CLASSES, 2), dtype=np.int64)
 
-    def send(self, row: int, receivers: Sequence[int], size: int) -> None:
+    def send(self, row: int, receivers: Rows, size: int) -> None:
         """A message of `size` bytes was said."""
         self._sent[row, receivers] += 1
         self._bytes[row, receivers] += size
 
-    def drop(self, row: int, receivers: Sequence[int]) -> None:
+    def drop(self, row: int, receivers: Rows) -> None:
         """A message never went on the air."""
         self._causes[row, receivers, QUEUE] += 1
 
     def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
         """Fates of messages, one entry per message and receiver."""
-        np.add.at(self._causes, (senders, receivers, causes), 1)
+        link = senders * len(self.names) + receivers  # flat places: numpy counts at those ten times as fast
+        np.add.at(self._causes.reshape(-1), link * len(CAUSES) + causes, 1)
         place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
-        np.add.at(self._fates, (senders, receivers, place, (causes == DELIVERED).astype(np.int64)), 1)
+        np.add.at(self._fates.reshape(-1), 2 * (link * _CLASSES + place) + (causes == DELIVERED), 1)
 
     def write_into(self, links: Links) -> None:
         """Carry everything over into the books, and begin anew."""

@@ -1,0 +1,132 @@
+"""What was heard on every link: how much, how late, and how old it was; many messages are written down at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.message import Received
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int64]
+
+Entry = tuple[float, str, int, float, Received]
+"""Arrival, sender, number, sending, and what the receiver gets; several receivers may share one."""
+
+MOST_WAITING = 1 << 17
+"""So many messages are held at most before they are written down, as each holds what it says."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """Of one link: messages heard, their delays [s], when the newest information there was said [s], and its age.
+
+    floors  (U,) ages just after each update [s];  peaks  (U - 1,) just before each, from the second on. Age rises at
+            slope 1 in between, so these say all of it
+    """
+
+    received: int
+    delay_sum: float
+    delay_max: float
+    newest: float
+    floors: Array
+    peaks: Array
+
+
+class Hearings:
+    """Takes lists of messages as they are given out, and works them off together when somebody asks."""
+
+    def __init__(self) -> None:
+        self._codes: dict[str, dict[str, int]] = {}
+        """Places of the links in the arrays, by receiver and sender."""
+        self._count = 0
+        self._waiting: list[tuple[str, Sequence[Entry]]] = []
+        self._number = 0
+        self._received: Codes = np.zeros(0, dtype=np.int64)
+        self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
+        self._updates: list[tuple[Codes, Array, Array]] = []
+        """Link, age after and age before of what was newer than all before it; before the first, infinity."""
+
+    def take(self, receiver: str, entries: Sequence[Entry]) -> None:
+        """A receiver has heard these, in this order."""
+        self._waiting.append((receiver, entries))
+        self._number += len(entries)
+        if self._number > MOST_WAITING:
+            self._work_off()
+
+    def by_link(self) -> dict[tuple[str, str], Heard]:
+        """What was heard on each link, by (sender, receiver)."""
+        self._work_off()
+        codes, floors, peaks = (
+            (np.concatenate(column) for column in zip(*self._updates, strict=True))
+            if self._updates
+            else (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+        )
+        order = np.argsort(codes, kind="stable")
+        ends = np.cumsum(np.bincount(codes, minlength=self._count))[:-1]
+        floors_of, peaks_of = np.split(floors[order], ends), np.split(peaks[order], ends)
+        return {
+            (sender, receiver): Heard(
+                int(self._received[code]),
+                float(self._delay_sum[code]),
+                float(self._delay_max[code]),
+                float(self._newest[code]),
+                floors_of[code],
+                peaks_of[code][1:],
+            )
+            for receiver, senders in self._codes.items()
+            for sender, code in senders.items()
+        }
+
+    def _work_off(self) -> None:
+        if not self._waiting:
+            return
+        where: list[int] = []
+        for receiver, entries in self._waiting:
+            known = self._codes.setdefault(receiver, {})
+            for sender in {entry[1] for entry in entries} - known.keys():
+                known[sender] = self._count
+                self._count += 1
+            where += [known[entry[1]] for entry in entries]
+        heard = [entry for _, entries in self._waiting for entry in entries]
+        codes = np.array(where, dtype=np.int64)
+        said = np.array([entry[4].message.generated for entry in heard], dtype=float)
+        arrived = np.array([entry[0] for entry in heard], dtype=float)
+        delay = arrived - np.array([entry[3] for entry in heard], dtype=float)
+        self._waiting, self._number = [], 0
+        self._make_room()
+        np.add.at(self._received, codes, 1)
+        np.add.at(self._delay_sum, codes, delay)
+        np.maximum.at(self._delay_max, codes, delay)
+        self._note_ages(codes, said, arrived)
+
+    def _make_room(self) -> None:
+        more = self._count - len(self._received)
+        self._received = np.concatenate([self._received, np.zeros(more, dtype=np.int64)])
+        self._delay_sum, self._delay_max = (
+            np.concatenate([a, np.zeros(more)]) for a in (self._delay_sum, self._delay_max)
+        )
+        self._newest = np.concatenate([self._newest, np.full(more, -np.inf)])
+
+    def _note_ages(self, codes: Codes, said: Array, arrived: Array) -> None:
+        """Which messages told something newer than all before on their link, and how the age went then."""
+        order = np.argsort(codes, kind="stable")
+        codes, said, arrived = codes[order], said[order], arrived[order]
+        before = np.maximum(_largest_before(codes, said), self._newest[codes])
+        fresh = said > before
+        self._updates.append((codes[fresh], (arrived - said)[fresh], (arrived - before)[fresh]))
+        np.maximum.at(self._newest, codes, said)
+
+
+def _largest_before(groups: Codes, values: Array) -> Array:
+    """(K,) the largest of the earlier `values` of the same group; minus infinity for the first. Groups rise."""
+    levels, rank = np.unique(values, return_inverse=True)
+    base = groups * len(levels)
+    running = np.maximum.accumulate(base + rank)  # begins anew with each group, as its base is above all before
+    before = np.empty(len(values))
+    before[1:] = levels[(running - base)[:-1]]
+    before[np.diff(groups, prepend=-1) > 0] = -np.inf
+    return before
