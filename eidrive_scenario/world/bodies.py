@@ -1,17 +1,12 @@
-"""The bodies of the actors in pybullet: scripted ones are placed, driven ones move by the forces of their tyres.
-
-Each is one rigid box. pybullet's gravity and damping are off; it integrates the velocities and resolves collisions.
-"""
+"""The bodies of the actors in pybullet: one rigid box each; and those of scripted actors, which are placed."""
 
 from __future__ import annotations
 
 import math
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.dynamics import SingleTrack, VehicleParameters
-from eidrive_scenario.world.ground import GroundUnder
 
 RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
 """Groups of pybullet's collision filter; a ray belongs to the first by pybullet's default."""
@@ -34,6 +29,8 @@ class Body:
         self.handle = -1
         self.moved = True
         """Whether the last step changed its pose."""
+        self.stale = False
+        """Whether the rigid body is not yet where the actor is: pybullet hears of it when somebody asks pybullet."""
         self.yaw_rate = 0.0
         self.acceleration: Vector3 = (0.0, 0.0, 0.0)
         self._dt = dt
@@ -52,6 +49,15 @@ class Body:
         velocity, acceleration = self.velocity, self.acceleration
         return (self.x, self.y, self.z, self.yaw, self.pitch, self.roll, velocity[0], velocity[1], velocity[2],
                 acceleration[0], acceleration[1], acceleration[2], self.yaw_rate, self.speed)  # fmt: skip
+
+    @property
+    def travel(self) -> float:
+        """How far any part of it goes within a tick, if nothing hits it and it keeps its velocity [m]."""
+        raise NotImplementedError
+
+    def settle(self) -> None:
+        """Put the rigid body where the actor is."""
+        raise NotImplementedError
 
     def remove(self) -> None:
         """Take the body out of pybullet."""
@@ -124,9 +130,16 @@ class ScriptedBody(Body):
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
         super().__init__(client, spec, placement, dt)
         self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
-        self.stale = False
-        """Whether the rigid body is not yet where the actor is: pybullet hears of it when somebody asks pybullet."""
         self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+
+    @property
+    def travel(self) -> float:
+        """How far any part of it has been moved in the step that it was placed for [m]."""
+        if not self.moved:
+            return 0.0
+        x, y, z, yaw, pitch, _ = self._from
+        turn = abs(wrap_angle(self.yaw - yaw)) + abs(self.pitch - pitch)
+        return math.dist((x, y, z), (self.x, self.y, self.z)) + turn * 2.0 * self.radius
 
     def rest(self) -> None:
         """Stay for this step: no placement was given."""
@@ -159,10 +172,9 @@ class ScriptedBody(Body):
     def settle(self) -> None:
         """Put the rigid body where the actor is."""
         self.stale = False
-        here = {"physicsClientId": self.client}
         turn = quaternion(self.yaw, self.pitch, self.roll)
-        bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, **here)
-        bullet.resetBaseVelocity(self.handle, self.velocity, (0.0, 0.0, self.yaw_rate), **here)
+        bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, self.client)
+        bullet.resetBaseVelocity(self.handle, self.velocity, (0.0, 0.0, self.yaw_rate), self.client)
 
     def pass_through(self, share: float) -> None:
         """Put the rigid body on the way between its last and its next place, for a collision in between."""
@@ -173,103 +185,9 @@ class ScriptedBody(Body):
             roll + share * (self.roll - roll),
         )
         at = (x + share * (self.x - x), y + share * (self.y - y), z + share * (self.z - z))
-        here = {"physicsClientId": self.client}
-        bullet.resetBasePositionAndOrientation(self.handle, at, turn, **here)
+        bullet.resetBasePositionAndOrientation(self.handle, at, turn, self.client)
         moving = ((self.x - x) / self._dt, (self.y - y) / self._dt, (self.z - z) / self._dt)
-        bullet.resetBaseVelocity(self.handle, moving, (0.0, 0.0, self.yaw_rate), **here)
-
-
-class DrivenBody(Body):
-    """A vehicle that moves by pedals and steering, and by what hits it."""
-
-    def __init__(
-        self, client: int, spec: ActorSpec, placement: Placement, dt: float, step: float, ground: GroundUnder
-    ) -> None:
-        super().__init__(client, spec, placement, dt)
-        parameters = VehicleParameters.of(spec)
-        self.track = SingleTrack(parameters, step)
-        self._step = step
-        self._ground = ground
-        self._lever = self.track.to_rear
-        self._create(
-            (spec.offset[0] - self._lever, spec.offset[1], 0.0),
-            (self.x, self.y, self.z),
-            parameters.mass,
-            parameters.yaw_inertia,
-            DRIVEN,
-            SCRIPTED | DRIVEN | STATIC,
-        )
-        self.jump(placement)
-
-    def jump(self, placement: Placement) -> None:
-        """Stand there now, rolling straight ahead with the given speed; the ground gives height, pitch and roll."""
-        z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
-        self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
-        self.speed, self.yaw_rate, self.acceleration = placement.speed, 0.0, (0.0, 0.0, 0.0)
-        self.velocity = self.velocity_before = self._along_heading(placement.speed)
-        self.moved = True
-        self._settle(self.velocity, (0.0, 0.0, 0.0))
-
-    def drive(self, control: Control, friction: float) -> None:
-        """Give the rigid body the velocity with which it moves over the next physics step."""
-        here = {"physicsClientId": self.client}
-        _, (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(self.handle, **here)
-        (vx, vy, _), (_, _, turning) = bullet.getBaseVelocity(self.handle, **here)
-        cos, sin = 1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz)
-        scale = 1.0 / math.sqrt(cos * cos + sin * sin)
-        cos, sin = cos * scale, sin * scale
-        forward, left = vx * cos + vy * sin, vy * cos - vx * sin
-        ahead, aside, turn = self.track.advance(forward, left, turning, control, friction, self.pitch)
-        forward, left = forward + ahead, left + aside
-        rise = -math.tan(self.pitch) * forward if self.pitch else 0.0
-        velocity = (forward * cos - left * sin, forward * sin + left * cos, rise)
-        bullet.resetBaseVelocity(self.handle, velocity, (0.0, 0.0, turning + turn), **here)
-
-    def present_velocity(self) -> Vector3:
-        """Of the rigid body now, within a step [m/s]."""
-        velocity: Vector3 = bullet.getBaseVelocity(self.handle, physicsClientId=self.client)[0]
-        return velocity
-
-    def read_back(self) -> None:
-        """Take over pose and velocity from pybullet after a step, and set the body on the ground again."""
-        here = {"physicsClientId": self.client}
-        (x, y, z), (qx, qy, qz, qw) = bullet.getBasePositionAndOrientation(self.handle, **here)
-        (vx, vy, _), turning = bullet.getBaseVelocity(self.handle, **here)
-        yaw = math.atan2(2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qy * qy + qz * qz))
-        cos, sin = math.cos(yaw), math.sin(yaw)
-        rate = turning[2]
-        arm_x, arm_y, arm_z = self._arm(yaw)
-        x, y, z = x - arm_x, y - arm_y, z - arm_z
-        self.moved = (x, y, yaw) != (self.x, self.y, self.yaw)
-        height, pitch, roll = self._ground.at(x, y, yaw)
-        lifted = abs(z - height) > 1e-6
-        self._pose(x, y, height, yaw, pitch, roll)
-        self.yaw_rate = rate
-        level = vx * cos + vy * sin
-        self.speed = level / math.cos(pitch)
-        rise = -math.tan(pitch) * level
-        self._accelerate_to((vx + arm_y * rate, vy - arm_x * rate, rise))
-        if pitch or roll or lifted or qx or qy:
-            self._settle((vx, vy, rise), (0.0, 0.0, rate))
-
-    def _settle(self, velocity: Vector3, turning: Vector3) -> None:
-        """Put the rigid body where the actor is."""
-        here = {"physicsClientId": self.client}
-        arm_x, arm_y, arm_z = self._arm(self.yaw)
-        at = (self.x + arm_x, self.y + arm_y, self.z + arm_z)
-        turn = quaternion(self.yaw, self.pitch, self.roll)
-        bullet.resetBasePositionAndOrientation(self.handle, at, turn, **here)
-        bullet.resetBaseVelocity(self.handle, velocity, turning, **here)
-
-    def _arm(self, yaw: float) -> Vector3:
-        """From the reference point to the centre of gravity, at half the height of the box, in the world [m]."""
-        lever, height = self._lever, self.spec.offset[2]
-        cy, sy = math.cos(yaw), math.sin(yaw)
-        if self.pitch == 0.0 and self.roll == 0.0:
-            return lever * cy, lever * sy, height
-        cp, sp, cr, sr = math.cos(self.pitch), math.sin(self.pitch), math.cos(self.roll), math.sin(self.roll)
-        ahead, aside = lever * cp + height * sp * cr, -height * sr
-        return cy * ahead - sy * aside, sy * ahead + cy * aside, height * cp * cr - lever * sp
+        bullet.resetBaseVelocity(self.handle, moving, (0.0, 0.0, self.yaw_rate), self.client)
 
 
 def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:

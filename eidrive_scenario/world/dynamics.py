@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -119,6 +120,23 @@ def _number(spec: ActorSpec, name: str, default: float, *, zero: bool = False, b
     return value
 
 
+class Demand(NamedTuple):
+    """What driver, road and slope ask of a vehicle for some steps, worked out beforehand."""
+
+    steering: float
+    """Where the front wheels shall turn to [rad]."""
+    throttle: float
+    brake: float
+    """Force of the brakes, as far as the grip allows [N]."""
+    direction: float
+    """1 forwards, -1 backwards."""
+    grip_front: float
+    grip_rear: float
+    """Largest forces of the tyres [N]."""
+    slope: float
+    """Force of the slope along the vehicle [N]."""
+
+
 class SingleTrack:
     """The forces on one vehicle, turned into the change of its velocities over short steps of `step` seconds.
 
@@ -133,76 +151,104 @@ class SingleTrack:
         """Present angle of the front wheels [rad]."""
         self.to_front = (1.0 - p.weight_front) * p.wheelbase
         self.to_rear = p.weight_front * p.wheelbase
-        self._step = step
+        self._cos, self._sin = 1.0, 0.0
+        self._turn = p.steering_rate * step
         self._load_front = p.mass * GRAVITY * p.weight_front
         self._load_rear = p.mass * GRAVITY * (1.0 - p.weight_front)
+        self._drag = 0.5 * AIR_DENSITY * p.drag_area
+        self._rolling = p.rolling_resistance * p.mass * GRAVITY
+        self._full_drive = p.mass * p.max_acceleration
+        self._full_brake = p.mass * p.max_deceleration
+        self._stop = p.mass / step
+        """Force that ends a speed within a step [N s/m]."""
+        self._per_mass = step / p.mass
+        self._per_inertia = step / p.yaw_inertia
         inertia_front = 1.0 / (1.0 / p.mass + self.to_front**2 / p.yaw_inertia)
         inertia_rear = 1.0 / (1.0 / p.mass + self.to_rear**2 / p.yaw_inertia)
         self._slowest_front = step * p.cornering_stiffness_front / inertia_front
         self._slowest_rear = step * p.cornering_stiffness_rear / inertia_rear
 
-    def advance(
-        self, forward: float, left: float, yaw_rate: float, control: Control, friction: float, pitch: float
-    ) -> tuple[float, float, float]:
-        """Changes of the velocities forward and to the left [m/s] and of the yaw rate [rad/s] over one step.
-
-        The velocities are those of the centre of gravity in the vehicle's axes; `friction` scales the tyres' grip,
-        `pitch` (positive nose down) is the road's, whose slope pulls the vehicle.
-        """
-        p, step = self.parameters, self._step
-        turn = p.steering_rate * step
-        wanted = min(max(control.steering, -p.max_steering), p.max_steering)
-        self.steering += min(max(wanted - self.steering, -turn), turn)
+    def demand(self, control: Control, friction: float, pitch: float) -> Demand:
+        """What a control asks for; `friction` scales the tyres' grip, `pitch` (positive nose down) is the road's,
+        whose slope pulls the vehicle."""
+        p = self.parameters
         grip = p.tyre_friction * friction
         grip_front, grip_rear = grip * self._load_front, grip * self._load_rear
-        along_front, along_rear, free = self._longitudinal(forward, control, grip_front, grip_rear, pitch)
-
-        cos, sin = math.cos(self.steering), math.sin(self.steering)
-        side = left + self.to_front * yaw_rate
-        rolling, slipping = forward * cos + side * sin, side * cos - forward * sin
-        slip = slipping / max(abs(rolling), self._slowest_front)
-        side_front = -_fiala(slip, p.cornering_stiffness_front, _left_by(grip_front, along_front))
-        slipping = left - self.to_rear * yaw_rate
-        slip = slipping / max(abs(forward), self._slowest_rear)
-        side_rear = -_fiala(slip, p.cornering_stiffness_rear, _left_by(grip_rear, along_rear))
-
-        across_front = side_front * cos + along_front * sin
-        force = along_front * cos - side_front * sin + along_rear + free
-        moment = self.to_front * across_front - self.to_rear * side_rear
-        return (
-            step * force / p.mass,
-            step * (across_front + side_rear) / p.mass,
-            step * moment / p.yaw_inertia,
+        brake = min(max(control.brake, 0.0), 1.0) * self._full_brake
+        return Demand(
+            steering=_limited(control.steering, p.max_steering),
+            throttle=min(max(control.throttle, 0.0), 1.0),
+            brake=min(brake, LONGITUDINAL_SHARE * (grip_front + grip_rear)),
+            direction=-1.0 if control.reverse else 1.0,
+            grip_front=grip_front,
+            grip_rear=grip_rear,
+            slope=p.mass * GRAVITY * math.sin(pitch),
         )
 
-    def _longitudinal(
-        self, forward: float, control: Control, grip_front: float, grip_rear: float, pitch: float
-    ) -> tuple[float, float, float]:
+    def advance(self, forward: float, left: float, yaw_rate: float, demand: Demand) -> tuple[float, float, float]:
+        """Velocities forward and to the left [m/s] and yaw rate [rad/s] after one step.
+
+        The velocities are those of the centre of gravity in the vehicle's axes, those of the beginning of the step.
+        """
+        p = self.parameters
+        if self.steering != demand.steering:
+            self._steer(demand.steering)
+        along_front, along_rear, free = self._longitudinal(forward, demand)
+        cos, sin, to_front, to_rear = self._cos, self._sin, self.to_front, self.to_rear
+
+        side = left + to_front * yaw_rate
+        rolling, slipping = abs(forward * cos + side * sin), side * cos - forward * sin
+        slip = slipping / (rolling if rolling > self._slowest_front else self._slowest_front)
+        side_front = _fiala(slip, p.cornering_stiffness_front, _left_by(demand.grip_front, along_front))
+        rolling, slipping = abs(forward), left - to_rear * yaw_rate
+        slip = slipping / (rolling if rolling > self._slowest_rear else self._slowest_rear)
+        side_rear = _fiala(slip, p.cornering_stiffness_rear, _left_by(demand.grip_rear, along_rear))
+
+        across_front = along_front * sin - side_front * cos
+        force = along_front * cos + side_front * sin + along_rear + free
+        return (
+            forward + force * self._per_mass,
+            left + (across_front - side_rear) * self._per_mass,
+            yaw_rate + (to_front * across_front + to_rear * side_rear) * self._per_inertia,
+        )
+
+    def _steer(self, wanted: float) -> None:
+        missing = wanted - self.steering
+        self.steering = wanted if abs(missing) <= self._turn else self.steering + math.copysign(self._turn, missing)
+        self._cos, self._sin = math.cos(self.steering), math.sin(self.steering)
+
+    def _longitudinal(self, forward: float, demand: Demand) -> tuple[float, float, float]:
         """Forces along the wheels at the front and the rear axle, and those that need no tyre [N]."""
         p = self.parameters
-        free = p.mass * GRAVITY * math.sin(pitch) - 0.5 * AIR_DENSITY * p.drag_area * forward * abs(forward)
-        direction = -1.0 if control.reverse else 1.0
-        ahead = direction * forward
-        drive = min(max(control.throttle, 0.0), 1.0) * min(p.mass * p.max_acceleration, p.power / max(ahead, 0.1))
-        drive = direction * min(drive, max(p.mass * (p.max_speed - ahead) / self._step - direction * free, 0.0))
-        drive_front = _limited(drive * p.drive_front, LONGITUDINAL_SHARE * grip_front)
-        drive_rear = _limited(drive * (1.0 - p.drive_front), LONGITUDINAL_SHARE * grip_rear)
+        free = demand.slope - self._drag * forward * abs(forward)
+        traction_front = LONGITUDINAL_SHARE * demand.grip_front
+        traction_rear = LONGITUDINAL_SHARE * demand.grip_rear
+        front = rear = 0.0
+        if demand.throttle > 0.0:
+            direction = demand.direction
+            ahead = direction * forward
+            drive = demand.throttle * min(self._full_drive, p.power / max(ahead, 0.1))
+            drive = direction * min(drive, max(self._stop * (p.max_speed - ahead) - direction * free, 0.0))
+            front = _limited(drive * p.drive_front, traction_front)
+            rear = _limited(drive * (1.0 - p.drive_front), traction_rear)
         # Brakes and rolling resistance stop the vehicle and hold it; they never push it.
-        to_rest = p.mass * forward / self._step + free + drive_front + drive_rear
-        rolling = _limited(to_rest, p.rolling_resistance * p.mass * GRAVITY)
-        brake = min(max(control.brake, 0.0), 1.0) * p.mass * p.max_deceleration
-        brake = _limited(to_rest - rolling, min(brake, LONGITUDINAL_SHARE * (grip_front + grip_rear)))
-        return (
-            _limited(drive_front - brake * p.weight_front, LONGITUDINAL_SHARE * grip_front),
-            _limited(drive_rear - brake * (1.0 - p.weight_front), LONGITUDINAL_SHARE * grip_rear),
-            free - rolling,
-        )
+        to_rest = self._stop * forward + free + front + rear
+        rolling = _limited(to_rest, self._rolling)
+        if demand.brake > 0.0:
+            brake = _limited(to_rest - rolling, demand.brake)
+            front = _limited(front - brake * p.weight_front, traction_front)
+            rear = _limited(rear - brake * (1.0 - p.weight_front), traction_rear)
+        return front, rear, free - rolling
 
 
 def _fiala(slip: float, stiffness: float, largest: float) -> float:
-    """Side force of an axle [N] at a tangent of its slip angle, saturating at `largest`."""
-    used = stiffness * abs(slip) / (3.0 * largest)
-    return math.copysign(largest if used >= 1.0 else largest * (1.0 - (1.0 - used) ** 3), slip)
+    """Side force of an axle [N] at a tangent of its slip angle, saturating at `largest`, in the slip's direction."""
+    used = stiffness * slip / (3.0 * largest)
+    if used >= 1.0:
+        return largest
+    if used <= -1.0:
+        return -largest
+    return largest * used * (3.0 - abs(used) * (3.0 - abs(used)))
 
 
 def _left_by(grip: float, along: float) -> float:
@@ -210,4 +256,4 @@ def _left_by(grip: float, along: float) -> float:
 
 
 def _limited(value: float, bound: float) -> float:
-    return min(max(value, -bound), bound)
+    return bound if value > bound else -bound if value < -bound else value

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Control, Vector3
-from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
+from eidrive_scenario.world.bodies import Body, ScriptedBody
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.contacts import Touch, relative_speed
+from eidrive_scenario.world.driven_body import DrivenBody
+from eidrive_scenario.world.dynamics import Demand
 from eidrive_scenario.world.scenery import Scenery
 
 Touches = dict[tuple[str, str], Touch]
@@ -17,6 +20,10 @@ Touches = dict[tuple[str, str], Touch]
 _ROLL = Control()
 _BLOW = 20.0
 """Speed that a collision may add within a tick, as far as the search for neighbours goes [m/s]."""
+_HARDEST = 20.0
+"""Acceleration of any part of a vehicle that nothing hits, at most [m/s²]."""
+_MARGIN = 0.1
+"""pybullet deals with bodies that are nearer than twice its collision margin of 4 cm [m]."""
 
 
 def substeps_per_tick(dt: float, physics_rate: float) -> int:
@@ -30,7 +37,8 @@ def substeps_per_tick(dt: float, physics_rate: float) -> int:
 
 
 class Physics:
-    """Steps one pybullet client. Bodies that nothing can reach within a tick cost nothing in its steps."""
+    """Steps one pybullet client. Only driven bodies that may meet something within the tick move in pybullet; there
+    what else can hit them, or be hit, moves with them."""
 
     def __init__(self, client: int, scenery: Scenery, dt: float, substeps: int) -> None:
         self.step = dt / substeps
@@ -39,9 +47,22 @@ class Physics:
         self._scenery = scenery
         self._dt = dt
         self._substeps = substeps
+        self._slack = _MARGIN + 0.5 * _HARDEST * dt * dt
+        self._searchable = False
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=self.step, deterministicOverlappingPairs=1, physicsClientId=client
         )
+
+    def changed(self) -> None:
+        """Bodies were put in or taken out, or moved."""
+        self._searchable = False
+
+    def refresh(self, bodies: Iterable[Body]) -> None:
+        """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
+        if not self._searchable:
+            _settle(bodies)
+            bullet.performCollisionDetection(self._client)
+            self._searchable = True
 
     def tick(
         self,
@@ -51,33 +72,59 @@ class Physics:
         friction: float,
     ) -> Touches:
         """All steps of one tick, the scripted bodies being at their new places; returns what pybullet resolved."""
-        pedals = [(body, controls.get(name, _ROLL)) for name, body in driven.items()]
+        self.changed()
+        if not driven:
+            return {}
+        demands = {name: body.demand(controls.get(name, _ROLL), friction) for name, body in driven.items()}
         passing, watched = self._within_reach(bodies, driven)
-        owners = {body.handle: (row, body) for row, body in enumerate(bodies.values())} if watched else {}
         touches: Touches = {}
+        if watched:
+            _settle(bodies.values())
+            self._step_through(bodies, passing, watched, demands, touches)
+        for name, body in driven.items():
+            if name not in watched:
+                body.roll_on(demands[name], self._substeps)
+        if watched:
+            self.refresh(bodies.values())
+        return touches
+
+    def _step_through(
+        self,
+        bodies: Mapping[str, Body],
+        passing: Sequence[ScriptedBody],
+        watched: Mapping[str, DrivenBody],
+        demands: Mapping[str, Demand],
+        touches: Touches,
+    ) -> None:
+        """The steps in pybullet."""
+        owners = {body.handle: (row, body) for row, body in enumerate(bodies.values())}
         for number in range(self._substeps):
             for scripted in passing:
                 scripted.pass_through(number / self._substeps)
-            for body, control in pedals:
-                body.drive(control, friction)
-            before = {body.handle: body.present_velocity() for body in watched}
-            bullet.stepSimulation(physicsClientId=self._client)
-            for body in watched:
+            for name, body in watched.items():
+                body.drive(demands[name])
+            before = {body.handle: body.present_velocity() for body in watched.values()}
+            bullet.stepSimulation(self._client)
+            for body in watched.values():
                 self._note_touches(body, owners, before, touches)
         for scripted in passing:
             scripted.settle()
-        for body, _ in pedals:
+        for body in watched.values():
             body.read_back()
-        bullet.performCollisionDetection(physicsClientId=self._client)
-        return touches
 
     def _within_reach(
         self, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
-    ) -> tuple[list[ScriptedBody], list[DrivenBody]]:
-        """Scripted bodies that move near a driven one, and the driven ones near any other body or a building."""
+    ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
+        """Scripted bodies that move near a driven one, and the driven ones near any other body or a building.
+
+        Nobody is, unless any two may meet; where they may, a blow can send them on to others.
+        """
         passing: dict[str, ScriptedBody] = {}
-        watched: list[DrivenBody] = []
-        reaches = {name: self._reach(body) for name, body in bodies.items()}
+        watched: dict[str, DrivenBody] = {}
+        travels = {name: body.travel + self._slack for name, body in bodies.items()}
+        if not any(self._may_meet(body, bodies, travels) for body in driven.values()):
+            return [], watched
+        reaches = {name: body.radius + travels[name] + _BLOW * self._dt for name, body in bodies.items()}
         for name, body in driven.items():
             x, y, own = body.centre_x, body.centre_y, reaches[name]
             near = self._scenery.near(x, y, own)
@@ -88,13 +135,20 @@ class Physics:
                     if isinstance(other, ScriptedBody) and other.moved:
                         passing[other_name] = other
             if near:
-                watched.append(body)
+                watched[name] = body
         return list(passing.values()), watched
 
-    def _reach(self, body: Body) -> float:
-        """How far any part of a body can be from its centre during a tick [m]."""
-        vx, vy, _ = body.velocity
-        return body.radius + (abs(vx) + abs(vy) + _BLOW) * self._dt + 1.0
+    def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
+        """Whether a driven body may touch anything in this tick."""
+        x, y, radius, own = body.centre_x, body.centre_y, body.radius, travels[body.name]
+        if self._scenery.near(x, y, radius + own):
+            return True
+        for name, other in bodies.items():
+            way = own + travels[name]
+            dx, dy, reach = other.centre_x - x, other.centre_y - y, radius + other.radius + way
+            if dx * dx + dy * dy <= reach * reach and other is not body and box_distance(body.box, other.box) <= way:
+                return True
+        return False
 
     def _note_touches(
         self,
@@ -119,3 +173,9 @@ class Physics:
             if pair not in touches:
                 speed = relative_speed(before[body.handle], before.get(handle, other.velocity))
                 touches[pair] = Touch(position, speed)
+
+
+def _settle(bodies: Iterable[Body]) -> None:
+    for body in bodies:
+        if body.stale:
+            body.settle()

@@ -14,10 +14,11 @@ from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.appearance import Appearance
-from eidrive_scenario.world.bodies import Body, DrivenBody, ScriptedBody
+from eidrive_scenario.world.bodies import Body, ScriptedBody
 from eidrive_scenario.world.bullet import bullet, connect
 from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
 from eidrive_scenario.world.contacts import ContactTracker
+from eidrive_scenario.world.driven_body import DrivenBody
 from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
@@ -78,7 +79,6 @@ class World:
         self._in_order: list[Body] = []
         self._cast: _Cast | None = None
         self._row_of_handle = np.empty(0, dtype=np.int64)
-        self._broadphase_fresh = False
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
@@ -197,13 +197,9 @@ class World:
                     body.place(placement)
             elif placement is not None:
                 self._driven[name].jump(placement)
-        touches = {}
-        if self._driven:
-            self._settle()
-            touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
+        touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._broadphase_fresh = bool(self._driven)
         self._contacts = self._tracker.update(self._in_order, touches)
 
     def view(self) -> WorldView:
@@ -302,7 +298,7 @@ class World:
     def _changed(self) -> None:
         """Somebody entered or left: what was prepared for the former actors is void."""
         self._view = self._cast = None
-        self._broadphase_fresh = False
+        self._physics.changed()
         self._in_order = list(self._bodies.values())
         self._rows = {name: row for row, name in enumerate(self._bodies)}
         highest = max([self._scenery.highest_handle, *(body.handle for body in self._in_order)])
@@ -319,18 +315,9 @@ class World:
         self._cast = _Cast(names, categories, dict(self._rows), size, offset)
         return self._cast
 
-    def _settle(self) -> None:
-        """Put the rigid bodies of scripted actors where these are."""
-        for body in self._in_order:
-            if isinstance(body, ScriptedBody) and body.stale:
-                body.settle()
-
     def _refresh(self) -> None:
-        """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
+        """Make what rays meet, and have it where the actors are."""
         raised = self._scenery.raise_ground()
         if self._scenery.raise_obstacles() or raised:
             self._changed()
-        if not self._broadphase_fresh:
-            self._settle()
-            bullet.performCollisionDetection(physicsClientId=self._client)
-            self._broadphase_fresh = True
+        self._physics.refresh(self._in_order)

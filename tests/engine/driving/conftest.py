@@ -51,12 +51,12 @@ class Vehicle:
 
     def drive(self, control: Control) -> None:
         step, rear = self.dt / SUBSTEPS, self.model.to_rear
+        demand = self.model.demand(control, 1.0, 0.0)
         for _ in range(SUBSTEPS):
-            change = self.model.advance(self.speed, self.left, self.yaw_rate, control, 1.0, 0.0)
             forward, left, rate = self.speed, self.left, self.yaw_rate
-            self.speed += change[0] + left * rate * step
-            self.left += change[1] - forward * rate * step
-            self.yaw_rate += change[2]
+            self.speed, self.left, self.yaw_rate = self.model.advance(forward, left, rate, demand)
+            self.speed += left * rate * step
+            self.left -= forward * rate * step
             aside = self.left - rear * self.yaw_rate
             self.x += step * (math.cos(self.yaw) * self.speed - math.sin(self.yaw) * aside)
             self.y += step * (math.sin(self.yaw) * self.speed + math.cos(self.yaw) * aside)

@@ -1,0 +1,100 @@
+"""Driven cars that nothing can touch move without pybullet: as they would with it, and as long as nothing can."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.bodies import Body, ScriptedBody
+from eidrive_scenario.world.driven_body import DrivenBody
+from eidrive_scenario.world.physics import Physics
+
+CarFactory = Callable[..., ActorSpec]
+
+HILL = """<OpenDRIVE>
+  <header revMajor="1" revMinor="6" name="" version="1.0"/>
+  <road name="" length="400" id="1" junction="-1">
+    <planView><geometry s="0" x="0" y="0" hdg="0.4" length="400"><line/></geometry></planView>
+    <elevationProfile><elevation s="0" a="1" b="0.04" c="0.0005" d="0"/></elevationProfile>
+    <lateralProfile><superelevation s="0" a="0.03" b="0" c="0" d="0"/></lateralProfile>
+    <lanes><laneSection s="0">
+      <center><lane id="0" type="none" level="false"/></center>
+      <right>
+        <lane id="-1" type="driving" level="false"><width sOffset="0" a="30" b="0" c="0" d="0"/></lane>
+      </right>
+    </laneSection></lanes>
+  </road>
+</OpenDRIVE>"""
+
+
+def wild_ride(tick: int) -> Control:
+    """Throttle, curves to both sides, a full brake, reverse."""
+    if tick < 60:
+        return Control(throttle=0.8, steering=0.05 * math.sin(0.3 * tick))
+    if tick < 120:
+        return Control(throttle=0.2, steering=0.4)
+    if tick < 180:
+        return Control(brake=0.9, steering=-0.3)
+    return Control(throttle=0.5, steering=0.5, reverse=True)
+
+
+def watch_all(
+    physics: Physics, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
+) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
+    return [], dict(driven)
+
+
+def ride(spec: ActorSpec, roads: RoadNetwork | None) -> np.ndarray:
+    """(ticks, 14) all that the view says of the car."""
+    rows = []
+    with World(roads, dt=0.05) as world:
+        world.add(spec, Placement(12.0, -4.0, yaw=0.6, speed=3.0), driven=True)
+        for tick in range(240):
+            world.step({}, {spec.name: wild_ride(tick)})
+            view = world.view()
+            angles = (view.yaw[0], view.pitch[0], view.roll[0], view.yaw_rate[0], view.speed[0])
+            rows.append([*view.position[0], *view.velocity[0], *view.acceleration[0], *angles])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("hilly", [False, True])
+def test_the_same_with_and_without_pybullet(car: CarFactory, hilly: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    roads = RoadNetwork.parse(HILL) if hilly else None
+    without = ride(car(), roads)
+    monkeypatch.setattr(Physics, "_within_reach", watch_all)
+    inside = ride(car(), roads)
+    assert np.ptp(without[:, 9]) > math.pi
+    # pybullet turns a body that leans on a slope by the gyroscopic moment of its made-up inertia, some 1e-6 rad a step.
+    assert without == pytest.approx(inside, abs=1e-3 if hilly else 1e-9)
+
+
+def test_nobody_is_watched_but_near_others(car: CarFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    watched: list[bool] = []
+    find = Physics._within_reach
+
+    def noted(
+        physics: Physics, bodies: Mapping[str, Body], driven: Mapping[str, DrivenBody]
+    ) -> tuple[list[ScriptedBody], dict[str, DrivenBody]]:
+        found = find(physics, bodies, driven)
+        watched.append(bool(found[1]))
+        return found
+
+    monkeypatch.setattr(Physics, "_within_reach", noted)
+    gaps = []
+    with World(dt=0.05) as world:
+        world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0), driven=True)
+        world.add(car("Parked"), Placement(60.0, 2.6))
+        for _ in range(200):
+            gaps.append(world.distance("Ego", "Parked"))
+            world.step({}, {"Ego": Control(throttle=0.1)})
+        assert world.view().contacts == ()
+    # 0.8 m lie between them as the one passes the other, at half a metre a tick.
+    assert min(gaps) == pytest.approx(0.8)
+    assert all(seen for gap, seen in zip(gaps, watched, strict=True) if gap <= 0.81)
+    assert not any(seen for gap, seen in zip(gaps, watched, strict=True) if gap > 1.2)
