@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.sensing.crossing import crossing, past_box
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
 from eidrive_scenario.sensing.settings import LidarSettings
-from eidrive_scenario.sensing.truth import crossing, past_box
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather

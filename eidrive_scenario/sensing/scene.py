@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
+Point = tuple[float, float, float]
 
 NOTHING = -2
 """In RayHits.rows: the ray met nothing. -1 is the ground, the road or a building."""
@@ -42,6 +43,9 @@ class Scene(Protocol):
 
     def cast(self, origins: Array, targets: Array) -> RayHits:
         """Rays from (M, 3) to (M, 3) [m]."""
+
+    def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
+        """The same rows as of `cast`, for a few rays in plain numbers."""
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """The light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""

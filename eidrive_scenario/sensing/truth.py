@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.sensing.crossing import few_past_box, past_box
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
-from eidrive_scenario.sensing.scene import NOTHING, Scene
+from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
 from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
@@ -26,8 +27,8 @@ SAMPLES = np.array(
 )
 """(10, 3) points of a box, in half lengths from its centre: eight corners, the centre, the middle of the top."""
 
-BEYOND_OWN_BODY = 1e-3
-"""A ray that leaves the own body starts this share of its length behind it."""
+FEW_PAIRS, FEW_RAYS = 64, 80
+"""Up to so many pairs of a sensor and an actor, and so many rays, plain numbers are faster than arrays."""
 
 
 class TruthSensor:
@@ -46,39 +47,45 @@ def read_truth(
     sensors: Sequence[TruthSensor], rows: Sequence[int], scene: Scene, view: WorldView
 ) -> list[TruthReading]:
     """What each sensor sees from the actor in its row; all rays of all sensors go out in one batch."""
-    boxes = view.boxes
-    own = np.asarray(rows, dtype=np.intp)
+    if not sensors:
+        return []
     unseen = [view.rows[name] for name in view.unseen if name in view.rows]
-    sensor_of, target_of = _candidates(sensors, own, boxes, unseen)
-    visibility = np.empty(0)
-    if len(sensor_of):
-        visibility = _visibility(sensors, own, sensor_of, target_of, boxes, scene, view)
-    readings = []
-    for index, sensor in enumerate(sensors):
-        mine = sensor_of == index
-        share = visibility[mine]
-        seen = share >= sensor.settings.visibility - 1e-9
-        found = target_of[mine][seen]
-        readings.append(
-            TruthReading(
-                names=tuple(view.names[row] for row in found),
-                categories=tuple(view.categories[row] for row in found),
-                boxes=boxes[found],
-                velocity=view.velocity[found, :2],
-                visibility=share[seen],
-            )
-        )
+    look = few_candidates if len(sensors) * len(view.names) <= FEW_PAIRS else candidates
+    targets = look(sensors, rows, view, unseen)
+    shares: Sequence[float] = ()
+    if any(targets):
+        few = sum(map(len, targets)) * len(SAMPLES) <= FEW_RAYS
+        shares = (few_visibilities if few else visibilities)(sensors, rows, targets, scene, view)
+    readings, start = [], 0
+    for sensor, found in zip(sensors, targets, strict=True):
+        least = sensor.settings.visibility - 1e-9
+        pairs = zip(found, shares[start : start + len(found)], strict=True)
+        readings.append(_reading(view, [(row, share) for row, share in pairs if share >= least]))
+        start += len(found)
     return readings
 
 
-def _candidates(
-    sensors: Sequence[TruthSensor], own: NDArray[np.intp], boxes: Array, unseen: Sequence[int]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs (sensor, row of an object) within range and field of view, the own body and unseen ones left out."""
-    offset = boxes[None, :, :3] - boxes[own, None, :3]
+def _reading(view: WorldView, seen: Sequence[tuple[int, float]]) -> TruthReading:
+    rows = np.array([row for row, _ in seen], dtype=np.intp)
+    return TruthReading(
+        names=tuple([view.names[row] for row, _ in seen]),
+        categories=tuple([view.categories[row] for row, _ in seen]),
+        boxes=view.boxes[rows],
+        velocity=view.velocity[rows][:, :2],
+        visibility=np.array([share for _, share in seen]),
+    )
+
+
+def candidates(
+    sensors: Sequence[TruthSensor], own: Sequence[int], view: WorldView, unseen: Sequence[int]
+) -> list[list[int]]:
+    """For each sensor the rows of objects within range and field of view, but for the own body and unseen ones."""
+    boxes = view.boxes
+    stations = np.asarray(own, dtype=np.intp)
+    offset = boxes[None, :, :3] - boxes[stations, None, :3]
     reach = np.array([sensor.settings.range for sensor in sensors])
     near = np.einsum("sni,sni->sn", offset, offset) <= (reach * reach)[:, None]
-    near[np.arange(len(own)), own] = False
+    near[np.arange(len(stations)), stations] = False
     near[:, unseen] = False
     for index, sensor in enumerate(sensors):
         if sensor.half_field < math.pi:
@@ -86,28 +93,68 @@ def _candidates(
             ahead = math.cos(heading) * offset[index, :, 0] + math.sin(heading) * offset[index, :, 1]
             aside = math.cos(heading) * offset[index, :, 1] - math.sin(heading) * offset[index, :, 0]
             near[index] &= np.abs(np.arctan2(aside, ahead)) <= sensor.half_field
-    pairs = np.nonzero(near)
-    return pairs[0], pairs[1]
+    return [np.flatnonzero(row).tolist() for row in near]
 
 
-def _visibility(
-    sensors: Sequence[TruthSensor],
-    own: NDArray[np.intp],
-    sensor_of: NDArray[np.intp],
-    target_of: NDArray[np.intp],
-    boxes: Array,
-    scene: Scene,
-    view: WorldView,
-) -> Array:
-    """(P,) share of each object's sampled points that are in sight of its sensor."""
+def few_candidates(
+    sensors: Sequence[TruthSensor], own: Sequence[int], view: WorldView, unseen: Sequence[int]
+) -> list[list[int]]:
+    """The same as `candidates` in plain numbers."""
+    boxes = view.boxes.tolist()
+    found: list[list[int]] = []
+    for sensor, station in zip(sensors, own, strict=True):
+        x, y, z, *_, yaw = boxes[station]
+        square = sensor.settings.range**2
+        narrow = sensor.half_field < math.pi
+        cos, sin = math.cos(yaw + sensor.mounting.yaw), math.sin(yaw + sensor.mounting.yaw)
+        rows: list[int] = []
+        for row, box in enumerate(boxes):
+            dx, dy, dz = box[0] - x, box[1] - y, box[2] - z
+            if row == station or row in unseen or dx * dx + dy * dy + dz * dz > square:
+                continue
+            if narrow and abs(math.atan2(cos * dy - sin * dx, cos * dx + sin * dy)) > sensor.half_field:
+                continue
+            rows.append(row)
+        found.append(rows)
+    return found
+
+
+def visibilities(
+    sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
+) -> list[float]:
+    """Shares of the objects' sampled points that are in sight, of the objects of each sensor in turn."""
+    boxes = view.boxes
+    sensor_of = np.repeat(np.arange(len(sensors)), [len(rows) for rows in targets])
+    target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
-    targets = _points(boxes[target_of])
+    points = _points(boxes[target_of])
     origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
-    starts = past_box(origins, targets, boxes[own[sensor_of]])
-    hits = scene.cast(starts.reshape(-1, 3), targets.reshape(-1, 3))
+    starts = past_box(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
+    hits = scene.cast(starts.reshape(-1, 3), points.reshape(-1, 3))
     met = np.asarray(hits.rows).reshape(len(target_of), len(SAMPLES))
     in_sight = (met == target_of[:, None]) | (met == NOTHING)
-    return np.asarray(in_sight.mean(axis=1))
+    shares: list[float] = in_sight.mean(axis=1).tolist()
+    return shares
+
+
+def few_visibilities(
+    sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
+) -> list[float]:
+    """The same as `visibilities` in plain numbers."""
+    boxes = view.boxes.tolist()
+    starts: list[Point] = []
+    points: list[Point] = []
+    for sensor, station, rows in zip(sensors, own, targets, strict=True):
+        if rows:
+            aims = [point for row in rows for point in _few_points(boxes[row])]
+            starts += few_past_box(sensor.mounting.position(view, station), aims, boxes[station])
+            points += aims
+    met = scene.first_met(starts, points)
+    shares, number = [], len(SAMPLES)
+    for index, row in enumerate([row for rows in targets for row in rows]):
+        part = met[index * number : (index + 1) * number]
+        shares.append((part.count(row) + part.count(NOTHING)) / number)
+    return shares
 
 
 def _points(boxes: Array) -> Array:
@@ -121,32 +168,20 @@ def _points(boxes: Array) -> Array:
     return points
 
 
-def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array]:
-    """Where rays (P, K, 3) enter and leave boxes (P, 7), as shares of the way; enter > leave where they miss.
-
-    The slab method (Kay and Kajiya, Ray tracing complex scenes, 1986) in the frame of the box.
-    """
-    cos, sin = np.cos(boxes[:, 6])[:, None], np.sin(boxes[:, 6])[:, None]
-    enter = np.full(origins.shape[:2], -np.inf)
-    leave = np.full(origins.shape[:2], np.inf)
-    start, way = origins - boxes[:, None, :3], targets - origins
-    axes = (
-        (cos * start[..., 0] + sin * start[..., 1], cos * way[..., 0] + sin * way[..., 1]),
-        (cos * start[..., 1] - sin * start[..., 0], cos * way[..., 1] - sin * way[..., 0]),
-        (start[..., 2], way[..., 2]),
-    )
-    for axis, (place, step) in enumerate(axes):
-        half = boxes[:, None, 3 + axis] / 2.0
-        step = np.where(np.abs(step) < 1e-12, 1e-12, step)
-        first, second = (-half - place) / step, (half - place) / step
-        enter = np.maximum(enter, np.minimum(first, second))
-        leave = np.minimum(leave, np.maximum(first, second))
-    return enter, leave
-
-
-def past_box(origins: Array, targets: Array, boxes: Array) -> Array:
-    """(P, K, 3) starts of the rays: behind the box where a ray crosses it on its way, else where it was."""
-    enter, leave = crossing(origins, targets, boxes)
-    crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
-    share = np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
-    return np.asarray(origins + share[..., None] * (targets - origins))
+def _few_points(box: Sequence[float]) -> list[Point]:
+    """The sampled points of one box, as in SAMPLES."""
+    x, y, z, length, width, height, yaw = box
+    ahead, aside, up = INSET / 2.0 * length, INSET / 2.0 * width, z + INSET / 2.0 * height
+    down = 2.0 * z - up
+    ahead_x, ahead_y = ahead * math.cos(yaw), ahead * math.sin(yaw)
+    aside_x, aside_y = -aside * math.sin(yaw), aside * math.cos(yaw)
+    points: list[Point] = []
+    for corner_x, corner_y in (
+        (x + ahead_x + aside_x, y + ahead_y + aside_y),
+        (x + ahead_x - aside_x, y + ahead_y - aside_y),
+        (x - ahead_x + aside_x, y - ahead_y + aside_y),
+        (x - ahead_x - aside_x, y - ahead_y - aside_y),
+    ):
+        points.append((corner_x, corner_y, up))
+        points.append((corner_x, corner_y, down))
+    return [*points, (x, y, z), (x, y, up)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+_FEW = 16
+"""Up to this many actors, plain numbers are faster than arrays."""
 
 
 @dataclass(frozen=True)
@@ -90,15 +94,27 @@ class WorldView:
         except KeyError:
             raise KeyError(f"actor {name!r} is not in the world at {self.time:.2f} s") from None
 
-    @cached_property
+    @property
     def centres(self) -> Array:
         """(N, 3) centres of the bounding boxes in the world frame [m]; pitch and roll neglected."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        x, y, z = self.offset.T
-        centres: Array = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
-        return centres
+        return self.boxes[:, :3]
 
     @cached_property
     def boxes(self) -> Array:
         """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
-        return np.concatenate([self.centres, self.size, self.yaw[:, None]], axis=1)
+        if 0 < len(self.names) <= _FEW:
+            bodies = zip(
+                self.position.tolist(), self.yaw.tolist(), self.offset.tolist(), self.size.tolist(), strict=True
+            )
+            return np.array([_box(*body) for body in bodies])
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        x, y, z = self.offset.T
+        centres = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        return np.concatenate([centres, self.size, self.yaw[:, None]], axis=1)
+
+
+def _box(position: list[float], yaw: float, offset: list[float], size: list[float]) -> tuple[float, ...]:
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    x, y, z = position
+    ahead, aside, up = offset
+    return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + up, *size, yaw)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ from eidrive_scenario.world.driven_body import DrivenBody
 from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
-from eidrive_scenario.world.rays import GROUND, RayHits, cast_rays
+from eidrive_scenario.world.rays import GROUND, NOTHING, Point, RayHits, cast_rays, first_met
 from eidrive_scenario.world.render.tones import toned, white_level
 from eidrive_scenario.world.roadside import FIRST_LABEL
 from eidrive_scenario.world.scenery import Scenery
@@ -79,6 +79,7 @@ class World:
         self._in_order: list[Body] = []
         self._cast: _Cast | None = None
         self._row_of_handle = np.empty(0, dtype=np.int64)
+        self._row_in_list: list[int] = []
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
@@ -243,6 +244,14 @@ class World:
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
         return cast_rays(self._client, begin, end, self._row_of_handle, passed)
 
+    def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
+        """The rows that rays meet first, as `cast` has them: quicker for up to a thousand rays in plain numbers."""
+        self._refresh()
+        if self._unseen:
+            rows: list[int] = self.cast(origins, targets).rows.tolist()
+            return rows
+        return first_met(self._client, origins, targets, self._row_in_list)
+
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
         """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
         clear: NDArray[np.bool_] = self.cast(origin, targets, ignore).fraction >= 1.0
@@ -302,9 +311,11 @@ class World:
         self._in_order = list(self._bodies.values())
         self._rows = {name: row for row, name in enumerate(self._bodies)}
         highest = max([self._scenery.highest_handle, *(body.handle for body in self._in_order)])
-        self._row_of_handle = np.full(highest + 1, GROUND, dtype=np.int64)
+        self._row_of_handle = np.full(highest + 2, GROUND, dtype=np.int64)
+        self._row_of_handle[-1] = NOTHING
         for row, body in enumerate(self._in_order):
             self._row_of_handle[body.handle] = row
+        self._row_in_list = self._row_of_handle.tolist()
 
     def _cast_of_actors(self) -> _Cast:
         specs = [body.spec for body in self._in_order]

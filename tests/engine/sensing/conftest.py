@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,6 +53,9 @@ class BoxScene:
             fractions.append(nearest)
             normals.append(normal)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
+
+    def first_met(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
+        return self.cast(np.array(origins), np.array(targets)).rows.tolist()
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         self.pictures.append((pose, pinhole))

@@ -1,0 +1,82 @@
+"""Rays and upright boxes: where they cross, and rays that start behind a box that they cross."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+BEYOND_OWN_BODY = 1e-3
+"""A ray that leaves the own body starts this share of its length behind it."""
+PARALLEL = 1e-12
+"""A way across a slab that is shorter than this counts as so long [m]."""
+
+
+def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array]:
+    """Where rays (P, K, 3) enter and leave boxes (P, 7), as shares of the way; enter > leave where they miss.
+
+    The slab method (Kay and Kajiya, Ray tracing complex scenes, 1986) in the frame of the box.
+    """
+    cos, sin = np.cos(boxes[:, 6])[:, None], np.sin(boxes[:, 6])[:, None]
+    enter = np.full(origins.shape[:2], -np.inf)
+    leave = np.full(origins.shape[:2], np.inf)
+    start, way = origins - boxes[:, None, :3], targets - origins
+    axes = (
+        (cos * start[..., 0] + sin * start[..., 1], cos * way[..., 0] + sin * way[..., 1]),
+        (cos * start[..., 1] - sin * start[..., 0], cos * way[..., 1] - sin * way[..., 0]),
+        (start[..., 2], way[..., 2]),
+    )
+    for axis, (place, step) in enumerate(axes):
+        half = boxes[:, None, 3 + axis] / 2.0
+        step = np.where(np.abs(step) < PARALLEL, PARALLEL, step)
+        first, second = (-half - place) / step, (half - place) / step
+        enter = np.maximum(enter, np.minimum(first, second))
+        leave = np.minimum(leave, np.maximum(first, second))
+    return enter, leave
+
+
+def past_box(origins: Array, targets: Array, boxes: Array) -> Array:
+    """(P, K, 3) starts of the rays: behind the box where a ray crosses it on its way, else where it was."""
+    enter, leave = crossing(origins, targets, boxes)
+    crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
+    share = np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
+    return np.asarray(origins + share[..., None] * (targets - origins))
+
+
+def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
+    """The same as `past_box` in plain numbers, for a few rays from one origin."""
+    x, y, z, length, width, height, yaw = box
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    ox, oy, oz = origin
+    px, py, pz = cos * (ox - x) + sin * (oy - y), cos * (oy - y) - sin * (ox - x), oz - z
+    half_length, half_width, half_height = length / 2.0, width / 2.0, height / 2.0
+    starts = []
+    for tx, ty, tz in targets:
+        dx, dy, dz = tx - ox, ty - oy, tz - oz
+        enter, leave = -math.inf, math.inf
+        for place, step, half in (
+            (pz, dz, half_height),
+            (px, cos * dx + sin * dy, half_length),
+            (py, cos * dy - sin * dx, half_width),
+        ):
+            if abs(step) < PARALLEL:
+                step = PARALLEL
+            first, second = (-half - place) / step, (half - place) / step
+            if first > second:
+                first, second = second, first
+            if first > enter:
+                enter = first
+            if second < leave:
+                leave = second
+            if enter >= leave or leave <= 0.0 or enter >= 1.0:
+                starts.append(origin)
+                break
+        else:
+            share = min(leave + BEYOND_OWN_BODY, 1.0)
+            starts.append((ox + share * dx, oy + share * dy, oz + share * dz))
+    return starts
