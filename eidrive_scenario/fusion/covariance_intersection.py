@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import ClassVar
 
 import numpy as np
@@ -12,11 +13,11 @@ from pydantic import Field, PositiveFloat
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.fusion.grouping import grouped
 from eidrive_scenario.fusion.headings import joined_heading
-from eidrive_scenario.fusion.intersection import intersect
+from eidrive_scenario.fusion.intersection import covariances, estimates, intersected, means
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import Gate
 from eidrive_scenario.fusion.report_memory import ReportMemory
-from eidrive_scenario.fusion.tracks import Table, predicted_to
+from eidrive_scenario.fusion.tracks import Table, move_on
 from eidrive_scenario.settings import Settings
 
 Array = NDArray[np.float64]
@@ -69,7 +70,8 @@ class CovarianceIntersectionFusion(FusionMethod):
         if not len(rows):
             return Detections(now)
         rows = rows[np.argsort(station[rows], kind="stable")]
-        present = predicted_to(tracks[rows], np.full(len(rows), now))
+        present = tracks[rows]
+        move_on(present, np.full(len(rows), now))
         present["station"] = station[rows]
         objects = grouped(present, self._gate)
         return _joined(present, objects, now, self.settings.existence)
@@ -110,19 +112,17 @@ def _intersected(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]
     Position and velocity are intersected each for itself, as their units do not compare. Members are joined in pairs,
     then those pairs, and so on: any order is consistent.
     """
-    mean = tracks["mean"].reshape(-1, 2, 2)
     covariance = np.empty((len(tracks), 2, 2, 2))
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
     covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
-    groups = objects
-    while any(len(members) > 1 for members in groups):
-        first = [row for members in groups for row in members[: len(members) // 2 * 2 : 2]]
-        second = [row for members in groups for row in members[1::2]]
-        joined, spread, _ = intersect(mean[first], covariance[first], mean[second], covariance[second])
-        fresh = iter(range(len(mean), len(mean) + len(first)))
-        groups = [
-            [next(fresh) for _ in range(len(members) // 2)] + members[len(members) // 2 * 2 :] for members in groups
-        ]
-        mean, covariance = np.concatenate([mean, joined]), np.concatenate([covariance, spread])
-    final = [members[0] for members in groups]
-    return mean[final], covariance[final, 0]
+    known = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
+    groups, count = objects, len(tracks)
+    while pairs := [pair for members in groups for pair in zip(members[::2], members[1::2], strict=False)]:
+        first, second = zip(*pairs, strict=True)
+        fresh, _ = intersected(known.take(first, axis=1), known.take(second, axis=1))
+        known = np.concatenate([known, fresh], axis=1)
+        places = iter(range(count, count + len(pairs)))
+        groups = [[*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]] for members in groups]
+        count += len(pairs)
+    final = known.take([members[0] for members in groups], axis=1)
+    return means(final), covariances(final[:, :, 0])

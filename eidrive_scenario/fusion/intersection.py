@@ -12,29 +12,57 @@ SLACK = 0.01
 the same: the least trace alone would take either of two equal ones whole, and rounding would say which."""
 
 
+def estimates(mean: Array, covariance: Array) -> Array:
+    """(5, ...) x, y, and xx, xy, yy of the inverse covariance, from means (..., 2) and covariances (..., 2, 2)."""
+    xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
+    both = np.empty((5, *xx.shape))
+    both[0], both[1] = mean[..., 0], mean[..., 1]
+    both[2], both[3], both[4] = yy, -xy, xx
+    both[2:] /= xx * yy - xy * xy
+    return both
+
+
+def means(both: Array) -> Array:
+    """(..., 2) of estimates (5, ...)."""
+    return np.stack([both[0], both[1]], axis=-1)
+
+
+def covariances(both: Array) -> Array:
+    """(..., 2, 2) of estimates (5, ...)."""
+    xx, xy, yy = both[2:] / (both[2] * both[4] - both[3] * both[3])
+    covariance = np.empty((*xx.shape, 2, 2))
+    covariance[..., 0, 0], covariance[..., 1, 1] = yy, xx
+    covariance[..., 0, 1] = covariance[..., 1, 0] = -xy
+    return covariance
+
+
 def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:
-    """The estimate from means (..., 2) with covariances (..., 2, 2): its mean, its covariance, and the weight of a.
+    """The estimate from means (..., 2) with covariances (..., 2, 2): its mean, its covariance, and the weight of a."""
+    both, w = intersected(estimates(a, cov_a), estimates(b, cov_b))
+    return means(both), covariances(both), w
+
+
+def intersected(a: Array, b: Array) -> tuple[Array, Array]:
+    """The estimates (5, ...) from both, and the weights (...) of a.
 
     P⁻¹ = w A⁻¹ + (1 - w) B⁻¹, x = P (w A⁻¹ a + (1 - w) B⁻¹ b). P is no smaller than the true covariance of the error,
     whatever the correlation, for any w in [0, 1] (Julier and Uhlmann, A non-divergent estimation algorithm in the
     presence of unknown correlations, American Control Conference 1997). `weight` says which w.
     """
-    axx, axy, ayy, det_a = _information(cov_a)
-    bxx, bxy, byy, det_b = _information(cov_b)
-    w = weight(axx + ayy, det_a, bxx + byy, det_b, axx * byy + ayy * bxx - 2.0 * axy * bxy)
-    rest = 1.0 - w
-    xx, xy, yy = w * axx + rest * bxx, w * axy + rest * bxy, w * ayy + rest * byy
-    determinant = xx * yy - xy * xy
-    covariance = np.empty_like(cov_a)
-    covariance[..., 0, 0], covariance[..., 1, 1] = yy / determinant, xx / determinant
-    covariance[..., 0, 1] = covariance[..., 1, 0] = -xy / determinant
-    # x = b + P w A⁻¹ (a - b): exactly b where the means agree.
-    dx, dy = w * (a[..., 0] - b[..., 0]), w * (a[..., 1] - b[..., 1])
+    both = a - b
+    dx, dy, axx, axy, ayy = both[0], both[1], a[2], a[3], a[4]
+    bxx, bxy, byy = b[2], b[3], b[4]
+    mixed = axx * byy + ayy * bxx - 2.0 * axy * bxy
+    w = weight(axx + ayy, axx * ayy - axy * axy, bxx + byy, bxx * byy - bxy * bxy, mixed)
     gx, gy = axx * dx + axy * dy, axy * dx + ayy * dy
-    mean = np.empty_like(a)
-    mean[..., 0] = b[..., 0] + (yy * gx - xy * gy) / determinant
-    mean[..., 1] = b[..., 1] + (xx * gy - xy * gx) / determinant
-    return mean, covariance, w
+    both *= w
+    both += b
+    xx, xy, yy = both[2], both[3], both[4]
+    share = w / (xx * yy - xy * xy)
+    # x = b + P w A⁻¹ (a - b): exactly b where the means agree.
+    both[0] = b[0] + share * (yy * gx - xy * gy)
+    both[1] = b[1] + share * (xx * gy - xy * gx)
+    return both, w
 
 
 def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Array) -> Array:
@@ -61,10 +89,3 @@ def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Ar
         return np.full_like(excess, 0.5)
     turn = slope + np.copysign(np.sqrt(np.maximum(slope * slope + 4.0 * limit * p * excess, 0.0)), slope)
     return np.where(excess > 0.0, 0.5 - 2.0 * excess / np.where(turn == 0.0, 1.0, turn), 0.5)
-
-
-def _information(covariance: Array) -> tuple[Array, Array, Array, Array]:
-    """Entries xx, xy, yy of the inverses of (..., 2, 2), and their determinants."""
-    xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
-    determinant = 1.0 / (xx * yy - xy * xy)
-    return yy * determinant, -xy * determinant, xx * determinant, determinant

@@ -54,11 +54,10 @@ def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool)
     other: two bodies cannot be in one place, however sure their reporters are that they stand apart. The cost is the
     negative log-likelihood of the offset, but for constants.
     """
-    own, other = _spread(first), _spread(second)
-    dx = first["mean"][:, 0, None] - second["mean"][None, :, 0]
-    dy = first["mean"][:, 1, None] - second["mean"][None, :, 1]
-    reach = math.sqrt(max(gate.chi_square, LEFT_OVER))
-    limit = _reach(first, own, reach, gate)[:, None] + _reach(second, other, reach, gate)[None, :]
+    own = _Side.of(first, gate)
+    other = own if second is first else _Side.of(second, gate)
+    dx, dy = own.x[:, None] - other.x, own.y[:, None] - other.y
+    limit = own.reach[:, None] + other.reach
     near = dx * dx + dy * dy <= limit * limit
     numbered = None
     if same_station:
@@ -72,14 +71,14 @@ def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool)
     rows, columns = np.nonzero(near)
     if not len(rows):
         return Pairs([], [], [], [])
-    x, y, spread = dx[rows, columns], dy[rows, columns], own[rows] + other[columns]
-    xx, xy, yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
+    x, y = dx[rows, columns], dy[rows, columns]
+    xx, xy, yy = own.xx[rows] + other.xx[columns], own.xy[rows] + other.xy[columns], own.yy[rows] + other.yy[columns]
     determinant = xx * yy - xy * xy
     mahalanobis = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / determinant
     square = x * x + y * y
-    vague = first["vague"][rows] | second["vague"][columns]
+    vague = own.vague[rows] | other.vague[columns]
     inside = np.where(vague, square < gate.distance**2, mahalanobis <= gate.chi_square)
-    narrower = np.minimum(first["body"][rows, 2], second["body"][columns, 2])
+    narrower = np.minimum(own.width[rows], other.width[columns])
     inside |= square < 0.25 * narrower * narrower
     cost = mahalanobis + np.log(determinant)
     if numbered is not None:
@@ -108,15 +107,26 @@ def matched_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     return chosen + matched(*zip(*rest, strict=True)) if rest else chosen
 
 
-def _spread(tracks: Table) -> Array:
-    """(N, 2, 2) covariance of the position."""
-    spread: Array = tracks["covariance"][:, :2, :2] + tracks["pose"]
-    return spread
+class _Side(NamedTuple):
+    """One side of the pairs, (N,) each: place, covariance of the place, width, and whether the place is vague.
 
+    reach  the farthest that any of the rules can take this side of a pair [m]
+    """
 
-def _reach(tracks: Table, spread: Array, reach: float, gate: Gate) -> Array:
-    """(N,) the farthest that any of the rules can take this side of a pair [m]."""
-    statistical = reach * np.sqrt(spread[:, 0, 0] + spread[:, 1, 1])
-    return np.where(
-        tracks["vague"], np.maximum(statistical, gate.distance), np.maximum(statistical, tracks["body"][:, 2])
-    )
+    x: Array
+    y: Array
+    xx: Array
+    xy: Array
+    yy: Array
+    width: Array
+    vague: NDArray[np.bool_]
+    reach: Array
+
+    @classmethod
+    def of(cls, tracks: Table, gate: Gate) -> _Side:
+        mean, covariance, pose, vague = (tracks[name] for name in ("mean", "covariance", "pose", "vague"))
+        xx, yy = covariance[:, 0, 0] + pose[:, 0, 0], covariance[:, 1, 1] + pose[:, 1, 1]
+        width = tracks["body"][:, 2]
+        statistical = math.sqrt(max(gate.chi_square, LEFT_OVER)) * np.sqrt(xx + yy)
+        reach = np.maximum(statistical, np.where(vague, gate.distance, width))
+        return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, reach)

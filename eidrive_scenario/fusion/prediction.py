@@ -21,21 +21,37 @@ def predicted(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple
     applications to tracking and navigation, 2001, sections 6.3.2 and 11.7.1). A step may be negative, where a clock is
     fast; then uncertainty grows as much.
     """
+    if not turn.any():
+        return _straight_on(mean, covariance, step)
     forward = np.zeros(covariance.shape)
     forward[:, 0, 0] = forward[:, 1, 1] = forward[:, 2, 2] = forward[:, 3, 3] = 1.0
-    forward[:, 0, 2] = forward[:, 1, 3] = step
-    if turn.any():
-        angle = turn * step
-        cos, sin = np.cos(angle), np.sin(angle)
-        chord = step * np.sinc(angle / np.pi)
-        aside = 0.5 * angle * step * np.sinc(0.5 * angle / np.pi) ** 2
-        forward[:, 0, 2] = forward[:, 1, 3] = chord
-        forward[:, 0, 3], forward[:, 1, 2] = -aside, aside
-        forward[:, 2, 2] = forward[:, 3, 3] = cos
-        forward[:, 2, 3], forward[:, 3, 2] = -sin, sin
+    angle = turn * step
+    cos, sin = np.cos(angle), np.sin(angle)
+    chord = step * np.sinc(angle / np.pi)
+    aside = 0.5 * angle * step * np.sinc(0.5 * angle / np.pi) ** 2
+    forward[:, 0, 2] = forward[:, 1, 3] = chord
+    forward[:, 0, 3], forward[:, 1, 2] = -aside, aside
+    forward[:, 2, 2] = forward[:, 3, 3] = cos
+    forward[:, 2, 3], forward[:, 3, 2] = -sin, sin
     later = forward @ covariance @ np.swapaxes(forward, 1, 2)
     length = np.abs(step)
     noise = (ACCELERATION_DENSITY * length)[:, None, None]
     across = step[:, None, None]
     later += noise * (_SPEED + across * (0.5 * _BOTH + (across / 3.0) * _PLACE))
     return (forward @ mean[:, :, None])[:, :, 0], later
+
+
+def _straight_on(mean: Array, covariance: Array, step: Array) -> tuple[Array, Array]:
+    """The same without a turn. Tracks along the last axis: numpy is three times as fast along long axes."""
+    entries = np.ascontiguousarray(covariance.reshape(-1, 16).T).reshape(4, 4, -1)
+    place, both, speed = entries[:2, :2], entries[:2, 2:], entries[2:, 2:]
+    noise = ACCELERATION_DENSITY * np.abs(step) * np.eye(2)[:, :, None]
+    way = step * speed
+    later = np.empty_like(entries)
+    later[2:, 2:] = speed + noise
+    later[:2, 2:] = both + way + 0.5 * step * noise
+    later[2:, :2] = later[:2, 2:].swapaxes(0, 1)
+    later[:2, :2] = place + step * (both + both.swapaxes(0, 1) + way + (step / 3.0) * noise)
+    moved = mean.copy()
+    moved[:, :2] += step[:, None] * mean[:, 2:]
+    return moved, later.reshape(16, -1).T.reshape(-1, 4, 4)

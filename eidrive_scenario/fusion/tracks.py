@@ -38,7 +38,8 @@ TRACK = np.dtype(
         ("score", "f8"),
         ("existence", "f8"),  # probability that there is such an object
         ("votes", "f8", (len(CLASSES),)),
-    ]
+    ],
+    align=True,  # else numpy copies every number that stands behind a flag before it reckons with it
 )
 
 DETECTION = 0.9
@@ -73,15 +74,16 @@ def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
     table["heading"], table["heading_covariance"] = first_heading(boxes[:, 6])
     table["facing"] = 1.0
+    counts = [len(found) for found in lists]
+    table["station"] = np.repeat(stations, counts)
+    table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
+    table["number"] = [number for found in lists for number in found.tracks or (-1,) * len(found)]
+    words = [_ROW_OF_CLASS.get(name, _MISC) for found in lists for name in found.classes]
+    table["votes"][np.arange(len(table)), words] = table["score"]
     start = 0
-    for station, report in zip(stations, reports, strict=True):
-        found = report.detections
-        rows = table[start : start + len(found)]
-        start += len(found)
-        rows["station"] = station
-        rows["time"] = rows["seen"] = found.time
-        rows["number"] = found.tracks or -1
-        rows["votes"][np.arange(len(found)), [_ROW_OF_CLASS.get(name, _MISC) for name in found.classes]] = rows["score"]
+    for report, count in zip(reports, counts, strict=True):
+        rows = table[start : start + count]
+        start += count
         if report.state is not None and report.state.pose_covariance is not None:
             rows["pose"] = pose_part(rows["mean"][:, :2], report.state.x, report.state.y, report.state.pose_covariance)
     if not len(boxes) or (math.isfinite(boxes.sum() + scores.sum()) and boxes[:, 3:6].min() > 0.0):
@@ -102,19 +104,17 @@ def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
     return np.asarray(jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
 
 
-def predicted_to(tracks: Table, time: Array) -> Table:
-    """The tracks at other times (N,) [s]."""
-    later = tracks.copy()
+def move_on(tracks: Table, time: Array) -> None:
+    """Predict these tracks to other times (N,) [s]."""
     step = time - tracks["time"]
     if not step.any():
-        return later
-    turn = known_turn(tracks["heading"], tracks["heading_covariance"])
-    later["mean"], later["covariance"] = predicted(tracks["mean"], tracks["covariance"], step, turn)
-    later["heading"], later["heading_covariance"] = predicted_heading(
-        tracks["heading"], tracks["heading_covariance"], step
+        return
+    mean, covariance, heading, of_heading = (
+        tracks[name] for name in ("mean", "covariance", "heading", "heading_covariance")
     )
-    later["time"] = time
-    return later
+    mean[:], covariance[:] = predicted(mean, covariance, step, known_turn(heading, of_heading))
+    heading[:], of_heading[:] = predicted_heading(heading, of_heading, step)
+    tracks["time"] = time
 
 
 def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: Gate, max_age: float) -> Table:
@@ -130,12 +130,16 @@ def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], 
     times = time_of[tracks["station"]]
     concerned = np.isfinite(times)
     recent = times - tracks["seen"] <= max_age
-    old = predicted_to(tracks[recent], times[recent])
+    old = tracks[recent]
+    move_on(old, times[recent])
     pairs = matched_pairs(likely_pairs(old, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
-    old[rows] = _updated(old[rows], born[columns])
-    if len(rows) < len(old):
+    if len(rows) == len(old):
+        order = np.argsort(rows)
+        old = _updated(old, born[columns[order]])
+    else:
+        old[rows] = _updated(old[rows], born[columns])
         missed = np.ones(len(old), dtype=bool)
         missed[rows] = False
         tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
@@ -153,8 +157,8 @@ def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], 
 
 
 def _updated(old: Table, new: Table) -> Table:
-    """Tracks, predicted to the time of a report, with the boxes `new` of that report."""
-    after = new.copy()
+    """Tracks, predicted to the time of a report, with the boxes `new` of that report, which become the answer."""
+    after = new
     still = ~new["moving"]
     if still.any():
         mean, covariance = _filtered(old[still], new[still])
