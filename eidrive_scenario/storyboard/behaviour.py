@@ -20,12 +20,13 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
 
     Configured in the constructor, which raises ScenarioError for what cannot be done; reset in `initialise`, which
     runs when the action starts; one decision for the step of `stage.dt` seconds in `update`, which answers SUCCESS in
-    the step in which the action reaches its end. In Init the step is 0 s long.
+    the step that brings the action to its goal: it ends at the end of that step. In Init the step is 0 s long.
     """
 
     domains: ClassVar[Domain] = Domain.NONE
     immediate: ClassVar[bool] = False
-    """True for an action that is done as soon as it starts, so that triggers judged after it see what it set."""
+    """True for an action that moves nothing, as it sets a value: it acts as soon as it starts, and it ends at the
+    instant at which `update` answers SUCCESS."""
 
     def __init__(
         self,

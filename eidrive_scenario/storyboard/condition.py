@@ -60,6 +60,10 @@ class Measure(NamedTuple):
 class Condition(ABC):
     """A predicate over the stage. Edges and delays are the Trigger's, not its own."""
 
+    instant: ClassVar[bool] = False
+    """True where what it looks at can change at one instant, as elements start and end and actions set values: it is
+    then asked again after such a change. All others are asked once per tick."""
+
     def __init__(self, element: model.Element) -> None:
         self.element = element
 

@@ -1,8 +1,11 @@
 """The state machine of the standard: storyboard, stories, acts, maneuver groups, maneuvers, events, actions.
 
-A tick has two phases. First the triggers judge the view (`judge`): elements stop and start, from the top down, as far
-as they come. Then the running actions decide on the next step (py_trees' `tick`), and what has come to its end ends,
-from the bottom up; conditions see such an end in the next tick.
+A tick (`play`) begins with the actions that the last step brought to their goal: they end, and with them, from the
+bottom up, what has nothing left to do. Then two phases take turns. The triggers judge (`judge`): elements stop and
+start, from the top down, as far as they come. The running actions decide on the next step (py_trees' `tick`), each
+once; those that only set a value end at once. Where a phase changed a state the triggers judge again, so that a chain
+of elements falls through in one tick: no transition consumes simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1).
+An element starts at most once in a tick, which bounds the turns.
 """
 
 from __future__ import annotations
@@ -46,6 +49,8 @@ class StoryElement(Composite):
         self.elements = tuple(children)
         self.limit = limit
         self.executions = 0
+        self._tried_at: int | None = None
+        """The tick in which it last started or was skipped."""
         self.record: ElementRecord = stage.progress.enrol(self.kind, path)
 
     @property
@@ -59,13 +64,17 @@ class StoryElement(Composite):
         self._arm()
 
     def judge(self) -> None:
-        """First phase of a tick: stop, start, and let the children do the same."""
-        if self.state is State.RUNNING and self.stop_leaf is not None:
+        """First phase of a turn: stop, start, and let the children do the same.
+
+        A stop trigger is asked from the tick after the start on, that of the storyboard from the first tick.
+        """
+        tried = self._tried_at == self.stage.progress.tick
+        if self.state is State.RUNNING and self.stop_leaf is not None and not tried:
             self.stop_leaf.tick_once()
             if self.stop_leaf.status is Status.SUCCESS:
                 self.halt(self.stop_leaf.trigger.why)
                 return
-        if self.state is State.STANDBY and self._may_start():
+        if self.state is State.STANDBY and not tried and self._may_start():
             self.begin(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
         if self.state is State.RUNNING:
             for element in self.elements:
@@ -73,6 +82,7 @@ class StoryElement(Composite):
 
     def begin(self, why: str = "") -> None:
         """standby -> running; the children stand by, or start where they have no trigger."""
+        self._tried_at = self.stage.progress.tick
         self.executions += 1
         self._change(Transition.START, State.RUNNING, why)
         for element in self.elements:
@@ -94,8 +104,15 @@ class StoryElement(Composite):
         else:
             self._change(Transition.END, State.COMPLETE)
 
+    def arrive(self) -> None:
+        """What the last step brought to its goal ends."""
+        if self.state is State.RUNNING:
+            for element in self.elements:
+                element.arrive()
+            self.settle()
+
     def tick(self) -> Iterator[Behaviour]:
-        """Second phase of a tick: the running children tick; all of them complete, so is this one."""
+        """Second phase of a turn: the running children tick; all of them complete, so is this one."""
         self.status = Status.RUNNING
         if self.state is State.RUNNING:
             for element in self.elements:
@@ -135,6 +152,27 @@ class StoryboardElement(StoryElement):
     """The root. It ends by its stop trigger; the stories' end is its own only where it has none."""
 
     kind = "storyboard"
+
+    def play(self, init: Behaviour | None = None) -> None:
+        """One tick of the whole tree, and of the actions that Init left running."""
+        progress = self.stage.progress
+        if self.state is None:
+            self.stand_by()
+            self.begin()
+            self._tried_at = None
+        if self.stage.arriving:
+            self.stage.arriving = False
+            self.arrive()
+        seen = -1
+        while seen != len(progress.changes):
+            seen = len(progress.changes)
+            self.judge()
+            if self.state is not State.RUNNING:
+                return
+            if init is not None:
+                init.tick_once()
+                init = None
+            self.tick_once()
 
     def settle(self) -> None:
         """End with the last story, if nothing else would end the storyboard."""

@@ -18,7 +18,8 @@ class EventElement(StoryElement):
     """An Event: actions that start together by its trigger.
 
     Its priority says what becomes of the running events of the same maneuver: `override` (before 1.2 `overwrite`)
-    stops them, `skip` lets them run and skips this one, `parallel` lets all run.
+    stops them, however many executions they have left, `skip` lets them run and skips this one, which counts as one of
+    its executions, `parallel` lets all run (ASAM OpenSCENARIO XML 1.3.1, 8.4.2).
     """
 
     kind = "event"
@@ -40,24 +41,21 @@ class EventElement(StoryElement):
 
     def begin(self, why: str = "") -> None:
         """Start by priority."""
+        self._tried_at = self.stage.progress.tick
         running = [rival for rival in self.rivals if rival.state is State.RUNNING]
         if running and self.priority == "skip":
-            self._change(Transition.SKIP, State.STANDBY, f"{running[0].name} is running")
+            self.executions += 1
+            after = State.STANDBY if self.executions < self.limit else State.COMPLETE
+            self._change(Transition.SKIP, after, f"{running[0].name} is running")
             return
         if self.priority in ("override", "overwrite"):
             for rival in running:
-                rival.overridden(self.name)
+                rival.halt(f"{self.name} overrides it")
         self.executions += 1
         self._change(Transition.START, State.RUNNING, why)
         for action in self.elements:
             if isinstance(action, ActionElement):
                 action.start_for(self.start_leaf.trigger.triggering if self.start_leaf is not None else ())
-
-    def overridden(self, by: str) -> None:
-        """Another event of the maneuver took over; where this one may be executed again, it stands by for that."""
-        self.halt(f"{by} overrides it")
-        if self.executions < self.limit:
-            self._arm()
 
 
 class ActionElement(StoryElement):
@@ -80,6 +78,9 @@ class ActionElement(StoryElement):
         self._made: dict[str | None, list[ActionBehaviour]] = {}
         self.actors = tuple(actors)
         self.running: list[ActionBehaviour] = []
+        self._there: list[ActionBehaviour] = []
+        """Those that the step which goes on brings to their goal; they hold their domains until they are there."""
+        self._decided_at: int | None = None
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
 
@@ -96,6 +97,8 @@ class ActionElement(StoryElement):
             actors = tuple(dict.fromkeys([*actors, *triggering]))
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
         self.stand_by()
+        self._tried_at, self._decided_at = self.stage.progress.tick, None
+        self._there = []
         self.executions += 1
         self._change(Transition.START, State.RUNNING)
         for behaviour in self.running:
@@ -103,7 +106,9 @@ class ActionElement(StoryElement):
             self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
                 behaviour.tick_once()
-        self.running = [behaviour for behaviour in self.running if behaviour.status is not Status.SUCCESS]
+        for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
+            self.running.remove(behaviour)
+            self.stage.release(behaviour)
         if not self.running and not actors:
             self._change(Transition.END, State.COMPLETE)
 
@@ -113,6 +118,7 @@ class ActionElement(StoryElement):
             if held is behaviour:
                 held.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
+        self._there = [other for other in self._there if other is not behaviour]
         if not self.running and self.state is State.RUNNING:
             self._change(Transition.STOP, State.COMPLETE, why)
 
@@ -121,20 +127,36 @@ class ActionElement(StoryElement):
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.stage.release(behaviour)
-        self.running = []
+        self.running, self._there = [], []
         self._change(Transition.STOP, State.COMPLETE, why)
         self.status = Status.INVALID
 
+    def arrive(self) -> None:
+        """The behaviours that the last step brought to their goal are done; the last one, and so is the action."""
+        if self.state is State.RUNNING:
+            there, self._there = self._there, []
+            self._let_go(there)
+
     def tick(self) -> Iterator[Behaviour]:
-        """The behaviours decide; the last one done, so is the action."""
+        """The behaviours decide, once per tick; what they bring about shows at the end of the step: there they end."""
         self.status = Status.RUNNING
-        for behaviour in tuple(self.running):
-            yield from behaviour.tick()
-            if behaviour.status is not Status.RUNNING:
-                self.running.remove(behaviour)
-                self.stage.release(behaviour)
-        if not self.running and self.state is State.RUNNING:
-            self._change(Transition.END, State.COMPLETE)
+        now = self.stage.progress.tick
+        if self._decided_at != now:
+            self._decided_at = now
+            done = []
+            for behaviour in tuple(self.running):
+                yield from behaviour.tick()
+                if behaviour.status is not Status.RUNNING:
+                    (done if behaviour.immediate else self._there).append(behaviour)
+            self.stage.arriving = self.stage.arriving or bool(self._there)
+            self._let_go(done)
         if self.state is State.COMPLETE:
             self.status = Status.SUCCESS
         yield self
+
+    def _let_go(self, done: Sequence[ActionBehaviour]) -> None:
+        for behaviour in done:
+            self.running.remove(behaviour)
+            self.stage.release(behaviour)
+        if not self.running and self.state is State.RUNNING:
+            self._change(Transition.END, State.COMPLETE)

@@ -68,12 +68,15 @@ class Progress:
 
 
 class Watch:
-    """One observer's eye on elements: each transition is shown to it once, and not long after it happened."""
+    """One observer's eye on elements: each transition is shown to it in one tick, and not long after it happened."""
 
     def __init__(self, progress: Progress, records: list[ElementRecord]) -> None:
         self._progress = progress
         self._records = records
         self._seen = [0] * len(records)
+        self._before = [0] * len(records)
+        """How many transitions were seen in earlier ticks."""
+        self._looked_at = -1
 
     def in_state(self, state: State) -> bool:
         """True where one of the elements is in that state."""
@@ -82,8 +85,10 @@ class Watch:
     def passed(self, transition: Transition) -> bool:
         """True where one of them went through that transition in this tick or, unseen so far, in the one before."""
         found = False
+        if self._looked_at != self._progress.tick:
+            self._looked_at, self._before = self._progress.tick, list(self._seen)
         for index, record in enumerate(self._records):
-            fresh = record.transitions[self._seen[index] :]
+            fresh = record.transitions[self._before[index] :]
             self._seen[index] = len(record.transitions)
             found = found or any(kind is transition and tick >= self._progress.tick - 1 for tick, kind in fresh)
         return found

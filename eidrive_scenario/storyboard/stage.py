@@ -102,6 +102,8 @@ class Stage:
             taken=frozenset(self.actors),
             must_stop=self.signals.must_stop,
         )
+        self.arriving = False
+        """Whether the step that goes on brings an action to its goal."""
         self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
 
     @property

@@ -82,13 +82,7 @@ class Storyboard:
         """Judge the triggers by this view, let the actions decide, and move what is scripted over to the next one."""
         self.stage.begin(view, self.dt)
         self.stage.signals.advance(view.time)
-        if self.root.state is None:
-            self.root.stand_by()
-            self.root.begin()
-        self.root.judge()
-        if self.root.state is State.RUNNING:
-            self.init.tick_once()
-            self.root.tick_once()
+        self.root.play(self.init)
         if self.root.state is State.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
         commands = self.stage.commands

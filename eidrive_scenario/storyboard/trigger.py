@@ -19,8 +19,9 @@ TINY = 1e-6
 class ConditionMonitor:
     """A condition with its edge and delay.
 
-    An edge needs a value before it: the first evaluation yields none. With a delay, the answer at t is the edge's
-    result at t - delay; before the first evaluation it is false.
+    An edge needs a value before it: the first evaluation yields none. It lasts for the rest of its tick, so that it
+    meets what else comes true at that instant. With a delay, the answer at t is the edge's result at t - delay; before
+    the first evaluation it is false.
     """
 
     def __init__(self, condition: Condition, *, name: str = "", edge: str = "none", delay: float = 0.0) -> None:
@@ -39,13 +40,22 @@ class ConditionMonitor:
         self.triggering: tuple[str, ...] = ()
         """The entities that made it so: those that fulfilled it or, where it counts as it ends, had fulfilled it."""
         self._fulfilled: tuple[str, ...] = ()
+        self._asked_at: int | None = None
+        self._pulse = False
         self._recorded = False
         self._history: deque[tuple[float, bool, str, tuple[str, ...]]] = deque()
         self._delayed: tuple[bool, str] = (False, "")
 
     def evaluate(self, stage: Stage) -> bool:
-        """Ask the condition once and answer with edge and delay. Called at most once per tick."""
+        """Ask the condition and answer with edge and delay; again in one tick only where it may have changed since."""
+        again = self._asked_at == stage.progress.tick
+        if again and not self.condition.instant:
+            return self.result
+        self._asked_at = stage.progress.tick
         result = self._edge(self.condition.holds(stage))
+        if again and self.edge != "none" and self._pulse:
+            return self.result
+        self._pulse = result
         before, self._fulfilled = self._fulfilled, getattr(self.condition, "fulfilled", ())
         who = self._fulfilled if self.value else before
         if self.delay <= 0.0:
@@ -117,7 +127,7 @@ class Trigger:
         return bool(self.groups)
 
     def evaluate(self, stage: Stage) -> bool:
-        """True where it fires; `why` then says what did it. Called at most once per tick."""
+        """True where it fires; `why` then says what did it."""
         fired = [group for group in self.groups if group.evaluate(stage)]
         if fired:
             monitors = fired[0].monitors
@@ -149,7 +159,8 @@ class WaitFor(py_trees.behaviour.Behaviour):
 
     def initialise(self) -> None:
         """Forget what was seen in an earlier life."""
-        self.trigger.reset()
+        if self.status is Status.INVALID:
+            self.trigger.reset()
 
     def update(self) -> Status:
         """Ask the trigger."""

@@ -39,7 +39,7 @@ def test_the_offset_goes_over_by_its_shape(scene: Any, shape: str, quarter: floa
     assert played.at(2.0).y == pytest.approx(-4.0)
     assert played.at(4.0).y == pytest.approx(-6.0)
     assert (played.at(4.1).y, played.at(4.1).yaw) == pytest.approx((-6.0, 0.0))
-    assert played.when("action 0", "completeState") == pytest.approx(3.9)
+    assert played.when("action 0", "completeState") == pytest.approx(4.0)
 
 
 def test_the_slanted_way_is_as_long_as_the_speed_says(scene: Any) -> None:
@@ -58,7 +58,7 @@ def test_a_distance_is_measured_along_the_lane(scene: Any) -> None:
 def test_a_rate_is_the_largest_speed_sideways(scene: Any) -> None:
     """Sinusoidal over 4 m at 2 m/s: π/2 · 4 / 2 = π seconds."""
     played = scene(5, ("Ego", change(lane(-2), "sinusoidal", "rate", 2)))
-    assert played.when("action 0", "completeState") == pytest.approx(3.1)
+    assert played.when("action 0", "completeState") == pytest.approx(3.2)
     assert played.at(math.pi / 2).y == pytest.approx(-4.0, abs=0.1)
 
 
@@ -107,7 +107,7 @@ def test_an_offset_is_reached_within_the_lateral_acceleration(scene: Any) -> Non
     played = scene(3, ("Ego", offset('<AbsoluteTargetLaneOffset value="1"/>')))
     assert played.at(1.0).y == pytest.approx(-1.5)
     assert played.at(2.0).y == pytest.approx(-1.0)
-    assert played.when("action 0", "completeState") == pytest.approx(1.9)
+    assert played.when("action 0", "completeState") == pytest.approx(2.0)
 
 
 @pytest.mark.element("LaneOffsetAction")
@@ -173,7 +173,7 @@ def test_a_trajectory_without_timing_is_driven_at_the_own_speed(scene: Any) -> N
     played = scene(2, ("Ego", trajectory(CORNER, "<None/>")))
     assert (played.at(0.4).x, played.at(0.4).y) == pytest.approx((108.0, -2.0))
     assert (played.at(1.0).x, played.at(1.0).y, played.at(1.0).yaw) == pytest.approx((110.0, 8.0, math.pi / 2))
-    assert played.when("action 0", "completeState") == pytest.approx(1.4)
+    assert played.when("action 0", "completeState") == pytest.approx(1.5)
 
 
 @pytest.mark.element("FollowTrajectoryAction", "Timing")
@@ -189,7 +189,7 @@ def test_times_say_when_a_vertex_is_passed(scene: Any, domain: str, offset: floa
     played = scene(6, ("Ego", trajectory(timed, timing), later))
     assert played.at(start + scale).x == pytest.approx(105.0)
     assert played.at(start + scale).speed == pytest.approx(5.0 / scale)
-    assert played.when("action 0", "completeState") == pytest.approx(start + 2 * scale - 0.1)
+    assert played.when("action 0", "completeState") == pytest.approx(start + 2 * scale)
 
 
 def test_in_the_mode_follow_speeds_change_evenly(scene: Any) -> None:

@@ -175,7 +175,7 @@ def test_lights_of_different_kinds_do_not_displace_each_other(scene: Any) -> Non
     assert played.commands[0].appearances["Ego"].lights == {"lowBeam": LightState("lowBeam", "on", fade=1.0)}
     assert set(played.commands[3].appearances["Ego"].lights) == {"lowBeam", "brakeLights"}
     assert played.when("action 0", "completeState") == pytest.approx(0.4)
-    assert played.when("action 1", "completeState") == pytest.approx(1.1)
+    assert played.when("action 1", "completeState") == pytest.approx(1.2)
 
 
 @pytest.mark.element("CustomCommandAction")

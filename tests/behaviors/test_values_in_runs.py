@@ -97,7 +97,7 @@ def test_lights_and_animations_are_in_the_frames(run: Any) -> None:
         for change in frame.changes
         if change.element == "action 1" and change.after.value == "completeState"
     ]
-    assert ended == pytest.approx([1.5])
+    assert ended == pytest.approx([1.55])
     assert played.frames[0].appearances == {}
 
 

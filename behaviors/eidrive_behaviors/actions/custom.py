@@ -10,6 +10,7 @@ from eidrive_scenario.api import ActionBehaviour, CustomCommand, model
 class CustomCommandAction(ActionBehaviour):
     """Hands its type and text on, once. It never starts a program."""
 
+    immediate = True
     action: model.CustomCommandAction
 
     def update(self) -> Status:

@@ -40,10 +40,12 @@ class LongitudinalDistanceAction(ActionBehaviour):
         error = self._gap() - self._wanted()
         if math.isnan(error):
             return Status.RUNNING
-        self._move(error)
-        return Status.SUCCESS if not self.action.continuous and abs(error) < REACHED else Status.RUNNING
+        then = self._move(error)
+        reached = abs(then) < REACHED or then * error < 0.0
+        return Status.SUCCESS if reached and not self.action.continuous else Status.RUNNING
 
-    def _move(self, error: float) -> None:
+    def _move(self, error: float) -> float:
+        """Set the speed; what of the error is left at the end of the step [m]."""
         limits, motion = self.action.dynamic_constraints, self.actor.motion
         faster = _or_infinite(limits.max_acceleration if limits is not None else None)
         slower = _or_infinite(limits.max_deceleration if limits is not None else None)
@@ -51,7 +53,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         if math.isinf(faster) and math.isinf(slower):
             motion.carry(error + other * self.stage.dt)
             motion.speed = other
-            return
+            return 0.0
         assert limits is not None
         wanted = self._spring(error, motion.speed - other, faster if error < 0.0 else slower)
         wanted = min(max(wanted, -slower), faster)
@@ -63,6 +65,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         self._acceleration = wanted
         top = _or_infinite(limits.max_speed)
         motion.speed = min(max(motion.speed + wanted * dt, -top), top)
+        return error + (other - motion.speed) * dt
 
     @staticmethod
     def _spring(error: float, faster_by: float, limit: float) -> float:

@@ -28,6 +28,8 @@ class TrafficInstanceAction(ActionBehaviour):
 
     parent_element: model.TrafficAction
 
+    immediate = True
+
     def __init__(
         self, action: model.Element, stage: Stage, *, actor: str | None = None, parent: model.Element | None = None
     ) -> None:
@@ -268,6 +270,7 @@ class TrafficAreaAction(TrafficInstanceAction):
 class TrafficStopAction(ActionBehaviour):
     """Ends all instances of the traffic of its name, or of all traffic where it has none; the cars drive on."""
 
+    immediate = True
     action: model.TrafficStopAction
     parent_element: model.TrafficAction
 

@@ -21,9 +21,10 @@ TRANSITIONS = {transition.value: transition for transition in Transition}
 class StoryboardElementStateCondition(Condition):
     """An element of the storyboard, by its name or by the end of its path (`Act::Event::Action`).
 
-    A transition is seen by the evaluation that follows it, and by no later one.
+    A transition is seen in the step in which it happens, by a trigger that is not asked then in the next one.
     """
 
+    instant = True
     element: model.StoryboardElementStateCondition
     _watch: Watch | None = None
 

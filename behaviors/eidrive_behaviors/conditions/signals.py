@@ -8,6 +8,7 @@ from eidrive_scenario.api import Condition, Problem, ScenarioError, Stage, model
 class TrafficSignalCondition(Condition):
     """A signal shows a state: the same text, whatever its case, as no tool's states differ in that alone."""
 
+    instant = True
     element: model.TrafficSignalCondition
 
     def bind(self, stage: Stage) -> None:
@@ -33,6 +34,7 @@ class TrafficSignalCondition(Condition):
 class TrafficSignalControllerCondition(Condition):
     """A controller is in a phase."""
 
+    instant = True
     element: model.TrafficSignalControllerCondition
 
     def bind(self, stage: Stage) -> None:

@@ -37,6 +37,7 @@ class TimeOfDayCondition(Condition):
     a zone and the other has none, both count in that zone.
     """
 
+    instant = True
     element: model.TimeOfDayCondition
 
     def bind(self, stage: Stage) -> None:

@@ -44,6 +44,7 @@ def _number(text: str) -> float | None:
 class ParameterCondition(Condition):
     """The value of a parameter, as ParameterActions may have set it."""
 
+    instant = True
     element: model.ParameterCondition
 
     def holds(self, stage: Stage) -> bool:
@@ -67,6 +68,7 @@ class ParameterCondition(Condition):
 class VariableCondition(Condition):
     """The value of a variable."""
 
+    instant = True
     element: model.VariableCondition
 
     def holds(self, stage: Stage) -> bool:

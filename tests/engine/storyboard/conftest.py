@@ -99,6 +99,12 @@ class Task(ActionBehaviour):
         return Status.SUCCESS if self._left <= 0 else Status.RUNNING
 
 
+class Setting(Task):
+    """An action that only sets a value: it is done as soon as it starts."""
+
+    immediate = True
+
+
 @pytest.fixture
 def stage() -> Stage:
     """A stage with cars A and B and no roads."""
@@ -123,6 +129,12 @@ def script() -> Callable[[Sequence[bool]], Script]:
 def task(stage: Stage) -> Callable[..., Task]:
     """Makes actions."""
     return lambda ticks, **more: Task(stage, ticks, **more)
+
+
+@pytest.fixture
+def setting(stage: Stage) -> Callable[[], Setting]:
+    """Makes actions that take no time."""
+    return lambda: Setting(stage, 1)
 
 
 @pytest.fixture
@@ -164,10 +176,12 @@ def build() -> Callable[..., Storyboard]:
         stop: str = "<StopTrigger/>",
         everywhere: str = "",
         registered: Registry | None = None,
+        declared: str = "",
     ) -> Storyboard:
         text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
         actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
         stories = ACT.format(events=events) if events else ""
+        text = text.replace("<CatalogLocations/>", declared + "<CatalogLocations/>")
         text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)
         return Storyboard(load_scenario(text.encode()), None, dt=0.1, actions=registered)
 

@@ -67,11 +67,7 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
     seen = []
     for _ in range(ticks):
         stage = clock.step()
-        if root.state is None:
-            root.stand_by()
-            root.begin()
-        root.judge()
-        root.tick_once()
+        root.play()
         seen.append([f"{c.element} {c.transition.name.lower()}" for c in stage.progress.changes if c.transition])
     return seen
 
@@ -79,16 +75,24 @@ def play(clock: Any, root: Any, ticks: Any) -> Any:
 @pytest.mark.element("Event without StartTrigger")
 def test_without_triggers_all_starts_in_one_tick_and_ends_from_the_bottom_up(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(2))))))
-    first, second, third = play(clock, root, 3)
+    first, second, third, fourth = play(clock, root, 4)
     assert first == [
         f"{name} start" for name in ("storyboard", "story", "act", "group", "maneuver", "event", "event.0")
     ]
-    assert second == [f"{name} end" for name in ("event.0", "event", "maneuver", "group", "act", "story", "storyboard")]
-    assert third == []
+    assert second == []
+    assert third == [f"{name} end" for name in ("event.0", "event", "maneuver", "group", "act", "story", "storyboard")]
+    assert fourth == []
 
 
-def test_an_action_of_one_tick_starts_and_ends_in_the_same(clock: Any, make: Any, task: Any) -> None:
+def test_an_action_of_one_step_ends_when_the_step_does(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))))
+    first, second = play(clock, root, 2)
+    assert first[-1] == "event.0 start"
+    assert second[-2:] == ["story end", "storyboard end"]
+
+
+def test_an_action_that_only_sets_a_value_takes_no_time(clock: Any, make: Any, setting: Any) -> None:
+    root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", setting())))))
     assert play(clock, root, 1)[0][-2:] == ["story end", "storyboard end"]
 
 
@@ -131,17 +135,40 @@ def test_override_stops_the_running_events_of_its_maneuver_only(
     old, new = make.event("old", task(9)), make.event("new", task(1), start=[NO, YES], priority=priority)
     other = make.maneuver(make.event("other", task(9)))
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new), other))), 2)
-    assert ticks[1] == ["old.0 stop", "old stop", "new start", "new.0 start", "new.0 end", "new end", "maneuver end"]
+    assert ticks[1] == ["old.0 stop", "old stop", "new start", "new.0 start"]
     assert other.state.name == "RUNNING"
 
 
+@pytest.mark.element("priority override")
+def test_who_is_overridden_is_complete_however_often_it_might_have_been_executed(
+    clock: Any, make: Any, task: Any
+) -> None:
+    old = make.event("old", task(9), start=[YES], limit=3)
+    new = make.event("new", task(1), start=[NO, YES], priority="override")
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(old, new)))), 3)
+    assert ticks[1] == ["old.0 stop", "old stop", "new start", "new.0 start"]
+    assert ticks[2][:3] == ["new.0 end", "new end", "maneuver end"]
+    assert old.executions == 1
+
+
 @pytest.mark.element("priority skip")
-def test_skip_stands_by_while_another_runs_and_may_start_later(clock: Any, make: Any, task: Any) -> None:
+def test_a_skipped_start_is_one_of_the_executions(clock: Any, make: Any, task: Any) -> None:
     running = make.event("running", task(2))
-    shy = make.event("shy", task(1), start=[NO, YES, YES], priority="skip")
+    shy = make.event("shy", task(1), start=[NO, YES, YES], priority="skip", limit=2)
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(running, shy)))), 4)
+    assert ticks[1] == ["shy skip"]
+    assert ticks[2] == ["running.0 end", "running end", "shy start", "shy.0 start"]
+    assert ticks[3][:3] == ["shy.0 end", "shy end", "maneuver end"]
+
+
+@pytest.mark.element("priority skip")
+def test_a_skipped_event_without_executions_left_is_complete(clock: Any, make: Any, task: Any) -> None:
+    running = make.event("running", task(2))
+    shy = make.event("shy", task(1), start=[NO, YES], priority="skip")
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(running, shy)))), 3)
-    assert ticks[1][:1] == ["shy skip"]
-    assert ticks[2][:2] == ["shy start", "shy.0 start"]
+    assert ticks[1] == ["shy skip"]
+    assert shy.state.name == "COMPLETE"
+    assert ticks[2][:3] == ["running.0 end", "running end", "maneuver end"]
 
 
 @pytest.mark.element("priority parallel")
@@ -155,9 +182,10 @@ def test_parallel_lets_others_run(clock: Any, make: Any, task: Any) -> None:
 def test_an_event_is_executed_as_often_as_it_may(clock: Any, make: Any, task: Any) -> None:
     event = make.event("event", task(1), start=[NO, YES], limit=2)
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 4)
-    assert ticks[1] == ["event start", "event.0 start", "event.0 end", "event end"]
+    assert ticks[1] == ["event start", "event.0 start"]
+    assert ticks[2] == ["event.0 end", "event end", "event start", "event.0 start"]
     assert event.executions == 2
-    assert ticks[2][-1] == "storyboard end"
+    assert ticks[3][-1] == "storyboard end"
 
 
 @pytest.mark.element("ManeuverGroup maximumExecutionCount")
@@ -166,8 +194,9 @@ def test_a_group_that_is_executed_again_starts_all_below_anew(clock: Any, make: 
     group = make.group(make.maneuver(make.event("event", doing)), limit=3)
     ticks = play(clock, make.storyboard(make.act(group)), 4)
     assert [tick.count("group start") for tick in ticks] == [1, 1, 1, 0]
+    assert ticks[1][:6] == ["event.0 end", "event end", "maneuver end", "group end", "group start", "maneuver start"]
     assert doing.starts == 3
-    assert ticks[2][-1] == "storyboard end"
+    assert ticks[3][-1] == "storyboard end"
 
 
 def test_what_has_no_children_runs_until_it_is_stopped(clock: Any, make: Any) -> None:
@@ -179,7 +208,7 @@ def test_what_has_no_children_runs_until_it_is_stopped(clock: Any, make: Any) ->
 
 def test_with_a_stop_trigger_the_storyboard_outlives_its_stories(clock: Any, make: Any, task: Any) -> None:
     root = make.storyboard(make.act(make.group(make.maneuver(make.event("event", task(1))))), stop=[NO])
-    assert play(clock, root, 1)[0][-1] == "story end"
+    assert play(clock, root, 2)[1][-1] == "story end"
     assert root.state.name == "RUNNING"
 
 
@@ -193,12 +222,22 @@ def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make:
     assert ticks[1] == ["fast start", "fast.0 start", "slow.0 stop", "slow end"]
 
 
+def test_who_is_displaced_in_the_step_that_would_bring_it_to_its_goal_does_not_end_but_stops(
+    clock: Any, make: Any, task: Any, stage: Any
+) -> None:
+    slow = make.event("slow", task(2, actor="A", domain=Domain.LATERAL))
+    watching = make.event("watching", task(9, actor="A", domain=Domain.LATERAL), start=[NO, YES])
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(slow, watching)))), 3)
+    assert "slow.0 stop" in ticks[1]
+    assert ticks[2] == []
+
+
 def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any, task: Any) -> None:
     action = make.action("action", task(1, actor="A"), task(2, actor="B"))
     event = EventElement(make.stage, ("event",), [action], priority="parallel")
-    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 2)
-    assert "action end" not in ticks[0]
-    assert ticks[1][0] == "action end"
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 3)
+    assert ticks[1] == []
+    assert ticks[2][0] == "action end"
 
 
 @pytest.mark.element("conflicting actions")

@@ -28,7 +28,7 @@ LEGAL = {
     Transition.START: {(State.STANDBY, State.RUNNING)},
     Transition.END: {(State.RUNNING, State.COMPLETE), (State.RUNNING, State.STANDBY)},
     Transition.STOP: {(State.STANDBY, State.COMPLETE), (State.RUNNING, State.COMPLETE)},
-    Transition.SKIP: {(State.STANDBY, State.STANDBY)},
+    Transition.SKIP: {(State.STANDBY, State.STANDBY), (State.STANDBY, State.COMPLETE)},
 }
 
 
@@ -127,11 +127,7 @@ class Tree:
         )
 
     def tick(self) -> list[StateChange]:
-        if self.root.state is None:
-            self.root.stand_by()
-            self.root.begin()
-        self.root.judge()
-        self.root.tick_once()
+        self.root.play()
         return list(self.stage.progress.changes)
 
 

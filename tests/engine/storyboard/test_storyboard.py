@@ -90,12 +90,13 @@ def test_a_step_of_speed_moves_the_actor_in_the_step_in_which_it_starts(build: A
     assert [round(a.placements["A"].x, 6) for a in answers] == [6.0, 7.0, 9.0, 11.0]
 
 
-def test_a_linear_change_of_speed_ends_in_the_tick_that_commands_its_target(build: Any) -> None:
+def test_a_linear_change_of_speed_ends_at_the_end_of_its_last_step(build: Any) -> None:
     event = EVENT.format(name="go", action=SPEED.format(shape="linear", value=0.3, speed=13), trigger="")
     storyboard = build(STARTS, event)
-    answers = play(storyboard, 3)
-    assert [a.placements["A"].speed for a in answers] == pytest.approx([11.0, 12.0, 13.0])
+    answers = play(storyboard, 4)
+    assert [a.placements["A"].speed for a in answers] == pytest.approx([11.0, 12.0, 13.0, 13.0])
     assert storyboard.ended == "storyboard complete"
+    assert storyboard.changes[0].time == pytest.approx(0.3)
 
 
 @pytest.mark.element("SimulationTimeCondition", "Storyboard StopTrigger")
@@ -177,10 +178,10 @@ WATCH = """<StartTrigger><ConditionGroup><Condition name="watch" delay="0" condi
         ("event", "first", "completeState", 0.3),
     ],
 )
-def test_a_start_is_seen_at_once_and_an_end_at_the_next_instant(
+def test_starts_and_ends_are_seen_in_the_step_in_which_they_happen(
     build: Any, kind: Any, name: Any, state: Any, when: Any
 ) -> None:
-    """The first event's action takes from 0 s to 0.3 s: it ends with its third step, whose end is the next view."""
+    """The first event's action takes from 0 s to 0.3 s: it ends with its third step."""
     events = EVENT.format(name="first", action=SPEED.format(shape="linear", value=0.3, speed=12), trigger="")
     watch = WATCH.format(kind=kind, name=f"{name} action" if kind == "action" else name, state=state)
     events += EVENT.format(name="second", action=SPEED.format(shape="step", value=0, speed=5), trigger=watch)

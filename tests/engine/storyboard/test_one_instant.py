@@ -1,0 +1,138 @@
+"""What happens at one instant: ends are seen in their own step, and chains of elements fall through it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.storyboard.states import Transition
+from eidrive_scenario.storyboard.trigger import ConditionMonitor
+
+PLACE = """<PrivateAction><TeleportAction><Position><WorldPosition x="5" y="0"/></Position></TeleportAction>
+  </PrivateAction>"""
+RAMP = """<PrivateAction><LongitudinalAction><SpeedAction>
+  <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="{time}"/>
+  <SpeedActionTarget><AbsoluteTargetSpeed value="1"/></SpeedActionTarget>
+  </SpeedAction></LongitudinalAction></PrivateAction>"""
+NOTE = """<UserDefinedAction><CustomCommandAction type="note">{text}</CustomCommandAction></UserDefinedAction>"""
+SET = """<GlobalAction><VariableAction variableRef="x"><SetAction value="{value}"/></VariableAction></GlobalAction>"""
+EVENT = """<Event name="{name}" priority="parallel" maximumExecutionCount="{limit}">
+  <Action name="{name} action">{action}</Action>{trigger}</Event>"""
+STATE = (
+    """<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{of}" state="{state}"/>"""
+)
+TIME = '<SimulationTimeCondition value="{value}" rule="greaterThan"/>'
+VARIABLE = '<VariableCondition variableRef="x" value="{value}" rule="equalTo"/>'
+CONDITION = """<Condition name="c" delay="{delay}" conditionEdge="{edge}">
+  <ByValueCondition>{what}</ByValueCondition></Condition>"""
+
+
+def when(*whats: str, kind: str = "Start", edge: str = "none", delay: float = 0.0) -> str:
+    """A trigger of one group."""
+    conditions = "".join(CONDITION.format(what=what, edge=edge, delay=delay) for what in whats)
+    return f"<{kind}Trigger><ConditionGroup>{conditions}</ConditionGroup></{kind}Trigger>"
+
+
+def event(name: str, trigger: str = "", action: str | None = None, limit: int = 1) -> str:
+    """An event; its action takes no time unless given."""
+    return EVENT.format(name=name, action=action or NOTE.format(text=name), trigger=trigger, limit=limit)
+
+
+def ended(of: str, state: str = "endTransition") -> str:
+    return STATE.format(of=of, state=state)
+
+
+def course(storyboard: Any, ticks: int) -> list[list[str]]:
+    """By tick of 0.1 s, what started and ended, in order."""
+    storyboard.initial()
+    seen = []
+    for tick in range(ticks):
+        storyboard.tick(replace(storyboard.stage.view, time=tick * 0.1, tick=tick))
+        words = {Transition.START: "starts", Transition.END: "ends", Transition.STOP: "stops"}
+        made = [c for c in storyboard.changes if c.kind in ("event", "storyboard") and c.transition in words]
+        seen.append([f"{c.element} {words[c.transition]}" for c in made])
+    return seen
+
+
+@pytest.mark.element("StoryboardElementStateCondition")
+@pytest.mark.parametrize("state", ["endTransition", "completeState"])
+@pytest.mark.parametrize("edge", ["none", "rising"])
+def test_a_chain_falls_through_one_step_whatever_the_order_of_the_file(build: Any, state: str, edge: str) -> None:
+    events = event("third", when(ended("second", state), edge=edge)) + event(
+        "second", when(ended("first", state), edge=edge)
+    )
+    ticks = course(build(PLACE, events + event("first", when(TIME.format(value=0.05)))), 3)
+    assert ticks[0] == ["storyboard starts"]
+    assert ticks[1][:6] == [f"{name} {word}" for name in ("first", "second", "third") for word in ("starts", "ends")]
+    assert ticks[2] == []
+
+
+@pytest.mark.element("StoryboardElementStateCondition")
+def test_an_action_that_takes_time_ends_when_its_goal_is_reached_and_the_next_starts_there(build: Any) -> None:
+    events = event("slow", action=RAMP.format(time=0.3)) + event("next", when(ended("slow")))
+    ticks = course(build(PLACE, events), 4)
+    assert ticks[:3] == [["storyboard starts", "slow starts"], [], []]
+    assert ticks[3] == ["slow ends", "next starts", "next ends", "storyboard ends"]
+
+
+def test_who_waits_for_each_other_in_a_circle_goes_round_once_a_step(build: Any) -> None:
+    kick = CONDITION.format(what=TIME.format(value=0.05), edge="rising", delay=0)
+    either = when(ended("b")).replace("</Start", f"<ConditionGroup>{kick}</ConditionGroup></Start")
+    ticks = course(build(PLACE, event("a", either, limit=4) + event("b", when(ended("a")), limit=4)), 6)
+    assert ticks[1] == ["a starts", "a ends", "b starts", "b ends"]
+    assert [sum("starts" in entry for entry in tick) for tick in ticks[1:]] == [2, 2, 2, 2, 0]
+
+
+def test_an_edge_meets_what_comes_true_at_the_same_instant(build: Any) -> None:
+    both = when(TIME.format(value=0.05), ended("first"), edge="rising")
+    ticks = course(build(PLACE, event("both", both) + event("first", when(TIME.format(value=0.05), edge="rising"))), 3)
+    assert ticks[1][:4] == ["first starts", "first ends", "both starts", "both ends"]
+
+
+@pytest.mark.element("Storyboard StopTrigger")
+def test_a_stop_trigger_sees_an_end_of_its_own_step(build: Any) -> None:
+    events = event("slow", action=RAMP.format(time=0.2)) + event("other", when(TIME.format(value=9)))
+    storyboard = build(PLACE, events, stop=when(ended("slow"), kind="Stop"))
+    assert course(storyboard, 3)[2] == ["slow ends", "other stops", "storyboard stops"]
+    assert storyboard.ended == "stop trigger"
+
+
+def test_the_delay_counts_from_the_step_of_the_end(build: Any) -> None:
+    events = event("slow", action=RAMP.format(time=0.2)) + event("late", when(ended("slow"), edge="rising", delay=0.3))
+    ticks = course(build(PLACE, events), 6)
+    assert ticks[2] == ["slow ends"]
+    assert ticks[5][0] == "late starts"
+
+
+@pytest.mark.element("VariableSetAction")
+def test_a_value_is_seen_in_its_own_step_by_triggers_further_up(build: Any) -> None:
+    events = event("reader", when(VARIABLE.format(value="7"), edge="rising")) + event(
+        "writer", when(TIME.format(value=0.15)), action=SET.format(value="7")
+    )
+    declared = (
+        '<VariableDeclarations><VariableDeclaration name="x" variableType="int" value="0"/></VariableDeclarations>'
+    )
+    ticks = course(build(PLACE, events, declared=declared), 3)
+    assert ticks[1] == []
+    assert ticks[2][:4] == ["writer starts", "writer ends", "reader starts", "reader ends"]
+
+
+def test_an_event_that_is_executed_again_starts_in_the_next_step(build: Any) -> None:
+    ticks = course(build(PLACE, event("again", limit=3)), 4)
+    assert [tick.count("again starts") for tick in ticks] == [1, 1, 1, 0]
+
+
+def test_conditions_that_look_at_the_view_are_asked_once_however_many_turns_a_step_takes(
+    clock: Any, script: Any, stage: Any
+) -> None:
+    watching, looking = script([False, True, True]), script([False, True, True])
+    looking.instant = True
+    clock.step()
+    for condition in (watching, looking):
+        monitor = ConditionMonitor(condition, edge="rising")
+        assert [monitor.evaluate(stage) for _ in range(3)] == (
+            [False] * 3 if condition is watching else [False, True, True]
+        )
+    assert (watching.asked, looking.asked) == (1, 3)
