@@ -143,7 +143,7 @@ class ActionElement(StoryElement):
         now = self.stage.progress.tick
         if self._decided_at != now:
             self._decided_at = now
-            done = []
+            done: list[ActionBehaviour] = []
             for behaviour in tuple(self.running):
                 yield from behaviour.tick()
                 if behaviour.status is not Status.RUNNING:
