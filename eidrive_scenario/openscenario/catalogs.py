@@ -53,6 +53,7 @@ class CatalogLibrary:
                 self._places[type(location).__name__.removesuffix("CatalogLocation")] = folder / path
         self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
+        self._unreadable: dict[Path, tuple[Problem, ...]] = {}
 
     def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
         """Reads the entries that the references name, and those that these refer to in turn."""
@@ -119,13 +120,18 @@ class CatalogLibrary:
             wanted = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
             self._wrong(found.reference, f"no place is given for the catalog {name!r}", f"add {wanted}")
             return None
-        files = list(_candidates(places, name))
-        before = len(self._findings.problems)
-        catalogs = {path: catalog for path in files if (catalog := self._file(path)) is not None}
-        named = next((catalog for catalog in catalogs.values() if catalog.name == name), None)
-        if named is not None:
-            return named
-        if len(self._findings.problems) > before or any(path.stem == name and path not in catalogs for path in files):
+        catalogs: dict[Path, CatalogFile] = {}
+        unreadable: list[Problem] = []
+        for path in _candidates(places, name):
+            catalog = self._file(path)
+            if catalog is not None and catalog.name == name:
+                self._findings.warnings.extend(unreadable)
+                return catalog
+            if catalog is not None:
+                catalogs[path] = catalog
+            unreadable += self._unreadable.get(path, ())
+        if unreadable:
+            self._findings.problems.extend(unreadable)
             return None
         for path, catalog in catalogs.items():
             if path.stem == name:
@@ -143,9 +149,7 @@ class CatalogLibrary:
                 line=found.reference.line,
             )
             return beside
-        where = ", ".join(str(place) for place in places)
-        known = suggestion(name, {catalog.name for catalog in catalogs.values()})
-        self._wrong(found.reference, f"no catalog {name!r} in {where}", known)
+        self._wrong(found.reference, *_nowhere(name, places, {catalog.name for catalog in catalogs.values()}))
         return None
 
     def _beside(self, name: str) -> CatalogFile | None:
@@ -160,6 +164,7 @@ class CatalogLibrary:
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
             catalog = self._file(path) if path.is_file() else None
+            self._findings.problems.extend(self._unreadable.get(path, ()))
             if catalog is not None and catalog.name == name:
                 return catalog
         return None
@@ -170,28 +175,42 @@ class CatalogLibrary:
         return list(dict.fromkeys([*own, *self._places.values()]))
 
     def _file(self, path: Path) -> CatalogFile | None:
-        """The catalog in a file, or None if it has none; what is wrong with it is found once."""
+        """The catalog in a file, or None if it has none or cannot be read; `_unreadable` has what is wrong with it."""
         if path not in self._files:
+            findings = Findings()
             try:
-                self._files[path] = self._read(path)
+                self._files[path] = _read(path, findings)
             except ScenarioError as error:
-                self._findings.problems.extend(error.problems)
+                findings.problems.extend(error.problems)
                 self._files[path] = None
+            self._findings.warnings.extend(findings.warnings)
+            if findings.problems:
+                self._unreadable[path] = tuple(findings.problems)
         return self._files[path]
-
-    def _read(self, path: Path) -> CatalogFile | None:
-        document = open_document(path)
-        catalog = document.root.find("Catalog")
-        if catalog is None:
-            return None
-        version = version_of(document, self._findings, older=VERSIONS[0])
-        if version is None:
-            return None
-        entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
-        return CatalogFile(catalog.get("name", path.stem), document, version, entries)
 
     def _wrong(self, reference: CatalogReference, message: str, remedy: str) -> None:
         self._findings.error(message, remedy, source=reference.source, line=reference.line)
+
+
+def _read(path: Path, findings: Findings) -> CatalogFile | None:
+    document = open_document(path)
+    catalog = document.root.find("Catalog")
+    if catalog is None:
+        return None
+    version = version_of(document, findings, older=VERSIONS[0])
+    if version is None:
+        return None
+    entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
+    return CatalogFile(catalog.get("name", path.stem), document, version, entries)
+
+
+def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:
+    """What is wrong where a catalog is in none of the places given, and what would be right."""
+    gone = [str(place) for place in places if not place.exists()]
+    message = f"no catalog {name!r} in " + ", ".join(str(place) for place in places)
+    if gone:
+        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", "correct the Directory"
+    return message, suggestion(name, known)
 
 
 def _assignments(reference: CatalogReference) -> dict[str, Assignment]:

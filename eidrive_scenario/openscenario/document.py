@@ -62,9 +62,13 @@ def version_of(document: Document, findings: Findings, older: Version | None = N
     """
     root = document.root
     if root.tag not in ROOTS:
+        name = etree.QName(root)
+        in_namespace = bool(name.namespace) and name.localname in ROOTS
         findings.error(
             f"the root element is {root.tag}, not OpenSCENARIO",
-            "is this another kind of file?",
+            f"take xmlns={name.namespace!r} out: the standard has no namespace"
+            if in_namespace
+            else "is this another kind of file?",
             source=document.name,
             line=line_of(root),
         )

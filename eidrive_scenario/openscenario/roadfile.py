@@ -28,7 +28,7 @@ def find_road_file(network: RoadNetwork | None, folder: Path, findings: Findings
         if candidate.is_file():
             return candidate
     findings.error(
-        f"no road file {logic.filepath!r} beside the scenario nor in the folders of {MAPS}",
+        f"no road file '{logic.filepath}' beside the scenario nor in the folders of {MAPS}",
         _remedy(logic, folder),
         source=logic.source,
         line=logic.line,
@@ -51,5 +51,7 @@ def _map_folders() -> list[Path]:
 def _remedy(logic: File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
-    known = {file.name for place in places if place.is_dir() for file in place.glob(f"*{SUFFIX}")}
-    return suggestion(named.name, known) if known else f"check LogicFile, or set {MAPS} to where the maps lie"
+    known = {file.stem for place in places if place.is_dir() for file in place.glob(f"*{SUFFIX}")}
+    if known:
+        return suggestion(named.name.removesuffix(SUFFIX), known)
+    return f"check LogicFile, or set {MAPS} to where the maps lie"

@@ -78,6 +78,8 @@ def _check_order(
         seen.add(name)
     for names in order.missing(state):
         if not (misplaced and seen & set(names)):
-            another = "another " if seen & set(names) else ""
-            what = f"the element {another}{names[0]}" if len(names) == 1 else "one of " + ", ".join(names)
+            if len(names) > 1:
+                what = "one of " + ", ".join(names)
+            else:
+                what = f"another {names[0]}" if names[0] in seen else f"the element {names[0]}"
             report(f"{node.tag} lacks {what}", f"it holds {known.summary}", node)

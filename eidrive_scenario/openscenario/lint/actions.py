@@ -123,6 +123,9 @@ def _times(shape: Polyline) -> Iterator[Problem]:
     for vertex in shape.vertex:
         if vertex.time is None:
             yield at(vertex, "a trajectory is followed by its times, and this vertex has none", "give it a time")
+    known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
+    if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
+        yield at(shape, f"all its vertices have the time {known[0]:g} s", "say when each vertex is passed")
     for one, after in pairwise(shape.vertex):
         if one.time is not None and after.time is not None and after.time < one.time:
             yield at(after, f"the time {after.time:g} s comes after {one.time:g} s", "let the times ascend")

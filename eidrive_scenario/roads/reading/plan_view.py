@@ -78,5 +78,7 @@ def _read_param_poly3(
     span = shape.get("pRange", "normalized")
     if span not in ("arcLength", "normalized"):
         findings.add(shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized")))
+    if not any((u1, u2, u3, v1, v2, v3)):
+        findings.add(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
     pace = 1.0 if span == "arcLength" else 1.0 / length
     return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace)

@@ -159,3 +159,34 @@ def test_an_entry_that_refers_to_itself_is_refused(shelf: Callable[..., Path], s
     path.write_text(text[:start] + reference("Cars", "car") + text[end:])
     with pytest.raises(ScenarioError, match="the catalog entry 'car' refers to itself"):
         load_scenario(path)
+
+
+def test_a_file_beside_the_catalog_that_cannot_be_read_is_a_warning(
+    shelf: Callable[..., Path], scene: Callable[..., Path]
+) -> None:
+    shelf("all.xosc", "Drivers", CONTROLLER.format(limit=3))
+    (shelf("aa.xosc", "Other", "")).write_text("<OpenSCENARIO><FileHeader")
+    scenario = load_scenario(scene(reference("Drivers", "driver")))
+    assert properties_of(scenario.controllers["Ego"][0])["limit"] == "3"
+    assert [Path(warning.source).name for warning in scenario.warnings] == ["aa.xosc"]
+
+
+def test_where_the_catalog_is_not_found_the_file_that_cannot_be_read_is_the_error(
+    shelf: Callable[..., Path], scene: Callable[..., Path]
+) -> None:
+    shelf("aa.xosc", "Other", "").write_text("<OpenSCENARIO><FileHeader")
+    with pytest.raises(ScenarioError, match=r"aa\.xosc:1: not well-formed XML"):
+        load_scenario(scene(reference("Drivers", "driver")))
+
+
+def test_a_folder_that_is_not_there_is_named(scene: Callable[..., Path]) -> None:
+    with pytest.raises(ScenarioError, match=r"no catalog 'Drivers' in .*gone; .*gone is not there"):
+        load_scenario(scene(reference("Drivers", "driver"), path=".\\gone"))
+
+
+def test_a_scenario_that_has_the_name_of_a_catalog_is_none(
+    shelf: Callable[..., Path], scene: Callable[..., Path], scenario_xml: Build
+) -> None:
+    shelf("Drivers.xosc", "", "").write_bytes(scenario_xml())
+    with pytest.raises(ScenarioError, match=r"no catalog 'Drivers' in"):
+        load_scenario(scene(reference("Drivers", "driver")))

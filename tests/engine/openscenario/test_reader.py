@@ -101,7 +101,7 @@ def test_structure_is_checked(scenario_xml: Build, action: str, message: str) ->
 def test_a_second_corner_is_missed(scenario_xml: Build) -> None:
     first, _, _ = CURVE.partition('<Vertex time="1">')
     xml = scenario_xml(init=private(TRAJECTORY.format(inside=f"{first}</Polyline></Shape></Trajectory>")))
-    assert problems_of(xml) == ["Polyline lacks the element another Vertex"]
+    assert problems_of(xml) == ["Polyline lacks another Vertex"]
 
 
 def test_an_attribute_of_a_newer_version_says_so(scenario_xml: Build) -> None:

@@ -153,8 +153,16 @@ class TestRoadFile:
     ) -> None:
         (tmp_path / "Town01.xodr").touch()
         monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
-        with pytest.raises(ScenarioError, match=r"no road file 'Twon01\.xodr' .* did you mean 'Town01\.xodr'\?"):
+        with pytest.raises(ScenarioError, match=r"no road file 'Twon01\.xodr' .* did you mean 'Town01'\?"):
             load_scenario(scenario_xml(road=self.LOGIC.format("Twon01.xodr")))
+
+    def test_a_common_suffix_makes_no_name_near(
+        self, tmp_path: Path, scenario_xml: Build, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "offset.xodr").touch()
+        monkeypatch.setenv("EIDRIVE_MAPS", str(tmp_path))
+        with pytest.raises(ScenarioError, match=r"no road file 'maps\\nowhere\.xodr' .* known: offset$"):
+            load_scenario(scenario_xml(road=self.LOGIC.format("maps\\nowhere.xodr")))
 
     def test_none_is_named(self, scenario_xml: Build) -> None:
         assert load_scenario(scenario_xml()).road_file is None

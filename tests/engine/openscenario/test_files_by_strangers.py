@@ -1,0 +1,99 @@
+"""Files as other people's editors and tools write them: encodings, names, numbers, and what they get wrong."""
+
+import codecs
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import load_scenario
+
+Build = Callable[..., bytes]
+Text = Callable[..., str]
+
+PROFILE = """<LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="{dimension}" value="{extent}"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>"""
+TIMED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false"><Shape><Polyline>
+<Vertex time="0"><Position><WorldPosition x="0" y="0"/></Position></Vertex>
+<Vertex time="1"><Position><WorldPosition x="9" y="0"/></Position></Vertex></Polyline></Shape></Trajectory>
+</TrajectoryRef><TimeReference><Timing domainAbsoluteRelative="relative" scale="{scale}" offset="0"/></TimeReference>
+<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+
+
+@pytest.mark.parametrize(
+    ("declared", "encoding", "mark"),
+    [
+        ("utf-8", "utf-8", codecs.BOM_UTF8),
+        ("utf-16", "utf-16", b""),
+        ("", "utf-16-be", codecs.BOM_UTF16_BE),
+        ("ISO-8859-1", "latin-1", b""),
+        ("windows-1252", "cp1252", b""),
+    ],
+)
+def test_encodings(scenario_xml: Build, declared: str, encoding: str, mark: bytes) -> None:
+    text = scenario_xml().decode().replace('name="Ego"', 'name="Mäuschen"')
+    head = f'<?xml version="1.0" encoding="{declared}"?>\n' if declared else ""
+    assert list(load_scenario(mark + (head + text).encode(encoding)).entities) == ["Mäuschen"]
+
+
+def test_comments_instructions_and_the_schema_s_location_change_nothing(scenario_xml: Build, story_xml: Text) -> None:
+    plain = scenario_xml(story=story_xml())
+    dressed = plain.replace(
+        b"<OpenSCENARIO>",
+        b'<?xml-stylesheet href="a.xsl"?><!-- by hand -->'
+        b'<OpenSCENARIO xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="a.xsd">',
+    )
+    dressed = dressed.replace(b"<Event ", b"<!-- first --><?tool keep?><Event ")
+    assert load_scenario(dressed).storyboard == load_scenario(plain).storyboard
+
+
+def test_a_namespace_is_named_as_what_is_wrong(scenario_xml: Build) -> None:
+    xml = scenario_xml().replace(b"<OpenSCENARIO>", b'<OpenSCENARIO xmlns="urn:x">')
+    with pytest.raises(ScenarioError, match=r"take xmlns='urn:x' out"):
+        load_scenario(xml)
+
+
+def test_names_in_any_script(scenario_xml: Build, story_xml: Text) -> None:
+    xml = (
+        scenario_xml(story=story_xml()).decode().replace("Ego", "車 ①").replace('"event"', '"&lt;ブレーキ &amp; 2&gt;"')
+    )
+    scenario = load_scenario(xml.encode())
+    assert list(scenario.entities) == ["車 ①"]
+    assert scenario.storyboard.story[0].act[0].maneuver_group[0].maneuver[0].event[0].name == "<ブレーキ & 2>"
+
+
+@pytest.mark.parametrize(("written", "value"), [("1e1", 10.0), ("+5", 5.0), (" 2 ", 2.0), (".5", 0.5), ("1.E0", 1.0)])
+def test_numbers_as_the_schema_has_them(scenario_xml: Build, story_xml: Text, written: str, value: float) -> None:
+    action = load_scenario(scenario_xml(story=story_xml(speed=written))).storyboard.story[0].act[0].maneuver_group[0]
+    private = action.maneuver[0].event[0].action[0].private_action
+    assert private is not None
+    assert private.longitudinal_action is not None
+    assert private.longitudinal_action.speed_action is not None
+    target = private.longitudinal_action.speed_action.speed_action_target.absolute_target_speed
+    assert target is not None
+    assert target.value == value
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (PROFILE.format(dimension="time", extent=1, speed="NaN"), "value of AbsoluteTargetSpeed is NaN"),
+        (PROFILE.format(dimension="time", extent="-1", speed=5), "a transition cannot take -1 s"),
+        (PROFILE.format(dimension="distance", extent="-20", speed=5), "a transition cannot take -20 m"),
+        (TIMED.format(scale=0), "Timing has the scale 0"),
+        (TIMED.format(scale=-2), "Timing has the scale -2"),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused(
+    tmp_path: Path, scenario_xml: Build, story_xml: Text, action: str, message: str
+) -> None:
+    path = tmp_path / "scene.xosc"
+    path.write_bytes(scenario_xml(story=story_xml(action=action)))
+    with pytest.raises(ScenarioError, match=rf"scene\.xosc:\d+: {message}"):
+        load_scenario(path)
+
+
+def test_the_sign_of_a_rate_does_not_matter(scenario_xml: Build, story_xml: Text) -> None:
+    load_scenario(scenario_xml(story=story_xml(action=PROFILE.format(dimension="rate", extent="-4", speed=5))))
