@@ -119,9 +119,9 @@ class Builder:
         self, maneuver: model.Maneuver, above: Place, actors: Sequence[str], by_trigger: bool
     ) -> ManeuverElement:
         path = (*above, maneuver.name)
-        events = [self._event(event, path, actors, by_trigger) for event in maneuver.event]
+        events = tuple(self._event(event, path, actors, by_trigger) for event in maneuver.event)
         for event in events:
-            event.rivals = tuple(other for other in events if other is not event)
+            event.rivals = events
         return ManeuverElement(self._stage, path, events)
 
     def _event(self, event: model.Event, above: Place, actors: Sequence[str], by_trigger: bool) -> EventElement:
