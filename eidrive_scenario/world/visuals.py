@@ -24,7 +24,7 @@ from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.render.lamps import Beam
 from eidrive_scenario.world.render.model import Array, Instance, Light, Model, gridded, merged, model, placed
-from eidrive_scenario.world.render.renderer import render
+from eidrive_scenario.world.render.renderer import Renderer, Subjects
 from eidrive_scenario.world.roadside import Roadside
 from eidrive_scenario.world.scenery import Building, Scenery
 from eidrive_scenario.world.vehicle_lamps import beam, glow
@@ -57,6 +57,7 @@ class Visuals:
         self._roadside = Roadside(scenery.furniture, heads)
         self._shown_buildings = 0
         self._ground = self._ground_parts()
+        self._renderer = Renderer()
         self._buildings: Model | None = None
         self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
@@ -96,10 +97,14 @@ class Visuals:
         ]
         left_out = frozenset(hidden)
         roadside = self._roadside.instances(pose[:3, 3], shown.signals, shown.time)
-        drawn = [*self._ground, *houses, *roadside, *(each for name, each in actors.items() if name not in left_out)]
-        casters = [*houses, *roadside, *actors.values()]
+        subjects = Subjects(
+            self._ground,
+            [*houses, *roadside],
+            [each for name, each in actors.items() if name not in left_out],
+            [each for name, each in actors.items() if name in left_out],
+        )
         ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
-        return render(drawn, casters, beams, weather, pose, pinhole, ground)
+        return self._renderer.render(subjects, beams, weather, pose, pinhole, ground)
 
     def _ground_parts(self) -> list[Instance]:
         """Roads, their markings, and the land around, cut along a grid."""

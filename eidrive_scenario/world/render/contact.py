@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.eye import Eye
 from eidrive_scenario.world.render.model import Array, Floats, Instance
+from eidrive_scenario.world.render.rasterise import Cover
 
 _LEAST = 0.12
 """Share of the sky's light in the middle below a body."""
@@ -23,58 +24,78 @@ _NEAR_GROUND = 0.12
 _FEWEST_PIXELS = 10.0
 
 
-class Ground(NamedTuple):
-    """Points (n,) relative to the camera, whether their surfaces look up, and where each pixel's point is: the index
-    (H, W) among them, or -1."""
-
-    x: Floats
-    y: Floats
-    z: Floats
-    upright: NDArray[np.bool_]
-    where: NDArray[np.int32]
+class _Window(NamedTuple):
+    lines: slice
+    columns: slice
 
 
-def dimmed(bodies: Sequence[Instance], ground: Ground, pose: Array, pinhole: Pinhole) -> Floats:
-    """(n,) share of the sky's light that bodies leave to points of the ground."""
-    share = np.ones(len(ground.x), dtype=np.float32)
+def dimmed(bodies: Sequence[Instance], cover: Cover, upright: NDArray[np.bool_], eye: Eye) -> Floats:
+    """(H, W) share of the sky's light that bodies leave to the ground that the pixels show; `upright` by triangle."""
+    share = np.ones(eye.shape, dtype=np.float32)
     for body in bodies:
         half = body.model.half
-        middle = body.rotation @ np.array([*body.model.centre[:2], 0.0]) + body.position - pose[:3, 3]
+        middle = body.rotation @ np.array([*body.model.centre[:2], 0.0]) + body.position - eye.place
         away = math.sqrt(float(middle @ middle))
-        if 2.0 * float(half[0]) * pinhole.focal < _FEWEST_PIXELS * away:
+        if 2.0 * float(half[0]) * eye.pinhole.focal < _FEWEST_PIXELS * away:
             continue
-        window = _window(middle, body, half, pose, pinhole)
-        if window is None:
-            continue
-        rows = ground.where[window].ravel()
-        rows = rows[rows >= 0]
-        rows = rows[ground.upright[rows] & (np.abs(ground.z[rows] - np.float32(middle[2])) < _NEAR_GROUND)]
-        if not len(rows):
-            continue
-        dx, dy = ground.x[rows] - np.float32(middle[0]), ground.y[rows] - np.float32(middle[1])
-        cos, sin = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
-        ahead = np.abs(cos * dx + sin * dy) - np.float32(half[0])
-        aside = np.abs(cos * dy - sin * dx) - np.float32(half[1])
-        outside = np.hypot(np.maximum(ahead, 0.0), np.maximum(aside, 0.0)) + np.minimum(np.maximum(ahead, aside), 0.0)
-        rise = np.clip((outside + np.float32(_INSET)) / np.float32(_INSET + _REACH), np.float32(0.0), np.float32(1.0))
-        rise *= np.float32(2.0) - rise
-        share[rows] = np.minimum(share[rows], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
+        window = _window(middle, body, half, eye)
+        if window is not None:
+            _dim(share[window], window, middle, body, cover, upright, eye)
     return share
 
 
-def _window(middle: Array, body: Instance, half: Array, pose: Array, pinhole: Pinhole) -> tuple[slice, slice] | None:
+def _dim(
+    share: Floats, window: _Window, middle: Array, body: Instance, cover: Cover, upright: NDArray[np.bool_], eye: Eye
+) -> None:
+    """What one body leaves in its window of the picture."""
+    triangle = cover.triangle[window]
+    rows = np.flatnonzero(upright[triangle] & (triangle >= 0))
+    if not len(rows):
+        return
+    far = np.float32(1.0) / cover.nearness[window].ravel()[rows]
+    own_x, own_y = (part.reshape(eye.shape)[window].ravel()[rows] for part in (eye.x, eye.y))
+    x, y, z = (ray * far for ray in eye.rays(own_x, own_y))
+    level = np.flatnonzero(np.abs(z - np.float32(middle[2])) < _NEAR_GROUND)
+    rows, dx, dy = rows[level], x[level] - np.float32(middle[0]), y[level] - np.float32(middle[1])
+    half = body.model.half
+    cos, sin = body.rotation[:2, 0].astype(np.float32) / np.float32(math.hypot(*body.rotation[:2, 0]))
+    ahead = np.abs(cos * dx + sin * dy) - np.float32(half[0])
+    aside = np.abs(cos * dy - sin * dx) - np.float32(half[1])
+    inwards = np.minimum(np.maximum(ahead, aside), np.float32(0.0))
+    ahead, aside = np.maximum(ahead, np.float32(0.0)), np.maximum(aside, np.float32(0.0))
+    outside = np.sqrt(ahead * ahead + aside * aside) + inwards
+    rise = np.clip((outside + np.float32(_INSET)) / np.float32(_INSET + _REACH), np.float32(0.0), np.float32(1.0))
+    rise *= np.float32(2.0) - rise
+    lines, columns = np.divmod(rows, share.shape[1])
+    share[lines, columns] = np.minimum(share[lines, columns], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
+
+
+def _window(middle: Array, body: Instance, half: Array, eye: Eye) -> _Window | None:
     """The part of the picture that the dimmed ground around a body can fill; None where it is out of the picture."""
-    signs = np.array([(1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)], dtype=float)
+    pinhole = eye.pinhole
+    signs = np.array([(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)], dtype=float)
     reach = np.array([half[0] + _REACH, half[1] + _REACH, 0.0])
     corners = (signs * reach) @ body.rotation.T + middle
-    x, y, depth = (corners @ pose[:3, :3]).T
-    if (depth < pinhole.near).all():
+    corners = _ahead(corners @ eye.pose[:3, :3], pinhole.near)
+    if not len(corners):
         return None
-    if (depth < 0.5).any():
-        return slice(0, pinhole.height), slice(0, pinhole.width)
+    x, y, depth = corners.T
     columns, rows = x / depth * pinhole.focal + pinhole.centre_x, y / depth * pinhole.focal + pinhole.centre_y
     left, right = max(math.floor(columns.min()), 0), min(math.ceil(columns.max()) + 1, pinhole.width)
     top, bottom = max(math.floor(rows.min()), 0), min(math.ceil(rows.max()) + 1, pinhole.height)
     if left >= right or top >= bottom:
         return None
-    return slice(top, bottom), slice(left, right)
+    return _Window(slice(top, bottom), slice(left, right))
+
+
+def _ahead(corners: Array, near: float) -> Array:
+    """The part (M, 3) of a polygon (N, 3) in the camera's frame that is not nearer than the near plane."""
+    if (corners[:, 2] >= near).all():
+        return corners
+    found = []
+    for first, second in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if first[2] >= near:
+            found.append(first)
+        if (first[2] >= near) != (second[2] >= near):
+            found.append(first + (near - first[2]) / (second[2] - first[2]) * (second - first))
+    return np.array(found).reshape(-1, 3)

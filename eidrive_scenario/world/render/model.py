@@ -25,9 +25,9 @@ _CELL = 30.0
 """Scenery is cut into squares of this side, of which those out of sight cost nothing [m]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
-    """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front.
+    """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front. Each equals only itself.
 
     normals (K, 3) unit, plane (K,) = normal · corner, albedo (K, 3) linear, finish (K,) index of FINISHES,
     material (K,) index of `materials`, coarse indices of the triangles that matter from afar; centre (3,), half (3,)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -12,136 +11,261 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
-from eidrive_scenario.world.render.contact import Ground, dimmed
-from eidrive_scenario.world.render.daylight import daylight
-from eidrive_scenario.world.render.lamps import Beam, numbered
+from eidrive_scenario.world.render.contact import dimmed
+from eidrive_scenario.world.render.daylight import Daylight, daylight
+from eidrive_scenario.world.render.eye import Eye, runs
+from eidrive_scenario.world.render.lamplight import Lamplight, lamplight
+from eidrive_scenario.world.render.lamps import Beam
 from eidrive_scenario.world.render.materials import SOAKS
 from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import rasterise
-from eidrive_scenario.world.render.shading import Points, shade
-from eidrive_scenario.world.render.shadows import shadow_map
-from eidrive_scenario.world.render.sky import dome, horizon, sample
-from eidrive_scenario.world.render.staging import Stage, Surfaces, stage
-from eidrive_scenario.world.render.surfaces import hollows
+from eidrive_scenario.world.render.rasterise import Cover, rasterise, rasterised
+from eidrive_scenario.world.render.shading import Lit, lit_surfaces, points_at, sampled, shade, together
+from eidrive_scenario.world.render.shadows import ShadowGrid, ShadowMap, shadow_grid
+from eidrive_scenario.world.render.sky import dome, horizon
+from eidrive_scenario.world.render.staging import stage
 from eidrive_scenario.world.weather import Weather
 
 DAYLIGHT = 1000.0
 """Light on the ground under which headlamps add nothing to see [lx]."""
 GLARE = 0.03
 """Share of light that a lens scatters around a bright spot."""
+_AT_ONCE = 16_384
+"""Pixels that are shaded at once: as many as a processor keeps near it."""
 
 
-def render(
-    instances: Sequence[Instance],
-    casters: Sequence[Instance],
-    beams: Sequence[Beam],
-    weather: Weather,
-    pose: Array,
-    pinhole: Pinhole,
-    ground: float,
-) -> Radiance:
-    """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m]."""
-    staged = stage(instances, pose, pinhole)
-    cover = rasterise(staged.x, staged.y, staged.nearness, pinhole.width, pinhole.height)
-    light, heaven = daylight(weather), dome(weather)
-    eye = pose[:3, 3]
-    rx, ry, rz, length = _rays(pinhole, pose)
-    rays = (rx / length, ry / length, rz / length)
-    shape = (pinhole.height, pinhole.width)
-    picture = [np.ravel(plane) for plane in cv2.split(sample(heaven, *(part.reshape(shape) for part in rays)))]
-    shown = np.flatnonzero(cover.triangle >= 0)
-    depth = np.full(len(cover.triangle), np.inf, dtype=np.float32)
-    label = np.full(len(cover.triangle), -1, dtype=np.int32)
-    if len(shown):
-        far = np.float32(1.0) / cover.nearness[shown]
-        triangle, surfaces = _seen_surfaces(staged, cover.triangle[shown])
-        points = Points(
-            triangle,
-            rx[shown] * far,
-            ry[shown] * far,
-            rz[shown] * far,
-            (rays[0][shown], rays[1][shown], rays[2][shown]),
-            length[shown] * far,
-            numbered((cover.triangle >= 0).reshape(shape)),
-        )
-        shadows = shadow_map(casters, light.towards, pose, pinhole) if light.sun.any() else None
-        upright = surfaces.normal[2][triangle] > 0.9
-        ground_points = Ground(points.x, points.y, points.z, upright, points.where)
-        open_sky = dimmed([each for each in instances if each.label >= 0], ground_points, pose, pinhole)
+class Subjects(NamedTuple):
+    """What there is to see: what lies on the ground, what stands on it and shades, actors, and such that are not seen,
+    but shade."""
+
+    ground: Sequence[Instance]
+    standing: Sequence[Instance]
+    actors: Sequence[Instance]
+    unseen: Sequence[Instance] = ()
+
+    @property
+    def scenery(self) -> Sequence[Instance]:
+        """All but actors."""
+        return (*self.ground, *self.standing)
+
+
+class _Circumstances(NamedTuple):
+    """What all pixels have in common."""
+
+    eye: Eye
+    weather: Weather
+    light: Daylight
+    sky: Floats
+    grid: ShadowGrid | None
+
+
+class _Canvas(NamedTuple):
+    """Of all pixels: light (3, P) [cd/m²], depth (P,) [m], label (P,)."""
+
+    planes: Floats
+    depth: Floats
+    label: NDArray[np.int32]
+
+    @classmethod
+    def blank(cls, pixels: int) -> _Canvas:
+        """Nothing drawn, nothing lit."""
+        empty = np.empty((3, pixels), dtype=np.float32)
+        return cls(empty, np.full(pixels, np.inf, dtype=np.float32), np.full(pixels, -1, dtype=np.int32))
+
+    def copy(self) -> _Canvas:
+        """One to draw on."""
+        return _Canvas(self.planes.copy(), self.depth.copy(), self.label.copy())
+
+
+class _Kept(NamedTuple):
+    """The scenery in front of a camera that stands still.
+
+    cover and lit of it; canvas of the picture without actors, in daylight on dry roads; heights of what shades, and the
+    cells of the sun's grid where the pixels' points lie
+    """
+
+    cover: Cover
+    lit: Lit
+    canvas: _Canvas
+    heights: Floats | None
+    cells: NDArray[np.int32] | None
+
+
+class Renderer:
+    """Draws pictures. Of cameras that stand still it keeps the scenery, and draws anew what actors change: the picture
+    is the same, bit by bit."""
+
+    MOST_KEPT = 24
+    """Cameras of which the scenery is kept; a picture of 800 x 600 pixels takes 13 MB."""
+
+    def __init__(self) -> None:
+        self._kept: dict[object, _Kept | None] = {}
+
+    def render(
+        self,
+        subjects: Subjects,
+        beams: Sequence[Beam],
+        weather: Weather,
+        pose: Array,
+        pinhole: Pinhole,
+        ground: float,
+        *,
+        keep: bool = True,
+    ) -> Radiance:
+        """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
+
+        Scenery is kept from the second picture on that shows the same, unless not to `keep` it is asked.
+        """
+        light = daylight(weather)
+        eye = Eye(pose, pinhole)
+        grid = shadow_grid(light.towards, eye) if light.sun.any() else None
+        at = _Circumstances(eye, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
-        luminance = shade(points, surfaces, eye, light, weather, heaven, shadows, felt, open_sky)
-        if weather.wetness > 0.0:
-            _wet(luminance, shown, points, surfaces.finish, open_sky, weather, pose, pinhole, ground)
-        through = np.exp(np.float32(-weather.extinction) * points.distance)
-        for plane, own, air in zip(picture, luminance, horizon(weather).tolist(), strict=True):
-            plane[shown] = (own - np.float32(air)) * through + np.float32(air)
-        near = np.flatnonzero(far <= pinhole.far)
-        depth[shown[near]] = far[near]
-        label[shown[near]] = surfaces.label[triangle[near]]
-    whole: Floats = np.asarray(cv2.merge([plane.reshape(shape) for plane in picture]), dtype=np.float32)
-    if weather.lamps_on:
-        whole = _with_glare(whole)
-    return Radiance(whole, depth.reshape(shape), label.reshape(shape))
+        known = self._known(subjects, at) if keep else None
+        canvas = _whole(subjects, felt, at, ground) if known is None else _renewed(known, subjects, felt, at, ground)
+        planes = [plane.reshape(eye.shape) for plane in canvas.planes]
+        whole: Floats = np.asarray(cv2.merge(planes), dtype=np.float32)
+        if weather.lamps_on:
+            whole = _with_glare(whole)
+        return Radiance(whole, canvas.depth.reshape(eye.shape), canvas.label.reshape(eye.shape))
+
+    def _known(self, subjects: Subjects, at: _Circumstances) -> _Kept | None:
+        """The scenery of a picture, if the one before from there showed the same."""
+        looks = tuple(
+            (each.model, each.position.tobytes(), each.label, tuple(each.glow.items())) for each in subjects.scenery
+        )
+        key = (at.eye.pose.tobytes(), at.eye.pinhole, at.weather, looks)
+        seen_before = key in self._kept
+        found = self._kept.pop(key, None)
+        if seen_before and found is None:
+            found = _scenery(subjects, at)
+        self._kept[key] = found
+        while len(self._kept) > self.MOST_KEPT:
+            del self._kept[next(iter(self._kept))]
+        return found
 
 
-def _seen_surfaces(staged: Stage, triangle: NDArray[np.int32]) -> tuple[NDArray[np.int32], Surfaces]:
-    """The triangles that the picture shows, and their numbers among these."""
-    marks = np.zeros(staged.x.shape[1], dtype=bool)
-    marks[triangle] = True
-    seen = np.flatnonzero(marks)
-    number = np.empty(len(marks), dtype=np.int32)
-    number[seen] = np.arange(len(seen), dtype=np.int32)
-    return number[triangle], staged.surfaces(seen)
+def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
+    """The picture, all drawn anew."""
+    staged = stage([*subjects.scenery, *subjects.actors], at.eye.pose, at.eye.pinhole)
+    cover = rasterise(staged.x, staged.y, staged.nearness, at.eye.pinhole.width, at.eye.pinhole.height)
+    lit = lit_surfaces(staged.surfaces, at.light, at.weather)
+    casters = [*subjects.standing, *subjects.actors, *subjects.unseen]
+    shadows = at.grid.drawn(casters) if at.grid is not None else None
+    open_sky = dimmed(_dimming(subjects), cover, lit.upright, at.eye)
+    canvas = _Canvas.blank(cover.triangle.size)
+    _draw(canvas, cover, lit, shadows, open_sky, beams, at, ground)
+    return canvas
 
 
-@lru_cache(maxsize=32)
-def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
-    """x, y (H · W,) at depth 1 in the camera's frame, and the length of each ray there."""
-    columns = (np.arange(pinhole.width) + 0.5 - pinhole.centre_x) / pinhole.focal
-    rows = (np.arange(pinhole.height) + 0.5 - pinhole.centre_y) / pinhole.focal
-    x, y = (grid.ravel().astype(np.float32) for grid in np.meshgrid(columns, rows))
-    return x, y, np.sqrt(x * x + y * y + np.float32(1.0))
+def _dimming(subjects: Subjects) -> list[Instance]:
+    return [each for each in (*subjects.standing, *subjects.actors) if each.label >= 0]
 
 
-def _rays(pinhole: Pinhole, pose: Array) -> tuple[Floats, Floats, Floats, Floats]:
-    """The rays through the pixels in the world's axes, at depth 1, and their lengths."""
-    x, y, length = _own_rays(pinhole)
-    turn = pose[:3, :3].astype(np.float32)
-    rx, ry, rz = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] for axis in range(3))
-    return rx, ry, rz, length
-
-
-def _wet(
-    luminance: Floats,
-    shown: NDArray[np.int64],
-    points: Points,
-    finish: NDArray[np.uint8],
+def _draw(
+    canvas: _Canvas,
+    cover: Cover,
+    lit: Lit,
+    shadows: ShadowMap | None,
     open_sky: Floats,
-    weather: Weather,
-    pose: Array,
-    pinhole: Pinhole,
+    beams: Sequence[Beam],
+    at: _Circumstances,
     ground: float,
 ) -> None:
-    """Add to luminance (3, n) what a wet road mirrors, from a picture of half as many lines and columns."""
-    on_road = np.flatnonzero(SOAKS[finish[points.triangle]])
-    if not len(on_road):
+    """Draw all pixels."""
+    triangle = cover.triangle.reshape(-1)
+    for part in runs(np.flatnonzero(triangle < 0), _AT_ONCE):
+        canvas.planes[:, part] = sampled(at.sky, *at.eye.directions(part))
+    shown = np.flatnonzero(triangle >= 0)
+    lamps = lamplight(beams, cover, lit.surfaces, at.eye) if beams else None
+    if at.weather.wetness <= 0.0:
+        _paint(canvas, shown, cover, lit, shadows, open_sky, lamps, at)
         return
-    shape = (pinhole.height, pinhole.width)
-    some = points.where[::2, ::2]
-    small = replace(pinhole.finer(0.5), width=some.shape[1], height=some.shape[0])
-    rx, ry, rz, length = (part.reshape(shape)[::2, ::2] for part in _rays(pinhole, pose))
-    sky = sample(dome(weather), rx / length, ry / length, np.abs(rz / length))
-    rows = some[some >= 0]
-    places = (points.x[rows], points.y[rows], points.z[rows])
-    image = wet_road.mirrored(luminance[:, rows], places, sky, ground - float(pose[2, 3]), pose, small)
-    image = np.asarray(cv2.resize(wet_road.blurred(image), shape[::-1], interpolation=cv2.INTER_LINEAR))
-    x, y = points.x[on_road] + np.float32(pose[0, 3] % 4096.0), points.y[on_road] + np.float32(pose[1, 3] % 4096.0)
-    share = wet_road.reflectance(np.abs(points.ray[2][on_road]))
-    share *= wet_road.puddles(x, y, weather.wetness, hollows())
-    dim = open_sky[on_road]
-    for own, plane in zip(luminance, cv2.split(image), strict=True):
-        before = own[on_road]
-        own[on_road] = before + share * (np.ravel(plane)[shown[on_road]] * dim - before)
+    _paint(canvas, shown, cover, lit, shadows, open_sky, lamps, at, fog=False)
+    on_road = shown[SOAKS[lit.surfaces.finish][triangle[shown]]]
+    wet_road.add_reflections(canvas.planes, on_road, cover, open_sky, at.sky, at.eye, at.weather.wetness, ground)
+    for part in runs(shown, _AT_ONCE):
+        distance = at.eye.length[part] * (np.float32(1.0) / cover.nearness.reshape(-1)[part])
+        canvas.planes[:, part] = _through_air(canvas.planes[:, part], distance, at.weather)
+
+
+def _paint(
+    canvas: _Canvas,
+    pixels: NDArray[np.intp],
+    cover: Cover,
+    lit: Lit,
+    shadows: ShadowMap | None,
+    open_sky: Floats,
+    lamps: Lamplight | None,
+    at: _Circumstances,
+    fog: bool = True,
+) -> None:
+    """Draw pixels that show something, each by itself."""
+    for part in runs(pixels, _AT_ONCE):
+        points = points_at(part, cover, at.eye)
+        shone = None if lamps is None else Lamplight(lamps.received[part], lamps.across[part])
+        sky_left = open_sky.reshape(-1)[part]
+        luminance = shade(points, lit, at.eye.place, at.light, at.weather, at.sky, shadows, shone, sky_left)
+        canvas.planes[:, part] = _through_air(luminance, points.distance, at.weather) if fog else luminance
+        near = points.depth <= at.eye.pinhole.far
+        canvas.depth[part] = np.where(near, points.depth, np.float32(np.inf))
+        canvas.label[part] = np.where(near, lit.surfaces.label[points.triangle], np.int32(-1))
+
+
+def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Floats:
+    """What is left of light (3, n) over a distance, and what the air adds."""
+    through = np.exp(np.float32(-weather.extinction) * distance)
+    air = horizon(weather).astype(np.float32)[:, None]
+    found: Floats = luminance - air
+    found *= through
+    found += air
+    return found
+
+
+def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
+    """The picture without actors, and what is needed to draw them into it."""
+    eye = at.eye
+    staged = stage(subjects.scenery, eye.pose, eye.pinhole)
+    cover = rasterise(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
+    lit = lit_surfaces(staged.surfaces, at.light, at.weather)
+    canvas = _Canvas.blank(cover.triangle.size)
+    heights = cells = still = None
+    if at.grid is not None:
+        still = at.grid.drawn(subjects.standing)
+        heights = np.full((at.grid.height, at.grid.width), np.float32(-np.inf))
+        heights[still.window] = still.heights
+        cells = np.full(cover.triangle.size, -1, dtype=np.int32)
+        for part in runs(np.flatnonzero(cover.triangle.reshape(-1) >= 0), _AT_ONCE):
+            points = points_at(part, cover, eye)
+            cells[part] = at.grid.numbers(points.x, points.y, points.z)
+    _draw(canvas, cover, lit, still, np.ones(eye.shape, dtype=np.float32), (), at, 0.0)
+    return _Kept(cover, lit, canvas, heights, cells)
+
+
+def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
+    """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbours too."""
+    eye = at.eye
+    staged = stage(subjects.actors, eye.pose, eye.pinhole)
+    seen = rasterised(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
+    lit = together(known.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
+    triangle, nearness = known.cover.triangle.copy(), known.cover.nearness.copy()
+    before = (seen.triangle >= 0) & (seen.nearness >= nearness[seen.window])
+    np.copyto(triangle[seen.window], seen.triangle + np.int32(len(known.lit.upright)), where=before)
+    np.copyto(nearness[seen.window], seen.nearness, where=before)
+    cover = Cover(triangle, nearness)
+    open_sky = dimmed(_dimming(subjects), cover, lit.upright, eye)
+    changed = open_sky < 1.0
+    changed[seen.window] |= before
+    shadows = None
+    if at.grid is not None and known.heights is not None and known.cells is not None:
+        shadows, cells = at.grid.drawn([*subjects.actors, *subjects.unseen]).over(known.heights)
+        changed |= cells[known.cells].reshape(eye.shape)
+    if beams or at.weather.wetness > 0.0:
+        canvas = _Canvas.blank(triangle.size)
+        _draw(canvas, cover, lit, shadows, open_sky, beams, at, ground)
+        return canvas
+    canvas = known.canvas.copy()
+    _paint(canvas, np.flatnonzero(changed), cover, lit, shadows, open_sky, None, at)
+    return canvas
 
 
 def _with_glare(picture: Floats) -> Floats:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.eye import Eye
 from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import rasterise
+from eidrive_scenario.world.render.rasterise import rasterised
 
 REACH = 80.0
 """How far from the camera shadows are drawn [m]."""
@@ -21,84 +21,141 @@ _SLACK = 0.04
 """A point must lie this far behind what the sun sees before it is in shadow [m]; more for large pixels."""
 _LOWEST = 0.035
 """Sine of the lowest sun that throws shadows."""
+_DEPTH = 200.0
+"""How far beyond the farthest corner of the view the sun's picture reaches [m]."""
+
+
+@dataclass(frozen=True)
+class ShadowGrid:
+    """A grid across the sun's rays over what a camera sees.
+
+    axes (2, 3) of the grid and `towards` (3,) in the world, low, high (2,) its ends [m], width, height [px] and scale
+    [px/m], base [m] of heights along the rays; all relative to `eye`, the camera
+    """
+
+    axes: Array
+    towards: Array
+    low: Array
+    high: Array
+    width: int
+    height: int
+    scale: float
+    base: float
+    eye: Array
+
+    def cells(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
+        """Column and row of points relative to the camera, from the middle of the first cell on."""
+        (ax, ay, az), (bx, by, bz) = self.axes.astype(np.float32)
+        start, scale = self.low.astype(np.float32), np.float32(self.scale)
+        column = (ax * x + ay * y + az * z - start[0]) * scale - np.float32(0.5)
+        row = (bx * x + by * y + bz * z - start[1]) * scale - np.float32(0.5)
+        return column, row
+
+    def numbers(self, x: Floats, y: Floats, z: Floats) -> NDArray[np.int32]:
+        """The cells (n,) from whose middles on points lie, line by line; -1 beyond the grid."""
+        column, row = (np.floor(part) for part in self.cells(x, y, z))
+        within = (column >= 0) & (column < self.width - 1) & (row >= 0) & (row < self.height - 1)
+        found: NDArray[np.int32] = np.where(within, row * np.float32(self.width) + column, -1.0).astype(np.int32)
+        return found
+
+    def drawn(self, casters: Sequence[Instance]) -> ShadowMap:
+        """What these bodies shade.
+
+        It shows the sides that turn away from the sun: those facing it lie above, and so do not shade themselves.
+        """
+        found = [corners for caster in casters if (corners := _away(caster, self)) is not None]
+        if not found:
+            return ShadowMap(self, np.empty((0, 0), dtype=np.float32), 0, 0)
+        corners = np.concatenate(found)
+        across, up, level = (
+            np.ascontiguousarray((corners @ axis).reshape(-1, 3).T) for axis in (*self.axes, self.towards)
+        )
+        across, up = (across - self.low[0]) * self.scale, (up - self.low[1]) * self.scale
+        cover = rasterised(across, up, level - self.base, self.width, self.height)
+        # A margin of one cell, where nothing is, belongs to it: points are looked up between four cells.
+        lines, columns = cover.window
+        top, left = max(lines.start - 1, 0), max(columns.start - 1, 0)
+        bottom, right = min(lines.stop + 1, self.height), min(columns.stop + 1, self.width)
+        heights = np.full((bottom - top, right - left), np.float32(-np.inf))
+        inner = heights[lines.start - top : lines.stop - top, columns.start - left : columns.stop - left]
+        np.copyto(inner, cover.nearness, where=cover.triangle >= 0)
+        return ShadowMap(self, heights, top, left)
 
 
 @dataclass(frozen=True)
 class ShadowMap:
-    """Heights along the sun's rays of what it meets first, on a grid across them.
+    """Heights (h, w) along the sun's rays of what it meets first, in a window of the grid; nothing is beyond."""
 
-    axes (2, 3) of the grid and `towards` (3,) in the world, origin (2,) and scale [px/m] of the grid, base [m] of the
-    heights; all relative to `eye` (3,), the camera
-    """
-
+    grid: ShadowGrid
     heights: Floats
-    width: int
-    height: int
-    axes: Floats
-    towards: Floats
-    origin: Floats
-    scale: float
-    base: float
+    top: int
+    left: int
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Lines and columns of the grid."""
+        height, width = self.heights.shape
+        return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
     def lit(self, x: Floats, y: Floats, z: Floats) -> Floats:
-        """Share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid."""
-        (ax, ay, az), (bx, by, bz), (sx, sy, sz) = *self.axes, self.towards
-        column = (ax * x + ay * y + az * z - self.origin[0]) * np.float32(self.scale) - np.float32(0.5)
-        row = (bx * x + by * y + bz * z - self.origin[1]) * np.float32(self.scale) - np.float32(0.5)
-        level = sx * x + sy * y + sz * z + np.float32(_SLACK + 0.35 / self.scale - self.base)
+        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid."""
+        found = np.ones(len(x), dtype=np.float32)
+        height, width = self.heights.shape
+        column, row = self.grid.cells(x, y, z)
         left, top = np.floor(column), np.floor(row)
-        right, down = column - left, row - top
-        left, top = left.astype(np.int32), top.astype(np.int32)
-        outside = (left < 0) | (top < 0) | (left >= self.width - 1) | (top >= self.height - 1)
-        at = np.where(outside, 0, top * np.int32(self.width) + left)
-        heights = self.heights
-        upper = (heights[at] <= level) * (1 - right) + (heights[at + 1] <= level) * right
-        lower = (heights[at + self.width] <= level) * (1 - right) + (heights[at + self.width + 1] <= level) * right
-        share = upper + (lower - upper) * down
-        share[outside] = 1.0
-        found: Floats = share.astype(np.float32)
+        within = (
+            (left >= self.left) & (left < self.left + width - 1) & (top >= self.top) & (top < self.top + height - 1)
+        )
+        some = np.flatnonzero(within)
+        if not len(some):
+            return found
+        sx, sy, sz = self.grid.towards.astype(np.float32)
+        margin = np.float32(_SLACK + 0.35 / self.grid.scale - self.grid.base)
+        level = sx * x[some] + sy * y[some] + sz * z[some] + margin
+        left, top = left[some], top[some]
+        right, down = column[some] - left, row[some] - top
+        at = (top.astype(np.int32) - np.int32(self.top)) * np.int32(width) + (
+            left.astype(np.int32) - np.int32(self.left)
+        )
+        heights = self.heights.ravel()
+        upper = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
+        at += np.int32(width)
+        lower = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
+        found[some] = np.float32(1.0) - (upper + (lower - upper) * down)
         return found
 
+    def over(self, still: Floats) -> tuple[ShadowMap, NDArray[np.bool_]]:
+        """Together with the heights (height, width) of what stands still; and the cells (height · width + 1,) for whose
+        points that makes a difference: from the middle of a cell to that of the next. The last one stands for none."""
+        heights = still.copy()
+        window = self.window
+        np.maximum(heights[window], self.heights, out=heights[window])
+        changed = np.zeros((still.shape[0] + 1, still.shape[1] + 1), dtype=bool)
+        changed[:-1, :-1][window] = heights[window] > still[window]
+        around = changed[:-1, :-1] | changed[:-1, 1:] | changed[1:, :-1] | changed[1:, 1:]
+        return ShadowMap(self.grid, heights, 0, 0), np.append(around.ravel(), False)
 
-def shadow_map(casters: Sequence[Instance], towards: Array, pose: Array, pinhole: Pinhole) -> ShadowMap | None:
-    """The sun's picture of what may shade the part of the world that a camera sees; None where there is no shade.
 
-    It shows the sides of bodies that turn away from the sun: those facing it lie above, and so do not shade themselves.
-    """
-    if towards[2] < _LOWEST or not casters:
+def shadow_grid(towards: Array, eye: Eye) -> ShadowGrid | None:
+    """The grid for the part of the world that a camera sees; None if the sun is too low."""
+    if towards[2] < _LOWEST:
         return None
     first = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.99 else (1.0, 0.0, 0.0))
     first /= np.linalg.norm(first)
     axes = np.stack([first, np.cross(towards, first)])
-    seen = _seen_ground(pose, pinhole)
+    seen = _seen_ground(eye)
     flat = seen @ axes.T
     low, high = flat.min(axis=0) - 0.5, flat.max(axis=0) + 0.5
-    pixels = min(max(1.2 * pinhole.width, _COARSEST), _FINEST)
+    pixels = min(max(1.2 * eye.pinhole.width, _COARSEST), _FINEST)
     scale = min(pixels / float((high - low).max()), 20.0)
     width, height = (max(math.ceil(extent * scale), 2) for extent in (high - low).tolist())
-    found = [
-        corners for caster in casters if (corners := _away(caster, towards, axes, pose[:3, 3], low, high)) is not None
-    ]
-    if not found:
-        return None
-    corners = np.concatenate(found)
-    across, up, level = (np.ascontiguousarray((corners @ axis).reshape(-1, 3).T) for axis in (*axes, towards))
-    base = float(level.min()) - 1.0
-    cover = rasterise((across - low[0]) * scale, (up - low[1]) * scale, level - base, width, height)
-    return ShadowMap(
-        np.where(cover.triangle >= 0, cover.nearness, np.float32(-np.inf)),
-        width,
-        height,
-        axes.astype(np.float32),
-        towards.astype(np.float32),
-        low.astype(np.float32),
-        scale,
-        base,
-    )
+    base = float((seen @ towards).min()) - _DEPTH
+    return ShadowGrid(axes, towards, low, high, width, height, scale, base, eye.place)
 
 
-def _seen_ground(pose: Array, pinhole: Pinhole) -> Array:
+def _seen_ground(eye: Eye) -> Array:
     """(M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
+    pinhole, pose = eye.pinhole, eye.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
     rows = np.array([0.0, 0.5, 1.0]) * pinhole.height
     rays = np.array([((c - pinhole.centre_x) / pinhole.focal, (r - pinhole.centre_y) / pinhole.focal, 1.0)
@@ -118,15 +175,15 @@ def _seen_ground(pose: Array, pinhole: Pinhole) -> Array:
     return found
 
 
-def _away(caster: Instance, towards: Array, axes: Array, eye: Array, low: Array, high: Array) -> Array | None:
+def _away(caster: Instance, grid: ShadowGrid) -> Array | None:
     """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
     them can shade the grid."""
-    model = caster.model
+    model, axes, eye, low, high = caster.model, grid.axes, grid.eye, grid.low, grid.high
     centre = caster.rotation @ model.centre + caster.position - eye
     flat = axes @ centre
     if (flat + model.radius < low).any() or (flat - model.radius > high).any():
         return None
-    sun = (caster.rotation.T @ towards).astype(np.float32)
+    sun = (caster.rotation.T @ grid.towards).astype(np.float32)
     if model.cells is not None:
         flat = (model.cells.centre @ caster.rotation.T + caster.position - eye) @ axes.T
         radius = model.cells.radius[:, None]

@@ -40,9 +40,10 @@ class Stage(NamedTuple):
     label: NDArray[np.int32]
     glow: Floats
 
-    def surfaces(self, triangles: NDArray[np.int64]) -> Surfaces:
-        """Of some of the triangles."""
-        rows = self.whose[triangles]
+    @property
+    def surfaces(self) -> Surfaces:
+        """Of all triangles."""
+        rows = self.whose
         return Surfaces(
             np.ascontiguousarray(self.normal[rows].T),
             np.ascontiguousarray(self.albedo[rows].T),

@@ -52,8 +52,19 @@ def hollows() -> Floats:
 def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
     """How much lighter or darker a surface is at places in the world [m], about ±1: fine grit near the camera, patches
     everywhere."""
-    mask = SIZE - 1
-    coarse = patches()[(y * 4.0).astype(np.int64) & mask, (x * 4.0).astype(np.int64) & mask]
-    fine = grit()[(y * 24.0).astype(np.int64) & mask, (x * 24.0).astype(np.int64) & mask]
-    found: Floats = np.float32(0.35) * coarse + fine * (np.float32(4.0) / (np.float32(6.0) + distance))
+    found: Floats = _looked_up(patches(), x, y, 4.0)
+    found *= np.float32(0.35)
+    fine = _looked_up(grit(), x, y, 24.0)
+    fine *= np.float32(4.0) / (np.float32(6.0) + distance)
+    found += fine
     return found
+
+
+def _looked_up(table: Floats, x: Floats, y: Floats, per_metre: float) -> Floats:
+    """The values of a table that repeats, at places [m]."""
+    mask = np.int32(SIZE - 1)
+    at = (y * np.float32(per_metre)).astype(np.int32)
+    at &= mask
+    at *= np.int32(SIZE)
+    at += (x * np.float32(per_metre)).astype(np.int32) & mask
+    return table.ravel().take(at)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.render.eye import Eye
 from eidrive_scenario.world.render.model import Array, Floats
+from eidrive_scenario.world.render.rasterise import Cover
+from eidrive_scenario.world.render.sky import sample
+from eidrive_scenario.world.render.surfaces import hollows
 
 WATER = 0.02
 """Share of light that water throws back when seen from straight above (Fresnel, index 1.33)."""
@@ -15,6 +21,35 @@ DARKENING = 0.45
 """Of the light that a soaked road returns, this share is lost: its pores hold water (Lekner and Dorf 1988)."""
 _HEIGHT = 0.15
 """What stands higher above the road has a mirror image [m]."""
+
+
+def add_reflections(
+    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, eye: Eye,
+    wetness: float, ground: float,
+) -> None:  # fmt: skip
+    """Add to luminance (3, P) of all pixels what a wet road mirrors in those that show one, from a picture of half as
+    many lines and columns; `ground` is the height of the road below the camera [m]."""
+    if not len(on_road):
+        return
+    numbers = np.arange(planes.shape[1]).reshape(eye.shape)[::2, ::2]
+    small = replace(eye.pinhole.finer(0.5), width=numbers.shape[1], height=numbers.shape[0])
+    x, y, z = (part.reshape(numbers.shape) for part in eye.directions(numbers.ravel()))
+    sky = sample(dome, x, y, np.abs(z))
+    some = numbers[cover.triangle[::2, ::2] >= 0]
+    far = np.float32(1.0) / cover.nearness.ravel()[some]
+    rx, ry, rz = eye.rays(eye.x[some], eye.y[some])
+    places = (rx * far, ry * far, rz * far)
+    image = mirrored(planes[:, some], places, sky, ground - float(eye.place[2]), eye.pose, small)
+    image = np.asarray(cv2.resize(blurred(image), eye.shape[::-1], interpolation=cv2.INTER_LINEAR))
+    rx, ry, rz = eye.rays(eye.x[on_road], eye.y[on_road])
+    far = np.float32(1.0) / cover.nearness.ravel()[on_road]
+    share = reflectance(np.abs(rz / eye.length[on_road]))
+    place = (eye.place % 4096.0).astype(np.float32)
+    share *= puddles(rx * far + place[0], ry * far + place[1], wetness, hollows())
+    dim = open_sky.ravel()[on_road]
+    for own, plane in zip(planes, cv2.split(image), strict=True):
+        before = own[on_road]
+        own[on_road] = before + share * (np.ravel(plane)[on_road] * dim - before)
 
 
 def mirrored(

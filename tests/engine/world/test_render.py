@@ -46,12 +46,12 @@ def test_pixels_whose_centres_lie_inside_are_covered() -> None:
     rng = np.random.default_rng(1)
     corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
     nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[None], 3, axis=0)
-    cover = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 20, 16)
+    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 20, 16).triangle.ravel()
     for pixel in range(20 * 16):
         x, y = pixel % 20 + 0.5, pixel // 20 + 0.5
         holders = [k for k in range(40) if inside(corners[k], x, y)]
         nearest = max(holders, key=lambda k: nearness[0, k], default=-1)
-        assert cover.triangle[pixel] == nearest
+        assert shown[pixel] == nearest
 
 
 def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
@@ -61,7 +61,7 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
     triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
     counts = np.zeros(400, dtype=int)
     for one in triangles:
-        counts += rasterise(one[:, :1], one[:, 1:], np.ones((3, 1)), 20, 20).triangle >= 0
+        counts += (rasterise(one[:, :1], one[:, 1:], np.ones((3, 1)), 20, 20).triangle >= 0).ravel()
     assert counts.max() == 1
     together = rasterise(triangles[..., 0].T, triangles[..., 1].T, np.ones((3, 5)), 20, 20).triangle >= 0
     assert counts.sum() == together.sum()
@@ -75,9 +75,9 @@ def test_nearness_is_that_of_the_plane() -> None:
     corners = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]])
     nearness = np.array([[0.1], [0.5], [0.3]])
     cover = rasterise(corners[:, :1], corners[:, 1:], nearness, 20, 20)
-    hit = np.flatnonzero(cover.triangle == 0)
-    x, y = hit % 20 + 0.5, hit // 20 + 0.5
-    np.testing.assert_allclose(cover.nearness[hit], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)
+    lines, columns = np.nonzero(cover.triangle == 0)
+    x, y = columns + 0.5, lines + 0.5
+    np.testing.assert_allclose(cover.nearness[lines, columns], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)
 
 
 def test_clear_noon_and_dusk_have_the_light_of_the_tables() -> None:
