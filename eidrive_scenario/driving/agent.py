@@ -49,9 +49,9 @@ ITSELF = " itself"
 class Agent:
     """One station. It sees its readings and its inbox, nothing else.
 
-    Of each sender it keeps the newest report until that is `report_timeout` old. It sends its own detections, never
-    fused ones: a box that came back to its first reporter would count twice. With `own_perception` it does not use its
-    own detections before the channel brings them back.
+    Of each sender it keeps the newest report until that is too old (`report_timeout`). It sends its own detections,
+    never fused ones: a box that came back to its first reporter would count twice. With `own_perception` it does not
+    use its own detections before the channel brings them back.
     """
 
     def __init__(
@@ -77,13 +77,17 @@ class Agent:
         self.controller = controller
         self.own_perception = own_perception
         self.points = points
+        self.message_interval = 0.0
+        """Least time between two messages that congestion control leaves this station [s]."""
         self._speaker = speaker
         self._clock = settings.clock
         self._partial: dict[str, ReceivedObjects] = {}
         self._detections = Detections(0.0)
         self._reports: dict[str, Report] = {}
+        self._lifetimes: dict[str, float] = {}
+        """How long the reports of each station count [s]."""
         self._own_places: deque[tuple[float, float, float, float]] = deque(
-            maxlen=math.ceil(settings.report_timeout / dt) + 2
+            maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
         )
 
     def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
@@ -112,7 +116,13 @@ class Agent:
             fused=fused,
             plan=plan,
             control=self._control(ego, plan),
-            outbox=self._speaker.speak(state, detections, now, self.points.own if self.points is not None else None),
+            outbox=self._speaker.speak(
+                state,
+                detections,
+                now,
+                self.points.own if self.points is not None else None,
+                interval=self.message_interval,
+            ),
             estimate=ego if self.settings.localization != "oracle" else None,
         )
 
@@ -140,16 +150,18 @@ class Agent:
                 detections = self._without_own_body(detections)
             station = sender if message.kind == "cpm" else sender + ITSELF
             report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
+            self._lifetimes[station] = self.settings.lifetime(complete=report.complete and message.kind == "cpm")
             self._take(report, None if report.complete else self._all_said(message))
-        oldest = now - self.settings.report_timeout - TIME_TOLERANCE
-        for sender in [sender for sender, held in self._reports.items() if held.detections.time < oldest]:
-            del self._reports[sender]
+        usual = self.settings.lifetime(complete=True)
+        for station, held in list(self._reports.items()):
+            if held.detections.time < now - self._lifetimes.get(station, usual) - TIME_TOLERANCE:
+                del self._reports[station]
 
     def _all_said(self, message: Message) -> Detections:
         """What the sender of a message that does not list all its objects has said of them by now."""
         memory = self._partial.get(message.sender)
         if memory is None:
-            memory = self._partial[message.sender] = ReceivedObjects(self.settings.report_timeout)
+            memory = self._partial[message.sender] = ReceivedObjects(self.settings.lifetime(complete=False))
         return self._without_own_body(memory.take(message))
 
     def _take(self, report: Report, completed: Detections | None = None) -> None:

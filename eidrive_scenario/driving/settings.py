@@ -40,6 +40,9 @@ LOCALIZING = ("gnss", "imu")
 
 _OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
 
+PARTIAL_LIFETIME = 1.5
+"""How long a report counts that leaves out what has not changed [s]; as `max_age` of covariance intersection."""
+
 Polygon = tuple[tuple[float, float], ...]
 
 
@@ -120,8 +123,9 @@ class AgentSettings(Settings):
     range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
     cooperates_with senders whose messages count; None is all
     message_rate    how often the station sends what it sees, None is each tick
-    report_timeout  a report older than this is forgotten: 1 s, the longest interval between two collective perception
-                    messages (ETSI TS 103 324, T_GenCpmMax)
+    report_timeout  a report older than this is forgotten. Where it is not given: 1 s for a list of all that its sender
+                    sees; 1.5 s for what is told by the rules of ETSI, which repeat what stands still once a second
+                    (T_GenCpmMax, T_GenCamMax), so that a message may be half a second late
     antenna_height  over the reference point; None is the roof
     messages        what it sends: `cpm` (the objects that it perceives), `cam` (itself)
     generation      `each_tick`, `rate` (message_rate), or `etsi`: by the triggers of EN 302 637-2 and TS 103 324; None
@@ -189,6 +193,11 @@ class AgentSettings(Settings):
                 f"report_timeout is {self.report_timeout:g} s"
             )
         return self
+
+    def lifetime(self, *, complete: bool) -> float:
+        """How long a report counts [s]; `complete` where it tells all that its sender sees at that time."""
+        given = "report_timeout" in self.model_fields_set
+        return self.report_timeout if complete or given else PARTIAL_LIFETIME
 
     @property
     def clock(self) -> StationClock:

@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.generation.cam import CamTriggers
+from eidrive_scenario.v2x.generation.cam import LONGEST, SHORTEST, CamTriggers
 from eidrive_scenario.v2x.generation.cpm import CpmTriggers
 from eidrive_scenario.v2x.generation.numbering import Numbering
 from eidrive_scenario.v2x.message import Message, StationState
@@ -41,18 +41,33 @@ class Speaker:
         self._numbering = Numbering()
 
     def speak(
-        self, state: StationState, detections: Detections, now: float, points: PointCloud | None = None
+        self,
+        state: StationState,
+        detections: Detections,
+        now: float,
+        points: PointCloud | None = None,
+        *,
+        interval: float = 0.0,
     ) -> tuple[Message, ...]:
-        """The messages of this tick, none where none is due; the first CPM carries the points."""
+        """The messages of this tick, none where none is due; the first CPM carries the points.
+
+        interval  least time between two messages of this station by congestion control [s]; the rules of ETSI keep to
+                  it, and each of two kinds of messages has half of them
+        """
         etsi = self._settings.generation == "etsi"
         if not etsi and not self._in_turn(now):
             return ()
         kinds = self._settings.messages
+        shortest = min(max(interval * len(kinds), SHORTEST), LONGEST)
         said: list[Message] = []
-        if "cam" in kinds and (not etsi or self._cam.due(state, now)):
+        if "cam" in kinds and (not etsi or self._cam.due(state, now, shortest)):
             said.append(self._awareness(state, now))
         if "cpm" in kinds:
-            perceived = self._triggered(state, detections, now) if etsi else [self._everything(state, detections, now)]
+            perceived = (
+                self._triggered(state, detections, now, shortest)
+                if etsi
+                else [self._everything(state, detections, now)]
+            )
             if points is not None and perceived:
                 perceived[0] = replace(perceived[0], points=points, size=perceived[0].size + points.size)
             said += perceived
@@ -74,10 +89,10 @@ class Speaker:
         size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
         return self._sized(Message(self._spec.name, self._take_number(), now, state, detections, size), self._sensors)
 
-    def _triggered(self, state: StationState, detections: Detections, now: float) -> list[Message]:
+    def _triggered(self, state: StationState, detections: Detections, now: float, shortest: float) -> list[Message]:
         """What the rules of ETSI choose, in as many messages as it needs."""
         numbers = self._numbering.numbers(detections)
-        contents = self._cpm.contents(detections, numbers, now)
+        contents = self._cpm.contents(detections, numbers, now, shortest)
         if contents is None:
             return []
         security, mtu = self._settings.security_bytes, self._settings.mtu

@@ -126,6 +126,8 @@ class Stations:
             seen = lookout.read(world, view, view.row(name), self.signals)
             readings[name] = replace(readings[name], signals=seen)
         now = view.time
+        for name, agent in self._agents.items():
+            agent.message_interval = 0.0 if self._channel is None else self._channel.interval(name)
         return {
             name: agent.act(readings[name], self._deliver(name, now), now, self.goals.get(name))
             for name, agent in self._agents.items()

@@ -45,6 +45,11 @@ class Channel(ABC):
     def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
         """What has arrived at `receiver` by `now` [s] and was not given out yet, in order of arrival."""
 
+    def interval(self, station: str) -> float:
+        """How long congestion control lets a station wait from one message to the next [s]: T_GenCam_DCC of ETSI
+        EN 302 637-2. 0 where there is no such control."""
+        return 0.0
+
     @abstractmethod
     def in_flight(self) -> int:
         """How many messages are on their way."""

@@ -26,9 +26,9 @@ EARLY = 1e-9
 class QueueSettings(Settings):
     """What waits for the medium at a sender.
 
-    discipline  `fifo`: first come, first served, and what does not fit is lost; `lcfs`: the newest message takes the
-                place of one that waits, as old news are worth nothing
-    length      how many messages can wait; of `lcfs` always one
+    discipline  `fifo`: first come, first served; `lcfs`: a message takes the place of those of its kind that wait
+                since an earlier tick, as old news are worth nothing
+    length      how many messages can wait; what does not fit is lost
     """
 
     discipline: Literal["fifo", "lcfs"] = "fifo"
@@ -138,6 +138,10 @@ class Access(ABC):
         if math.isfinite(until):
             self._measure(until)
 
+    def interval(self, row: int) -> float:
+        """How long congestion control lets a station wait from one message to the next, after its last one [s]."""
+        return self.gate.interval(row, float(self._last_duration[row]))
+
     def busy_for(self, row: int) -> float:
         """How long a station has found the medium busy so far [s]."""
         return float(self._busy_time[row] + self._period_busy[row])
@@ -176,15 +180,19 @@ class Access(ABC):
     def _arrive(self, transmission: Transmission) -> list[Transmission]:
         row = self._rows[transmission.message.sender]
         queue = self._waiting[row]
-        dropped = []
+        dropped: list[Transmission] = []
+        place = len(queue)
         if self.queue.discipline == "lcfs" and queue:
-            dropped = list(queue)
-            queue.clear()
-            self._head[row] = None
-        elif len(queue) >= self.queue.length:
-            return [transmission]
-        queue.append(transmission)
-        if len(queue) == 1:
+            if any(_old_news(transmission, beside=entry) for entry in queue):
+                return [transmission]
+            dropped = [entry for entry in queue if _old_news(entry, beside=transmission)]
+            place = queue.index(dropped[0]) if dropped else place
+            for entry in dropped:
+                queue.remove(entry)
+        if len(queue) >= self.queue.length:
+            return [*dropped, transmission]
+        queue.insert(place, transmission)
+        if queue[0] is not self._head[row]:
             self._next(row)
         return dropped
 
@@ -196,7 +204,7 @@ class Access(ABC):
             self.headed(row, None)
             return
         first = queue[0]
-        opens = self._last_start[row] + self.gate.interval(row, float(self._last_duration[row]))
+        opens = self._last_start[row] + self.interval(row)
         self._head[row], self.ready[row] = first, max(first.ready, opens)
         self.headed(row, first)
 
@@ -220,7 +228,7 @@ class Access(ABC):
             self._period_end = math.floor(now / period + 1e-6) * period + period
         while now >= self._period_end - EARLY:
             self._busy_time += self._period_busy
-            self.gate.measured(np.minimum(1.0, self._period_busy / period))
+            self.gate.measured(self._period_busy / period)
             self._period_busy = np.zeros(len(self.names))
             self._period_end += period
 
@@ -228,6 +236,11 @@ class Access(ABC):
 def moved(values: Array, rows: Sequence[int | None], fresh: float) -> Array:
     """An array by station for other stations: the value of the former row, or `fresh`."""
     return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
+
+
+def _old_news(entry: Transmission, *, beside: Transmission) -> bool:
+    """Whether another message of this kind was said later. Those of one tick belong together."""
+    return entry.message.kind == beside.message.kind and entry.sent < beside.sent
 
 
 def _entry(transmission: Transmission) -> tuple[float, str, int]:

@@ -69,6 +69,9 @@ class RadioChannel(LinkChannel):
             locks=profile.technology == "80211p",
             background=profile.background_by_loss(),
         )
+        background = self._receiver.background
+        self._outside = 0.0 if background is None else background[0].busy_ratio
+        """Share of the time in which vehicles that are not simulated fill the channel."""
         self._losses = LossDraws(profile.loss, seed)
         self._draws = LinkDraws(seed)
         self._rows: dict[str, int] = {}
@@ -86,7 +89,7 @@ class RadioChannel(LinkChannel):
 
     def _new_access(self, names: tuple[str, ...]) -> Access:
         profile = self.profile
-        gate = Gate(profile.congestion, len(names))
+        gate = Gate(profile.congestion, len(names), self._outside)
         if profile.technology == "80211p":
             return Csma(names, profile.queue, gate, profile.sensing, self._seed)
         return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink)
@@ -132,12 +135,14 @@ class RadioChannel(LinkChannel):
         return super().statistics(now)
 
     def busy_ratio(self, station: str) -> float | None:
-        background = self._receiver.background
-        outside = 0.0 if background is None else background[0].busy_ratio
         row = self._rows.get(station)
         if row is None or self._since is None or self._until <= self._since:
-            return outside
-        return min(1.0, self._access.busy_for(row) / (self._until - self._since) + outside)
+            return self._outside
+        return min(1.0, self._access.busy_for(row) / (self._until - self._since) + self._outside)
+
+    def interval(self, station: str) -> float:
+        row = self._rows.get(station)
+        return 0.0 if row is None else self._access.interval(row)
 
     def settle(self) -> None:
         self._advance(math.inf)

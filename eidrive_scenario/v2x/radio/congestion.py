@@ -40,6 +40,11 @@ class ReactiveControl(Settings):
             raise ValueError("limits must rise, and each has one interval")
         return self
 
+    def interval_at(self, busy: Array) -> Array:
+        """Least intervals [s] at these busy ratios."""
+        rows = np.minimum(np.searchsorted(self.limits, busy), len(self.limits) - 1)
+        return np.array(self.intervals)[rows]
+
 
 class Limeric(Settings):
     """The adaptive approach: every station moves its share of the channel towards a common target (LIMERIC).
@@ -62,6 +67,11 @@ class Limeric(Settings):
 
     period: ClassVar[float] = 0.2
 
+    def steady_share(self, busy: float) -> float:
+        """Where the share of a station settles while the busy ratio stays what it is."""
+        gain = min(max(self.beta * (self.target - busy), self.gain_down), self.gain_up)
+        return min(max(gain / self.alpha, self.share_min), self.share_max)
+
     def next_share(self, share: Array, busy: Array) -> Array:
         """The share of each station after one step, at these filtered busy ratios."""
         gain = np.clip(self.beta * (self.target - busy), self.gain_down, self.gain_up)
@@ -72,20 +82,25 @@ CongestionControl = Annotated[NoControl | ReactiveControl | Limeric, Field(discr
 
 
 class Gate:
-    """The least interval between two messages of each of N stations."""
+    """The least interval between two messages of each of N stations.
 
-    def __init__(self, control: NoControl | ReactiveControl | Limeric, count: int) -> None:
+    background  busy ratio by traffic that is not simulated; stations begin as if they had long been in it alone
+    """
+
+    def __init__(self, control: NoControl | ReactiveControl | Limeric, count: int, background: float = 0.0) -> None:
         self.control = control
-        self.share = np.full(count, control.share_max if isinstance(control, Limeric) else 1.0)
-        self.filtered = np.zeros(count)
-        self.before = np.zeros(count)
-        self.reactive = np.full(count, control.intervals[0] if isinstance(control, ReactiveControl) else 0.0)
+        self.background = background
+        self.share = np.full(count, control.steady_share(background) if isinstance(control, Limeric) else 1.0)
+        self.filtered = np.full(count, background)
+        self.before = np.full(count, background)
+        alone = np.full(count, background)
+        self.reactive = control.interval_at(alone) if isinstance(control, ReactiveControl) else np.zeros(count)
 
     def measured(self, busy: Array) -> None:
-        """The busy ratios (N,) of the last period of the control."""
+        """The busy ratios (N,) of the last period of the control, by simulated stations."""
+        busy = np.minimum(1.0, busy + self.background)
         if isinstance(self.control, ReactiveControl):
-            rows = np.minimum(np.searchsorted(self.control.limits, busy), len(self.control.limits) - 1)
-            self.reactive = np.array(self.control.intervals)[rows]
+            self.reactive = self.control.interval_at(busy)
         elif isinstance(self.control, Limeric):
             self.filtered = 0.5 * self.filtered + 0.25 * (busy + self.before)
             self.before = busy.copy()
@@ -100,7 +115,7 @@ class Gate:
 
     def rearranged(self, rows: list[int | None]) -> Gate:
         """The same for other stations: each takes the state of its former row, or begins anew."""
-        gate = Gate(self.control, len(rows))
+        gate = Gate(self.control, len(rows), self.background)
         for row, old in enumerate(rows):
             if old is not None:
                 for mine, former in (

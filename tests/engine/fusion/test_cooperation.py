@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -161,3 +163,32 @@ def test_messages_by_the_rules_of_etsi_lose_no_car_between_them() -> None:
             np.testing.assert_allclose(
                 sorted(fused.boxes[:, 0].tolist()), [slow[0] + slow[2] * tick * DT, rest[0]], atol=1e-3
             )
+
+
+@pytest.mark.parametrize("latency", [0.05, 0.2, 0.45])
+def test_what_stands_still_and_is_told_once_a_second_stays_known(latency: float) -> None:
+    """By the rules of ETSI a parked car comes once a second. Late as the messages are, it does not flicker."""
+    talk = Conversation(PLACES, f"{{delay: {{kind: constant, seconds: {latency}}}}}", generation="etsi")
+    counts = [len(talk.step({"B": ((5.0, 20.0, 0.0),)})["A"]) for _ in range(100)]
+    assert counts[round(latency / DT) + 1 :] == [1] * (99 - round(latency / DT))
+
+
+def test_congestion_control_spaces_the_messages_by_the_rules_of_etsi() -> None:
+    """At 25 m/s a CAM is due every 0.2 s and the car that B sees too; with 0.4 s asked for, each kind has half."""
+    for kinds, interval, gap in (("cpm", 0.4, 0.4), ("cam", 0.4, 0.4), ("[cpm, cam]", 0.4, 0.8), ("cpm", 0.0, 0.2)):
+        talk = Conversation(PLACES, None, generation="etsi", messages=kinds.strip("[]"))
+        agent = talk.agents["A"]
+        agent.message_interval = interval
+        said: dict[str, list[float]] = {"cpm": [], "cam": []}
+        for tick in range(100):
+            now = tick * DT
+            for message in agent.act(fast(now), (), now, None).outbox:
+                said[message.kind].append(now)
+        for times in filter(None, said.values()):
+            assert np.diff(times) == pytest.approx(gap), (kinds, interval)
+
+
+def fast(time: float) -> Readings:
+    """A station at 25 m/s that sees a car as fast beside it."""
+    seen = readings(time, (25.0 * time, 0.0), ((0.0, 5.0, 25.0),))
+    return replace(seen, ego=replace(seen.ego, speed=25.0))

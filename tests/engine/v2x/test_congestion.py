@@ -21,6 +21,19 @@ def test_limeric_settles_where_its_equation_says(stations: int, busy: float) -> 
         assert gate.share[0] == pytest.approx(0.000816 / (0.016 + 0.0012 * stations), rel=1e-3)
 
 
+def test_stations_begin_where_the_traffic_around_them_has_brought_them() -> None:
+    """Alone: 0.0005 / 0.016 is above the largest share. At 60 % busy: 0.0012 · 0.08 / 0.016. At 77 %: the least."""
+    limeric = Limeric(kind="limeric")
+    shares = [Gate(limeric, 1, busy).share[0] for busy in (0.0, 0.6, 0.77)]
+    assert shares == pytest.approx([0.03, 0.006, 0.0006])
+    for busy in (0.0, 0.6, 0.77):
+        gate = Gate(limeric, 1, busy)
+        for _ in range(50):
+            gate.measured(np.zeros(1))
+        assert gate.share[0] == pytest.approx(limeric.steady_share(busy)), "nothing moves while nobody else talks"
+    assert Gate(ReactiveControl(kind="reactive"), 1, 0.35).interval(0, 0.001) == 0.4
+
+
 def test_limeric_keeps_intervals_within_their_bounds() -> None:
     gate = Gate(Limeric(kind="limeric"), 1)
     assert gate.interval(0, 0.000448) == 0.025

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -28,6 +29,10 @@ QUIET: dict[str, object] = {
     "path_loss": {"kind": "tr37885", "blockage": "mean"},
     "line_of_sight": "clear",
 }
+
+
+BUSY = {"kind": "80211p", "density": 0.12, "rate": 25, "size": 500}
+"""Traffic that fills 77 % of the channel."""
 
 
 def radio(seed: int = 0, **profile: Any) -> RadioChannel:
@@ -219,6 +224,48 @@ def test_the_newest_message_takes_the_place_of_one_that_waits() -> None:
     assert delays[1] > 0.4
 
 
+def kinds_said(carrier: RadioChannel, ticks: int, *kinds: str) -> list[LinkEvent]:
+    """A says one message of each kind in every tick, numbered one after the other; B listens."""
+    events: list[LinkEvent] = []
+    for tick in range(ticks):
+        now = tick * DT
+        carrier.around(Surroundings({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
+        said = [replace(message("A", tick * len(kinds) + part, now), kind=kind) for part, kind in enumerate(kinds)]  # type: ignore[arg-type]
+        events += carrier.transmit([(one, ["B"]) for one in said], now)
+    return events
+
+
+def test_news_of_one_kind_do_not_take_the_place_of_another() -> None:
+    """One resource for two messages a tick: each kind goes every other time, neither starves."""
+    settings = {**QUIET, "technology": "cv2x_mode4", "sidelink": {"interval": 0.05, "subchannel_bytes": 300}}
+    events = kinds_said(radio(1, queue={"discipline": "lcfs"}, **settings), 200, "cam", "cpm")
+    heard = [event.number % 2 for event in events if event.outcome == "delivered"]
+    assert len(heard) == pytest.approx(200, abs=5)
+    assert sum(heard) == pytest.approx(100, abs=5)
+
+
+def test_parts_of_one_report_do_not_take_each_other_s_place() -> None:
+    """What does not fit into one CPM goes in two: with room for two messages in a tick all of them arrive."""
+    settings = {**QUIET, "technology": "cv2x_mode4", "sidelink": {"interval": 0.02, "subchannel_bytes": 300}}
+    events = kinds_said(radio(1, queue={"discipline": "lcfs"}, **settings), 200, "cpm", "cpm")
+    assert {event.reason for event in events} <= {"", "propagation"}
+    assert len(events) > 390
+
+
+@pytest.mark.parametrize(
+    ("congestion", "least"),
+    [({"kind": "reactive"}, 1.0), ({"kind": "limeric"}, 0.448 / 0.6), ({"kind": "none"}, 0.0)],
+)
+def test_congestion_control_knows_of_the_traffic_in_the_background(congestion: dict[str, str], least: float) -> None:
+    """77 % busy is beyond LIMERIC's target of 68 %: shares fall to the least one. 300 bytes take 0.448 ms."""
+    carrier = radio(1, congestion=congestion, background=BUSY, queue={"discipline": "lcfs"}, **QUIET)
+    events = kinds_said(carrier, 400, "cpm")
+    assert carrier.interval("A") == pytest.approx(least)
+    assert carrier.interval("nobody") == 0.0
+    starts = [event.sent for event in events if event.reason != "queue"]
+    assert len(starts) == pytest.approx(20.0 / max(least, DT), abs=1.5)
+
+
 def test_limeric_holds_a_saturated_channel_at_its_fixed_point() -> None:
     """25 stations that always have something to say: the busy ratio settles at 0.4435 (docs of LIMERIC)."""
     places = {f"S{n:02}": (4.0 * n, 0.0, 1.5) for n in range(25)}
@@ -297,7 +344,7 @@ def test_background_traffic_costs_receptions_and_fills_the_channel() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (150.0, 0.0, 1.5)}
     free = radio(1, **QUIET)
     events, _ = talk(free, places, 1000)
-    full = radio(1, background={"kind": "80211p", "density": 0.12, "rate": 25, "size": 500}, **QUIET)
+    full = radio(1, background=BUSY, **QUIET)
     crowded, _ = talk(full, places, 1000)
     assert {e.reason for e in crowded if e.outcome == "lost"} >= {"busy", "collision"}
     kept = [{(e.sender, e.number) for e in told if e.outcome == "delivered"} for told in (events, crowded)]
