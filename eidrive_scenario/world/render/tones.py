@@ -27,7 +27,8 @@ def white_level(luminance: Floats) -> float:
     The mean of log luminance goes to a key that falls with darkness, so that a night looks like one:
     1.03 - 2 / (2 + log10(L + 1)) (Krawczyk, Myszkowski, Seidel: Perceptual effects in real-time tone mapping, 2005).
     """
-    mean = math.exp(float(np.log(np.maximum(_luma(luminance[::2, ::2]), np.float32(BLACK))).mean()))
+    sampled = np.maximum(_luma(np.ascontiguousarray(luminance[::2, ::2])), np.float32(BLACK))
+    mean = math.exp(float(np.log(sampled).mean()))
     key = max(BRIGHTNESS * (1.03 - 2.0 / (2.0 + math.log10(mean + 1.0))), DARKEST)
     return HEADROOM * mean / key
 
@@ -41,8 +42,9 @@ def _luma(luminance: Floats) -> Floats:
 
 def toned(signal: Floats) -> NDArray[np.uint8]:
     """The numbers of a picture whose light is given as shares of white; what is brighter is white."""
-    steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0)) * np.float32(_STEPS - 1)
-    return _TONES[steps.astype(np.uint16)]
+    steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0))
+    steps *= np.float32(_STEPS - 1)
+    return _TONES.take(steps.astype(np.uint16))
 
 
 def _tone_curve() -> NDArray[np.uint8]:
