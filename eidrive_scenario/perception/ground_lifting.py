@@ -23,6 +23,8 @@ LANE_DEVIATION = math.radians(25.0)
 EDGE_DEVIATION = 1.5
 """Of the edges of a box from those of the object, standard deviation [px]; a share of the box's size on top."""
 EDGE_SHARE = 0.02
+SHAPE_DEVIATION = 0.08
+"""How far bodies of one size differ in where their edges are: bumpers, mirrors, roofs [m]."""
 AT_BORDER = 2.0
 """An edge this near to the picture's border is where the picture ends, not the object [px]."""
 ROUNDS = 10
@@ -33,7 +35,22 @@ LOOKS = 4
 LARGEST_VARIANCE = 2500.0
 
 _OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
-_CORNERS = np.array([[x, y, z] for x in (0.5, -0.5) for y in (0.5, -0.5) for z in (0.0, 1.0)])
+
+
+def _hull(*quarter: tuple[float, float, float]) -> Array:
+    """(4 K, 3) points of a body that is the same to both sides and ends, from those of a quarter of it."""
+    signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+    return np.array([(a * x, b * y, z) for x, y, z in quarter for a, b in signs])
+
+
+_BOX = _hull((0.5, 0.5, 0.0), (0.5, 0.5, 1.0))
+_CAR = _hull(
+    (0.31, 0.45, 0.0), (0.5, 0.42, 0.15), (0.5, 0.42, 0.55), (0.4, 0.49, 0.2), (0.4, 0.49, 0.6), (0.22, 0.32, 1.0)
+)
+_TALL = _hull((0.35, 0.47, 0.0), (0.5, 0.5, 0.12), (0.5, 0.5, 0.85), (0.47, 0.47, 1.0))
+_HULLS = {"car": _CAR, "van": _TALL, "truck": _TALL, "bus": _TALL}
+"""Outermost points of bodies, in shares of length, width and height. A picture's box ends at the tyres, the bumpers and
+the roof, not at the corners of the box around the body: bumpers end well above the ground and roofs before the ends."""
 
 
 def lift_by_ground(
@@ -69,6 +86,9 @@ class _View:
         priors = [prior_of(name) for name in classes]
         self._sizes = np.array([prior.mean for prior in priors])
         self._deviations = np.array([prior.deviation for prior in priors])
+        hulls = [_HULLS.get(name, _BOX) for name in classes]
+        most = max(map(len, hulls))
+        self._hulls = np.array([np.resize(hull, (most, 3)) for hull in hulls])
         focal = float(camera.intrinsics[0, 0])
         height, width = camera.rgb.shape[:2]
         size = np.maximum(boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1])
@@ -165,7 +185,7 @@ class _View:
 
     def _projected(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
         """(3, N, K, 4) edges of the projections, and (3, N, K) depths of the centres."""
-        corners = _CORNERS * self._sizes[:, None]
+        corners = self._hulls * self._sizes[:, None]
         cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
         x = cos * corners[:, None, :, 0] - sin * corners[:, None, :, 1] + place[..., 0:1]
         y = sin * corners[:, None, :, 0] + cos * corners[:, None, :, 1] + place[..., 1:2]
@@ -182,12 +202,9 @@ class _View:
         """(N, K, 4) one over the standard deviation of each edge: of the box, and of the usual size."""
         across = self._deviations[:, 1, None] / 2.0 / depth
         upwards = self._deviations[:, 2, None] / depth
-        blur = self._blur[:, None]
+        blur = np.hypot(self._blur[:, None], SHAPE_DEVIATION / depth)
         sides = 1.0 / np.hypot(blur, across)
-        weight = np.stack(
-            [sides, 1.0 / np.hypot(blur, upwards), sides, np.broadcast_to(1.0 / blur, depth.shape)], axis=-1
-        )
-        return weight
+        return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / blur], axis=-1)
 
     def _covariance(self, information: Array, heading: Array) -> Array:
         """(N, 2, 2) of the centres: of the fit, and of half the length and width that are not seen."""

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.geometry import box_corners
+from eidrive_scenario.geometry import box_corners, overlap
 from eidrive_scenario.perception.box_fit import Fit
 from eidrive_scenario.perception.clustering import clusters
-from eidrive_scenario.perception.ground_lifting import lift_by_ground
+from eidrive_scenario.perception.ground_lifting import AT_BORDER, lift_by_ground
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_points
 from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.perception.scan import Scan
@@ -22,15 +22,23 @@ from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 LEAST_POINTS = 2
 """Of a cluster that can be the object in a box."""
+MARGIN = 0.1
+"""Points this far beside a box may belong to its object, as a share of the box's size: so exact are detectors, and what
+a LiDAR's rays meet is not quite what a camera sees."""
+MOST_TRIED = 3
+"""Clusters of which boxes are fitted, for each box of the picture."""
 LEAST_DEVIATION, LARGEST_DEVIATION = 0.1, 0.4
 """Of the logarithm of the distance that a box leads to expect."""
 LEAST_OVERLAP = 0.3
 """Of a box from points, seen by the camera, with the box in the picture (intersection over union)."""
 GATE = 3.0
 """Clusters at a distance that differs by more deviations are not the object."""
+DOUBTFUL = 9.0
+"""Sum of squared deviations from the sizes of its class up to which points suit it."""
 UNLIKELY = 60.0
 """Sum of squared deviations from the sizes of its class beyond which points are not believed to be the object."""
 MAY_BE: Mapping[str, tuple[str, ...]] = {
@@ -62,10 +70,11 @@ def lift(
     surroundings  the map, for the direction of lanes and the height of roads
     pattern  of the LiDAR's rays; by its points where None
 
-    With a LiDAR, its points without the ground are projected into the picture. Those within a box are clustered, and
-    the cluster that has many points at the distance which the box's height leads to expect is the object: its box comes
-    from an L-shape fit. A box without such points stands on the ground where `lift_by_ground` puts it. Velocities are
-    unknown.
+    With a LiDAR, its points without the ground are projected into the picture. Those in and close to a box, and beyond
+    the picture's border where that cuts the box off, are clustered. The object is the cluster with many points in the
+    box, about where `lift_by_ground` expects it, of which an L-shape fit makes a box that has the size of the class and
+    fills the picture's; pieces that lie in that box belong to it. A box without such points stands on the ground where
+    `lift_by_ground` puts it. Velocities are unknown.
     """
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
     surroundings = surroundings or Surroundings(None)
@@ -92,63 +101,143 @@ def _by_points(
 ) -> list[Fit | None]:
     """What the points in each box say of its object."""
     places, _ = pixels(scan.world, camera)
+    behind = np.isnan(places[:, 0])
+    aside = (scan.world[behind] - camera.pose[:3, 3]) @ camera.pose[:3, 0]
+    places[behind, 0] = np.where(aside < 0.0, -math.inf, math.inf)
+    places[behind, 1] = camera.rgb.shape[0] / 2.0
     away = np.hypot(*(scan.world[:, :2] - camera.pose[:2, 3]).T)
     found: list[Fit | None] = []
-    for box, name, guess, spread in zip(boxes.tolist(), classes, by_ground, covariance, strict=True):
-        left, top, right, bottom = box
-        inside = (places[:, 0] >= left) & (places[:, 0] <= right) & (places[:, 1] >= top) & (places[:, 1] <= bottom)
+    for box, name, guess, spread in zip(boxes, classes, by_ground, covariance, strict=True):
         place = guess[:2] - camera.pose[:2, 3]
         expected = max(float(np.linalg.norm(place)), 0.5)
         deviation = math.sqrt(float(place @ spread @ place)) / expected**2
-        lengths = _Expected(expected, min(math.hypot(deviation, LEAST_DEVIATION), LARGEST_DEVIATION))
-        heading = float(guess[6]) - scan.frame.yaw
-        fit = _foreground(scan, np.flatnonzero(inside), away, name, lengths, heading)
-        found.append(fit if fit is not None and _fills(fit, scan, box, camera) else None)
+        target = _Target(
+            box.tolist(),
+            MAY_BE.get(name, (name,)),
+            expected,
+            min(math.hypot(deviation, LEAST_DEVIATION), LARGEST_DEVIATION),
+            max(prior_of(name).mean[:2]) / 4.0,
+            float(guess[6]) - scan.frame.yaw,
+        )
+        found.append(_foreground(scan, camera, target, places, away))
     return found
 
 
-def _fills(fit: Fit, scan: Scan, box: Sequence[float], camera: CameraReading) -> bool:
-    """Whether a box of the world, seen by the camera, is about the box that the picture has."""
+class _Target(NamedTuple):
+    """The object that is looked for.
+
+    box      in the picture [px];  classes  that it may be
+    distance from the camera at which it should be [m], and the deviation of the logarithm of that
+    depth    from the points that are seen of it to its middle, about [m]
+    heading  in the level frame, where the points are too few to show one [rad]
+    """
+
+    box: list[float]
+    classes: tuple[str, ...]
+    distance: float
+    deviation: float
+    depth: float
+    heading: float
+
+    def likelihood(self, distance: float) -> float:
+        """How well something at this distance [m] agrees with what is expected, 1 at best; 0 beyond the gate."""
+        off = math.log(max(distance + self.depth, 0.5) / self.distance) / self.deviation
+        return math.exp(-0.5 * off * off) if abs(off) <= GATE else 0.0
+
+
+class _Candidate(NamedTuple):
+    """Points that may be the object, as rows of the scan, and how many of them at the right distance are in its box."""
+
+    rows: Integers
+    weight: float
+
+
+def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Array, away: Array) -> Fit | None:
+    """The box of the object among the points in and about a box of the picture; None where there is none.
+
+    places   (N, 2) of all points of the scan in the picture, those behind the camera infinitely far beside it [px]
+    away     (N,) their distance from the camera [m]
+    """
+    inside = _within(places, target.box)
+    rows = np.flatnonzero(_within(places, _widened(target.box, camera)))
+    best: tuple[float, Fit] | None = None
+    tried: set[bytes] = set()
+    for grazing in (True, False):
+        groups = [
+            rows[group].astype(np.int64) for group in clusters(scan.points[rows], scan.pattern.azimuth, grazing=grazing)
+        ]
+        candidates = _candidates([group for group in groups if group.tobytes() not in tried], inside, away, target)
+        for candidate in candidates[:MOST_TRIED]:
+            fit = scan.fit(candidate.rows, target.classes, target.heading)
+            if fit is None:
+                continue
+            fit = _with_pieces(scan, candidate, fit, candidates, target)
+            score = candidate.weight * _filled(fit, scan, target.box, camera) / (1.0 + fit.deviation / DOUBTFUL)
+            if fit.deviation <= UNLIKELY and score > 0.0 and (best is None or score > best[0]):
+                best = score, fit
+        if best is not None and best[1].deviation <= DOUBTFUL:
+            break  # else parts of what the rays graze may lie apart
+        tried.update(group.tobytes() for group in groups)
+    return None if best is None else best[1]
+
+
+def _candidates(
+    groups: Sequence[Integers], inside: NDArray[np.bool_], away: Array, target: _Target
+) -> list[_Candidate]:
+    """The groups of points that may be the object, the likeliest first."""
+    found = []
+    for group in groups:
+        count = int(inside[group].sum())
+        if count >= LEAST_POINTS:
+            weight = count * target.likelihood(float(np.median(away[group])))
+            if weight > 0.0:
+                found.append(_Candidate(group, weight))
+    return sorted(found, key=lambda candidate: -candidate.weight)
+
+
+def _with_pieces(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: _Target) -> Fit:
+    """The fit with those other clusters that lie in its box, where one box suits them all as well."""
+    for other in others:
+        if not np.intersect1d(other.rows, candidate.rows).size:
+            piece = scan.fit(other.rows, target.classes, target.heading)
+            if piece is not None and overlap(fit.box, piece.box):
+                rows = np.concatenate([candidate.rows, other.rows])
+                whole = scan.fit(rows, target.classes, target.heading)
+                if whole is not None and whole.deviation <= max(fit.deviation, DOUBTFUL):
+                    candidate, fit = _Candidate(rows, candidate.weight), whole
+    return fit
+
+
+def _within(places: Array, box: Sequence[float]) -> NDArray[np.bool_]:
+    left, top, right, bottom = box
+    x, y = places[:, 0], places[:, 1]
+    return np.asarray((x >= left) & (x <= right) & (y >= top) & (y <= bottom))
+
+
+def _widened(box: Sequence[float], camera: CameraReading) -> tuple[float, float, float, float]:
+    """A box with its margin; without an end where the picture ends."""
+    left, top, right, bottom = box
+    height, width = camera.rgb.shape[:2]
+    across, down = MARGIN * (right - left), MARGIN * (bottom - top)
+    return (
+        left - across if left > AT_BORDER else -math.inf,
+        top - down if top > AT_BORDER else -math.inf,
+        right + across if right < width - AT_BORDER else math.inf,
+        bottom + down if bottom < height - AT_BORDER else math.inf,
+    )
+
+
+def _filled(fit: Fit, scan: Scan, box: Sequence[float], camera: CameraReading) -> float:
+    """How much of a box of the picture a box of the world fills, seen by the camera: intersection over union; 0 where
+    that is too little, 1 where it reaches behind the camera, and so out of the picture on several sides."""
     outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
     if np.isnan(outline).any():
-        return True  # it reaches behind the camera, and so out of the picture on several sides
+        return 1.0
     height, width = camera.rgb.shape[:2]
     left, top = np.clip(outline.min(axis=0), 0.0, (width, height)).tolist()
     right, bottom = np.clip(outline.max(axis=0), 0.0, (width, height)).tolist()
     across, down = min(right, box[2]) - max(left, box[0]), min(bottom, box[3]) - max(top, box[1])
     shared = max(across, 0.0) * max(down, 0.0)
     areas = (right - left) * (bottom - top) + (box[2] - box[0]) * (box[3] - box[1])
-    return bool(shared > LEAST_OVERLAP * (areas - shared))
-
-
-class _Expected(NamedTuple):
-    """How far away an object should be [m], and the deviation of the logarithm of that."""
-
-    distance: float
-    deviation: float
-
-
-def _foreground(
-    scan: Scan, rows: NDArray[np.intp], away: Array, name: str, expected: _Expected, heading: float
-) -> Fit | None:
-    """The box of the object among points that a box of a picture has within it; None where there is none.
-
-    away   (N,) distance of all points of the scan from the camera [m]
-    """
-    best: tuple[float, NDArray[np.int64]] | None = None
-    points = scan.points[rows]
-    depth = max(prior_of(name).mean[:2]) / 2.0
-    for cluster in clusters(points, scan.pattern.azimuth):
-        if len(cluster) < LEAST_POINTS:
-            continue
-        distance = float(np.median(away[rows[cluster]])) + depth / 2.0
-        off = math.log(max(distance, 0.5) / expected.distance) / expected.deviation
-        if abs(off) > GATE:
-            continue
-        weight = len(cluster) * math.exp(-0.5 * off * off)
-        if best is None or weight > best[0]:
-            best = (weight, rows[cluster].astype(np.int64))
-    if best is None:
-        return None
-    fit = scan.fit(best[1], MAY_BE.get(name, (name,)), heading)
-    return fit if fit is not None and fit.deviation <= UNLIKELY else None
+    share = shared / max(areas - shared, 1e-9)
+    return share if share > LEAST_OVERLAP else 0.0
