@@ -53,7 +53,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
         *_rows("SpeedProfileAction", "LongitudinalDistanceAction"),
         Row("LaneChangeAction", note=EXACTLY),
         *_rows("LaneOffsetAction", "LateralDistanceAction"),
-        Row("VisibilityAction", note="a gap: counts for all sensors of others, whatever its SensorReferenceSet says"),
+        Row("VisibilityAction"),
         Row("SynchronizeAction"),
         Row("ActivateControllerAction", note="controllers of other tools mean the default controller"),
         Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),

@@ -32,6 +32,7 @@ class Camera:
 
     def __init__(self, settings: CameraSettings, spec: ActorSpec, name: str = "camera", seed: int = 0) -> None:
         self.settings = settings
+        self.name = name
         self.mounting = mounting(settings, spec, "front")
         self._photographer = Photographer(settings)
         self._key = (seed, "camera", spec.name, name)
@@ -43,6 +44,7 @@ class Camera:
             scene,
             self.mounting.camera_pose(view, row),
             generator(seed, *key, view.tick),
+            ignore=view.unseen_by.get(self.name, ()),
             velocity=view.velocity[row],
             lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
         )

@@ -31,6 +31,7 @@ class Lidar:
 
     def __init__(self, settings: LidarSettings, spec: ActorSpec, name: str = "lidar", seed: int = 0) -> None:
         self.settings = settings
+        self.name = name
         self.mounting = mounting(settings, spec, "roof")
         rings = settings.elevations or np.linspace(settings.upper_fov, settings.lower_fov, settings.channels)
         self._elevations = np.radians(rings)
@@ -59,7 +60,8 @@ class Lidar:
         else:
             enter, leave = crossing(origin[None], targets[None], own)
             starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
-        hits = scene.cast(np.ascontiguousarray(starts[clear]), targets[clear])
+        named = {"sensor": self.name} if view.unseen_by else {}
+        hits = scene.cast(np.ascontiguousarray(starts[clear]), targets[clear], **named)
         rows = np.asarray(hits.rows)
         met = rows != NOTHING
         begin = np.linalg.norm(starts[clear] - pose[:3, 3], axis=1) if self._on_mast else 0.0

@@ -109,7 +109,7 @@ def ego_state(view: WorldView, row: int) -> EgoState:
 def _sensor(settings: SensorSettings, spec: ActorSpec, name: str, seed: int) -> Sensor:
     match settings:
         case TruthSettings():
-            return TruthSensor(settings, spec)
+            return TruthSensor(settings, spec, name)
         case CameraSettings():
             return Camera(settings, spec, name, seed)
         case LidarSettings():

@@ -41,8 +41,8 @@ class Scene(Protocol):
     def weather(self) -> Weather:
         """The weather at present."""
 
-    def cast(self, origins: Array, targets: Array) -> RayHits:
-        """Rays from (M, 3) to (M, 3) [m]."""
+    def cast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHits:
+        """Rays from (M, 3) to (M, 3) [m], of the sensor of this name, which may not see some actors."""
 
     def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
         """The same rows as of `cast`, for a few rays in plain numbers."""

@@ -37,8 +37,9 @@ class TruthSensor:
     Range is measured between the centres of the bodies; rays start at the mount and pass through the own body.
     """
 
-    def __init__(self, settings: TruthSettings, spec: ActorSpec) -> None:
+    def __init__(self, settings: TruthSettings, spec: ActorSpec, name: str = "truth") -> None:
         self.settings = settings
+        self.name = name
         self.mounting = mounting(settings, spec, "roof")
         self.half_field = math.radians(settings.field_of_view) / 2.0
 
@@ -46,9 +47,14 @@ class TruthSensor:
 def read_truth(
     sensors: Sequence[TruthSensor], rows: Sequence[int], scene: Scene, view: WorldView
 ) -> list[TruthReading]:
-    """What each sensor sees from the actor in its row; all rays of all sensors go out in one batch."""
+    """What each sensor sees from the actor in its row; all rays of all sensors go out in one batch.
+
+    Where the scenario hides actors from sensors by their names, each looks for itself.
+    """
     if not sensors:
         return []
+    if view.unseen_by:
+        return [_read_alone(sensor, row, scene, view) for sensor, row in zip(sensors, rows, strict=True)]
     unseen = [view.rows[name] for name in view.unseen if name in view.rows]
     look = few_candidates if len(sensors) * len(view.names) <= FEW_PAIRS else candidates
     targets = look(sensors, rows, view, unseen)
@@ -63,6 +69,15 @@ def read_truth(
         readings.append(_reading(view, [(row, share) for row, share in pairs if share >= least]))
         start += len(found)
     return readings
+
+
+def _read_alone(sensor: TruthSensor, row: int, scene: Scene, view: WorldView) -> TruthReading:
+    unseen = [view.rows[name] for name in view.hidden_from(sensor.name) if name in view.rows]
+    targets = candidates([sensor], [row], view, unseen)
+    shares = visibilities([sensor], [row], targets, scene, view, sensor.name) if targets[0] else []
+    least = sensor.settings.visibility - 1e-9
+    seen = zip(targets[0], shares, strict=True)
+    return _reading(view, [(target, share) for target, share in seen if share >= least])
 
 
 def _reading(view: WorldView, seen: Sequence[tuple[int, float]]) -> TruthReading:
@@ -120,9 +135,17 @@ def few_candidates(
 
 
 def visibilities(
-    sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
+    sensors: Sequence[TruthSensor],
+    own: Sequence[int],
+    targets: Sequence[Sequence[int]],
+    scene: Scene,
+    view: WorldView,
+    name: str = "",
 ) -> list[float]:
-    """Shares of the objects' sampled points that are in sight, of the objects of each sensor in turn."""
+    """Shares of the objects' sampled points that are in sight, of the objects of each sensor in turn.
+
+    With a name, past actors that the scenario hides from the sensor of that name.
+    """
     boxes = view.boxes
     sensor_of = np.repeat(np.arange(len(sensors)), [len(rows) for rows in targets])
     target_of = np.concatenate([np.asarray(rows, dtype=np.intp) for rows in targets])
@@ -130,7 +153,8 @@ def visibilities(
     points = _points(boxes[target_of])
     origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
     starts = past_box(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
-    hits = scene.cast(starts.reshape(-1, 3), points.reshape(-1, 3))
+    begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
+    hits = scene.cast(begin, end, sensor=name) if name else scene.cast(begin, end)
     met = np.asarray(hits.rows).reshape(len(target_of), len(SAMPLES))
     in_sight = (met == target_of[:, None]) | (met == NOTHING)
     shares: list[float] = in_sight.mean(axis=1).tolist()

@@ -62,11 +62,16 @@ class AnimationState:
 
 @dataclass(frozen=True)
 class Visibility:
-    """Who can see an actor."""
+    """Who can see an actor; `named` are the sensors, by their names, for which something else was said."""
 
     graphics: bool = True
     traffic: bool = True
     sensors: bool = True
+    named: Mapping[str, bool] = field(default_factory=dict)
+
+    def by(self, sensor: str) -> bool:
+        """Whether the sensor of this name sees it."""
+        return self.named.get(sensor, self.sensors)
 
 
 @dataclass(frozen=True)

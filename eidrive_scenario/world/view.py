@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -43,6 +43,7 @@ class WorldView:
     offset        (N, 3) box centre in the actor's frame [m]
     contacts      touches that began during the step that led here
     unseen        actors that sensors do not see, as the scenario says
+    unseen_by     the same for the sensors of these names, of whom it says something else
     """
 
     time: float
@@ -61,6 +62,11 @@ class WorldView:
     offset: Array
     contacts: tuple[Contact, ...] = ()
     unseen: tuple[str, ...] = ()
+    unseen_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def hidden_from(self, sensor: str) -> tuple[str, ...]:
+        """The actors that the sensor of this name does not see, as the scenario says."""
+        return self.unseen_by.get(sensor, self.unseen)
 
     @cached_property
     def rows(self) -> Mapping[str, int]:
@@ -73,9 +79,9 @@ class WorldView:
         if len(kept) == len(self.names):
             return self
         arrays: dict[str, Any] = {
-            field.name: value[kept]
-            for field in fields(self)
-            if isinstance(value := getattr(self, field.name), np.ndarray)
+            entry.name: value[kept]
+            for entry in fields(self)
+            if isinstance(value := getattr(self, entry.name), np.ndarray)
         }
         return replace(
             self,

@@ -71,6 +71,7 @@ class World:
         self._signals: Mapping[str, str] = {}
         self._appearances: Mapping[str, Appearance] = {}
         self._unseen: tuple[str, ...] = ()
+        self._unseen_by: Mapping[str, tuple[str, ...]] = {}
         self._friction = 1.0
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
@@ -167,6 +168,11 @@ class World:
         if appearances is not self._appearances:
             self._appearances = appearances
             self._unseen = tuple(name for name, look in appearances.items() if not look.visibility.sensors)
+            sensors = dict.fromkeys(name for look in appearances.values() for name in look.visibility.named)
+            self._unseen_by = {
+                sensor: tuple(name for name, look in appearances.items() if not look.visibility.by(sensor))
+                for sensor in sensors
+            }
             self._view = None
 
     @property
@@ -226,6 +232,7 @@ class World:
                 offset=cast.offset,
                 contacts=self._contacts,
                 unseen=self._unseen,
+                unseen_by=self._unseen_by,
             )
             self._view.__dict__["rows"] = cast.rows
         return self._view
@@ -234,11 +241,14 @@ class World:
         """Distance between the boxes of two actors [m], 0 where they touch. Raises SimulationError."""
         return box_distance(self._body(first).box, self._body(second).box)
 
-    def cast(self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> RayHits:
-        """What rays (M, 3) to (M, 3) meet first; actors in `ignore`, and such that sensors do not see, are passed."""
+    def cast(self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = (), *, sensor: str = "") -> RayHits:
+        """What rays (M, 3) to (M, 3) meet first; actors in `ignore`, and such that the sensor does not see, are passed.
+
+        `sensor` is its name: without one, actors count that the scenario hides from sensors as such.
+        """
         self._refresh()
         rows = self.view().rows
-        unseen = [rows[name] for name in self._unseen if name in rows]
+        unseen = [rows[name] for name in self._unseen_by.get(sensor, self._unseen) if name in rows]
         passed = np.array([*(rows[name] for name in ignore), *unseen], dtype=np.int64)
         begin, end = (np.ascontiguousarray(np.reshape(points, (-1, 3)), dtype=float) for points in (origins, targets))
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))

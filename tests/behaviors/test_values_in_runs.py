@@ -149,6 +149,22 @@ def test_who_is_hidden_from_sensors_is_not_detected_and_is_there_all_the_same(ru
     assert all("Other" in frame.view for frame in played.frames)
 
 
+@pytest.mark.element("VisibilityAction")
+def test_a_sensor_reference_set_hides_from_the_sensors_that_it_names_alone(run: Any) -> None:
+    hide = private("""<VisibilityAction graphics="true" sensors="{}" traffic="true"><SensorReferenceSet>
+      <SensorReference name="{}"/></SensorReferenceSet></VisibilityAction>""")
+    played = run(
+        2,
+        ("Other", hide.format("false", "another"), after(0.25)),
+        ("Other", hide.format("false", "truth"), after(0.5)),
+        ("Other", hide.format("true", "truth"), after(1.2)),
+        others={"Other": (-1, 120.0, 20.0)},
+    )
+    assert [len(frame.steps["Ego"].detections) for frame in played.frames] == [1] * 12 + [0] * 14 + [1] * 15
+    seen = played.frames[-1].appearances["Other"].visibility
+    assert [seen.by(name) for name in ("another", "truth", "a third")] == [False, True, True]
+
+
 def test_a_time_of_day_that_nobody_states_is_told(run: Any) -> None:
     noon = '<TimeOfDayCondition rule="greaterThan" dateTime="2024-06-01T12:00:00"/>'
     played = run(0.5, ("Ego", NOTHING, f"<ByValueCondition>{noon}</ByValueCondition>"))

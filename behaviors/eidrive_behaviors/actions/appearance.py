@@ -28,7 +28,10 @@ MOTION = "motion"
 
 
 class VisibilityAction(ActionBehaviour):
-    """Says who sees the entity: pictures, traffic, sensors."""
+    """Says who sees the entity: pictures, traffic, sensors.
+
+    With a SensorReferenceSet what it says of sensors is for those of these names alone, whosever they are.
+    """
 
     immediate = True
     action: model.VisibilityAction
@@ -36,13 +39,23 @@ class VisibilityAction(ActionBehaviour):
     def update(self) -> Status:
         """Say it."""
         action, stage, name = self.action, self.stage, self.actor.name
-        seen = Visibility(action.graphics, action.traffic, action.sensors)
-        stage.look(name, replace(stage.appearance(name), visibility=seen))
+        before, chosen = stage.appearance(name), action.sensor_reference_set
+        if chosen is None:
+            seen = Visibility(action.graphics, action.traffic, action.sensors)
+        else:
+            named = {one.name: action.sensors for one in chosen.sensor_reference}
+            others = before.visibility
+            seen = Visibility(action.graphics, action.traffic, others.sensors, {**others.named, **named})
+        stage.look(name, replace(before, visibility=seen))
         return Status.SUCCESS
 
     def describe(self) -> str:
         """Who sees it."""
-        who = (("pictures", self.action.graphics), ("traffic", self.action.traffic), ("sensors", self.action.sensors))
+        chosen = self.action.sensor_reference_set
+        sensors = (
+            "sensors" if chosen is None else "the sensors " + ", ".join(one.name for one in chosen.sensor_reference)
+        )
+        who = (("pictures", self.action.graphics), ("traffic", self.action.traffic), (sensors, self.action.sensors))
         return f"seen by {', '.join(name for name, seen in who if seen) or 'nobody'}"
 
 

@@ -13,6 +13,7 @@ from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.appearance import Appearance, Visibility
 
 
 def spec(name: str, size: tuple[float, float, float] = (4.892, 1.837, 1.49), shape: str = "car") -> ActorSpec:
@@ -82,3 +83,25 @@ def test_camera_sees_the_truck_where_it_stands(world: World) -> None:
     assert picture.segmentation[24, 32] == world.view().rows["Truck"]
     assert picture.depth[24, 32] == pytest.approx(15 - 4.234 - 2.5, abs=0.5)
     assert math.isclose(picture.intrinsics[0, 0], 32 / math.tan(math.radians(50)))
+
+
+def test_an_actor_may_be_hidden_from_some_sensors_by_their_names(world: World) -> None:
+    """Without the truck, sight from the mounts reaches the car behind it, whose rear is at 30 - 2.446 m."""
+    lidar = LidarSettings(channels=16, points_per_second=16 * 360 * 20, range_noise=0.0)
+    camera = CameraSettings(width=64, height=48, mount=Mount(x=2.5, y=0, z=1.0))
+    world.add_building("wall", (60, 0, 5), (4, 200, 10))
+    for blind in ("eyes", "roof", "front"):
+        world.show({}, {"Truck": Appearance(visibility=Visibility(named={blind: False}))})
+        rig = Rig(spec("Ego"), {"eyes": TruthSettings(), "roof": lidar, "front": camera})
+        readings = rig.read(world, world.view())
+        assert readings.truth is not None
+        assert set(readings.truth.names) == ({"Hidden", "Beside"} if blind == "eyes" else {"Truck", "Beside"})
+        sweep = readings.lidars["roof"]
+        points = sweep.points @ sweep.pose[:3, :3].T + sweep.pose[:3, 3]
+        ahead = points[(np.abs(points[:, 1]) < 0.9) & (points[:, 2] > 0.1) & (points[:, 0] > 5)]
+        assert ahead[:, 0].min() == pytest.approx(30 - 2.446 if blind == "roof" else 15 - 4.234, abs=0.02)
+        seen = "Hidden" if blind == "front" else "Truck"
+        assert readings.cameras["front"].segmentation[24, 32] == world.view().rows[seen]
+    world.show({}, {"Truck": Appearance(visibility=Visibility(sensors=False, named={"eyes": True}))})
+    assert names(Rig(spec("Ego"), {"eyes": TruthSettings()}), world) == {"Truck", "Beside"}
+    assert names(Rig(spec("Ego"), {"truth": TruthSettings()}), world) == {"Hidden", "Beside"}
