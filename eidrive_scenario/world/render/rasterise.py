@@ -159,16 +159,22 @@ def _fill(
     left: int,
 ) -> None:
     """Draw one triangle, numbers rising from call to call."""
+    first, last = int(spans.line[0]), int(spans.line[-1]) + 1
     begin, end = int(spans.left.min()), int(spans.right.max())
-    window = (slice(int(spans.line[0]) - top, int(spans.line[-1]) + 1 - top), slice(begin - left, end - left))
-    columns = np.arange(begin, end)
-    value = np.empty((len(level), len(columns)), dtype=np.float32)
-    np.add(level[:, None], (columns + 0.5) * slope, out=value, casting="same_kind")
+    window = (slice(first - top, last - top), slice(begin - left, end - left))
+    # Where a tip is thinner than a pixel, some of its lines hold no centre of one.
+    rows = spans.line - first
+    levels = np.zeros(last - first)
+    levels[rows] = level
+    from_column, to_column = np.zeros((2, last - first, 1), dtype=np.int32)
+    from_column[rows, 0], to_column[rows, 0] = spans.left, spans.right
+    columns = np.arange(begin, end, dtype=np.int32)
+    value = np.empty((last - first, end - begin), dtype=np.float32)
+    np.add(levels[:, None], (columns + 0.5) * slope, out=value, casting="same_kind")
     np.maximum(value, np.float32(_LEAST), out=value)
     better = value >= near[window]
-    short = columns.astype(np.int32)
-    better &= short >= spans.left[:, None].astype(np.int32)
-    better &= short < spans.right[:, None].astype(np.int32)
+    better &= columns >= from_column
+    better &= columns < to_column
     np.copyto(near[window], value, where=better)
     np.copyto(triangle[window], np.int32(number), where=better)
 

@@ -71,6 +71,27 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
         assert len(covered) == 0 or np.all(np.diff(covered) == 1)
 
 
+def test_large_triangles_cover_what_small_ones_do() -> None:
+    """Triangles of thousands of pixels, thin tips among them, against all centres of pixels one by one."""
+    rng = np.random.default_rng(3)
+    corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [[(120.2, 0.0), (119.9, 90.0), (300.0, 200.0)]]])
+    nearness = rng.uniform(0.1, 1.0, (3, len(corners)))
+    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 300, 200)
+    lines, columns = np.indices((200, 300)) + 0.5
+    best, nearest = np.zeros((200, 300)), np.full((200, 300), -1)
+    for number, (a, b, c) in enumerate(corners):
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        share = [
+            ((q[0] - p[0]) * (lines - p[1]) - (q[1] - p[1]) * (columns - p[0])) / area
+            for p, q in ((b, c), (c, a), (a, b))
+        ]
+        near = sum(part * nearness[corner, number] for corner, part in enumerate(share))
+        better = (np.minimum(np.minimum(*share[:2]), share[2]) > 0.0) & (near > best)
+        best[better], nearest[better] = near[better], number
+    np.testing.assert_array_equal(shown.triangle, nearest)
+    np.testing.assert_allclose(shown.nearness, best, rtol=1e-5)
+
+
 def test_nearness_is_that_of_the_plane() -> None:
     corners = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]])
     nearness = np.array([[0.1], [0.5], [0.3]])
