@@ -1,0 +1,212 @@
+"""Whole runs in turned, moved and mirrored worlds: the same run, turned, moved and mirrored.
+
+Nothing in physics or in the rules of messages knows where north is, or left from right. So map and scenario of the
+library are turned about by 217.3 degrees and moved, or reflected at the x axis (with lanes, rule of the road, areas and
+headings), and run again. What differs is rounding, some 1e-12 m where the world was turned.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunResult, RunSettings, run_file
+
+TURN, EAST, NORTH = math.radians(217.3), 310.0, -85.0
+ROUNDING = 1e-9
+"""Of places [m], headings [rad] and path loss [dB]; a tick earlier or later in any decision would be 0.4 m."""
+
+Node = etree._Element
+
+
+@dataclass
+class Seen:
+    """Where everybody was, what the ego knew and what came over the radio, tick by tick."""
+
+    places: list[np.ndarray] = field(default_factory=list)
+    known: list[np.ndarray] = field(default_factory=list)
+    links: list[tuple[tuple[object, ...], ...]] = field(default_factory=list)
+    losses: list[tuple[float, ...]] = field(default_factory=list)
+
+    def observe(self, frame: Frame) -> None:
+        view = frame.view
+        self.places.append(np.column_stack([view.position[:, :2], view.yaw]))
+        self.known.append(frame.steps["Ego"].fused.boxes[:, [0, 1, 6]])
+        self.links.append(tuple((e.sender, e.number, e.outcome, e.reason, e.los, e.blockers) for e in frame.links))
+        self.losses.append(tuple(e.path_loss_db or 0.0 for e in frame.links))
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+
+def scaled(node: Node, *names: str, by: float = -1.0) -> None:
+    for name in names:
+        if node.get(name) is not None:
+            node.set(name, repr(by * float(node.get(name))))
+
+
+def negated_lane(node: Node, *names: str) -> None:
+    for name in names:
+        if node.get(name) is not None:
+            node.set(name, str(-int(node.get(name))))
+
+
+def turned(x: float, y: float) -> tuple[float, float]:
+    cos, sin = math.cos(TURN), math.sin(TURN)
+    return EAST + cos * x - sin * y, NORTH + sin * x + cos * y
+
+
+def turned_road(road: Node) -> None:
+    for geometry in road.iter("geometry"):
+        x, y = turned(float(geometry.get("x")), float(geometry.get("y")))
+        geometry.set("x", repr(x))
+        geometry.set("y", repr(y))
+        geometry.set("hdg", repr(float(geometry.get("hdg")) + TURN))
+
+
+def mirrored_road(road: Node) -> None:
+    for node in road.iter("geometry"):
+        scaled(node, "y", "hdg")
+    for node in road.iter("arc", "spiral"):
+        scaled(node, "curvature", "curvStart", "curvEnd")
+    for node in road.iter("laneOffset"):
+        scaled(node, "a", "b", "c", "d")
+    for node in road.iter("object", "cornerRoad", "signal"):
+        scaled(node, "t", "hdg", "hOffset")
+    for node in road.iter("validity"):
+        negated_lane(node, "fromLane", "toLane")
+        first, last = node.get("fromLane"), node.get("toLane")
+        node.set("fromLane", last)
+        node.set("toLane", first)
+    for node in road.iter("laneLink"):
+        negated_lane(node, "from", "to")
+    for node in road.iter("road"):
+        node.set("rule", "LHT" if node.get("rule", "RHT") == "RHT" else "RHT")
+    for section in road.iter("laneSection"):
+        for lane in section.iter("lane"):
+            negated_lane(lane, "id")
+            for link in lane.iter("predecessor", "successor"):
+                negated_lane(link, "id")
+        sides = {side.tag: side for side in section if side.tag in ("left", "right")}
+        for side in sides.values():
+            side[:] = list(reversed(side))
+            side.tag = "right" if side.tag == "left" else "left"
+        section[:] = sorted(section, key=lambda side: ["left", "center", "right"].index(side.tag))
+
+
+def turned_scenario(text: str) -> str:
+    def place(found: re.Match[str]) -> str:
+        x, y = turned(float(found[1]), float(found[2]))
+        return f'<WorldPosition x="{x!r}" y="{y!r}" z="0" h="{float(found[3]) + TURN!r}"/>'
+
+    def area(found: re.Match[str]) -> str:
+        x0, x1, y0, y1 = map(float, found[1].split(","))
+        return f'"conflict_area" value="{[list(turned(x, y)) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]}"'
+
+    return re.sub(AREA, area, re.sub(PLACE, place, text))
+
+
+def mirrored_scenario(text: str) -> str:
+    def area(found: re.Match[str]) -> str:
+        x0, x1, y0, y1 = map(float, found[1].split(","))
+        return f'"conflict_area" value="{[x0, x1, -y1, -y0]}"'
+
+    text = re.sub(PLACE, r'<WorldPosition x="\1" y="\g<2>" z="0" h="\3"/>', text)
+    text = re.sub(PLACE, lambda f: f'<WorldPosition x="{f[1]}" y="{-float(f[2])}" z="0" h="{-float(f[3])}"/>', text)
+    return re.sub(AREA, area, re.sub(r'laneId="(-?\d+)"', lambda f: f'laneId="{-int(f[1])}"', text))
+
+
+PLACE = r'<WorldPosition x="([-\d.]+)" y="([-\d.]+)" z="0" h="([-\d.]+)"/>'
+AREA = r'"conflict_area" value="\[([^\]]*)\]"'
+
+
+def turned_poses(poses: np.ndarray) -> np.ndarray:
+    cos, sin = math.cos(TURN), math.sin(TURN)
+    x, y, yaw = poses.T
+    return np.column_stack([EAST + cos * x - sin * y, NORTH + sin * x + cos * y, yaw + TURN])
+
+
+def mirrored_poses(poses: np.ndarray) -> np.ndarray:
+    return poses * [1.0, -1.0, -1.0]
+
+
+Roads = Callable[[Node], None]
+Scenario = Callable[[str], str]
+Poses = Callable[[np.ndarray], np.ndarray]
+CHANGES: dict[str, tuple[Roads, Scenario, Poses]] = {
+    "turned": (turned_road, turned_scenario, turned_poses),
+    "mirrored": (mirrored_road, mirrored_scenario, mirrored_poses),
+}
+
+
+def unchanged(root: Node) -> None:
+    """The roads as they are."""
+
+
+def changed(folder: Path, name: str, fusion: str, roads: Roads = unchanged, scenario: Scenario = str) -> Path:
+    """The scenario in a changed world, with this method of fusion; its catalogs are those of the library."""
+    folder.mkdir()
+    source = resolve_scenario(name)
+    text = source.read_text().replace('x="${40.0 + $CentreAhead}"', 'x="41.384"')
+    text = text.replace('name="fusion" value="average"', f'name="fusion" value="{fusion}"')
+    (map_name,) = re.findall(r'LogicFile filepath="([^"]*)"', text)
+    tree = etree.parse(source.parent / map_name)
+    roads(tree.getroot())
+    tree.write(folder / "roads.xodr", xml_declaration=True, encoding="UTF-8")
+    assert len(re.findall("<WorldPosition", text)) == len(re.findall(PLACE, text))
+    text = scenario(text).replace(map_name, "roads.xodr")
+    path = folder / "changed.xosc"
+    path.write_text(text.replace('"../', f'"{source.parent.parent}/'))
+    return path
+
+
+def play(source: Path, channel: str, seed: int) -> tuple[Seen, RunResult]:
+    seen = Seen()
+    return seen, run_file(source, seed=seed, settings=RunSettings(channel=channel), observers=[seen])
+
+
+def off(found: np.ndarray, expected: np.ndarray) -> float:
+    """The largest difference of poses (N, 3) [m, rad]."""
+    difference = np.abs(found - expected)
+    difference[:, 2] = np.abs((found[:, 2] - expected[:, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+    return float(difference.max(initial=0.0))
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(
+    ("name", "fusion", "channel", "seed"),
+    [
+        ("coop/scenario_1", "average", "80211p_urban", 2),
+        ("coop/scenario_1", "average", "latency_300ms", 3),
+        ("coop/scenario_1", "covariance_intersection", "latency_300ms", 1),
+        ("coop/scenario_2", "average", "bursty", 1),
+        ("coop/scenario_2", "covariance_intersection", "cv2x_highway", 2),
+        ("coop/scenario_2", "average", "none", 3),
+    ],
+)
+def test_the_run_turns_with_the_world(
+    tmp_path: Path, change: str, name: str, fusion: str, channel: str, seed: int
+) -> None:
+    roads, scenario, poses = CHANGES[change]
+    usual, before = play(changed(tmp_path / "usual", name, fusion), channel, seed)
+    other, after = play(changed(tmp_path / "other", name, fusion, roads, scenario), channel, seed)
+    assert len(other.places) == len(usual.places) > 100
+    assert (after.passed, after.end) == (before.passed, before.end)
+    assert other.links == usual.links
+    for tick, (there, here) in enumerate(zip(other.places, usual.places, strict=True)):
+        assert off(there, poses(here)) < ROUNDING, tick
+    for tick, (there, here) in enumerate(zip(other.known, usual.known, strict=True)):
+        assert there.shape == here.shape, tick
+        assert off(there, poses(here)) < ROUNDING, tick
+    assert [loss for tick in other.losses for loss in tick] == pytest.approx(
+        [loss for tick in usual.losses for loss in tick], abs=ROUNDING
+    )
