@@ -28,8 +28,7 @@ def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Pla
     In the world frame [m]; pitch and roll are neglected.
     """
     row = view.rows[spec.name]
-    x, y, z = view.position[row].tolist()
-    yaw = float(view.yaw[row])
+    x, y, z, yaw, *_ = view.states[row]
     cos, sin = math.cos(yaw), math.sin(yaw)
     ahead, aside, up = spec.offset
     over = up + spec.size[2] / 2.0 if height is None else height

@@ -7,8 +7,6 @@ import json
 import struct
 from collections.abc import Mapping
 
-import numpy as np
-
 from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.appearance import Appearance
@@ -42,9 +40,8 @@ class TraceHash:
         view = frame.view
         self._texts(*view.names)
         self._floats(view.time)
-        angles = np.stack([view.yaw, view.pitch, view.roll], axis=1)
-        kinematics = np.concatenate([view.position, angles, view.velocity], axis=1)
-        self._sha.update(kinematics.astype("<f8", copy=False).tobytes())
+        kinematics = (view.position, view.yaw, view.pitch, view.roll, view.velocity)
+        self._sha.update(b"".join([part.astype("<f8", copy=False).tobytes() for part in kinematics]))
         for contact in view.contacts:
             self._texts("contact", contact.first, contact.second)
             self._floats(*contact.position, contact.impact_speed)

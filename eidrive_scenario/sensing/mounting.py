@@ -36,8 +36,8 @@ class Mounting:
 
     def position(self, view: WorldView, row: int) -> tuple[float, float, float]:
         """In the world [m]; pitch and roll neglected, as in the view's boxes."""
-        x, y, z = view.position[row].tolist()
-        cos, sin = math.cos(view.yaw[row]), math.sin(view.yaw[row])
+        x, y, z, yaw, *_ = view.states[row]
+        cos, sin = math.cos(yaw), math.sin(yaw)
         return x + cos * self.x - sin * self.y, y + sin * self.x + cos * self.y, z + self.z
 
     def pose(self, view: WorldView, row: int) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from eidrive_scenario.sensing.camera import Camera
 from eidrive_scenario.sensing.inertial import Gnss, Imu
 from eidrive_scenario.sensing.lidar import Lidar
-from eidrive_scenario.sensing.readings import EgoState, Readings
+from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, TruthReading
 from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import (
     CameraSettings,
@@ -77,32 +77,43 @@ def read_all(rigs: Sequence[Rig], scene: Scene, view: WorldView) -> dict[str, Re
     seen = read_truth([sensor for _, sensor in sighted], [rows[index] for index, _ in sighted], scene, view)
     truths = {index: reading for (index, _), reading in zip(sighted, seen, strict=True)}
     return {
-        rig.station: Readings(
-            time=view.time,
-            ego=ego_state(view, rows[index]),
-            truth=truths.get(index),
-            cameras={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Camera)},
-            lidars={name: s.read(scene, view, rows[index]) for name, s in due[index].items() if isinstance(s, Lidar)},
-            gnss=next((s.read(view, rows[index]) for s in due[index].values() if isinstance(s, Gnss)), None),
-            imu=next((s.read(view, rows[index]) for s in due[index].values() if isinstance(s, Imu)), None),
-        )
-        for index, rig in enumerate(rigs)
+        rig.station: _read(found, scene, view, row, truths.get(index))
+        for index, (rig, found, row) in enumerate(zip(rigs, due, rows, strict=True))
     }
+
+
+def _read(
+    sensors: Mapping[str, Sensor], scene: Scene, view: WorldView, row: int, truth: TruthReading | None
+) -> Readings:
+    """The readings of one station, whose truth sensor has been read."""
+    cameras: dict[str, CameraReading] = {}
+    lidars: dict[str, LidarReading] = {}
+    gnss = imu = None
+    for name, sensor in sensors.items():
+        if isinstance(sensor, Camera):
+            cameras[name] = sensor.read(scene, view, row)
+        elif isinstance(sensor, Lidar):
+            lidars[name] = sensor.read(scene, view, row)
+        elif isinstance(sensor, Gnss):
+            gnss = sensor.read(view, row)
+        elif isinstance(sensor, Imu):
+            imu = sensor.read(view, row)
+    return Readings(view.time, ego_state(view, row), truth, cameras, lidars, gnss, imu)
 
 
 def ego_state(view: WorldView, row: int) -> EgoState:
     """The actor's own motion, exact."""
-    yaw = float(view.yaw[row])
-    forward, left, _ = view.acceleration[row].tolist()
+    state = view.states[row]
+    yaw = state.yaw
     return EgoState(
         time=view.time,
         position=view.position[row],
         yaw=yaw,
-        pitch=float(view.pitch[row]),
-        roll=float(view.roll[row]),
-        speed=float(view.speed[row]),
-        yaw_rate=float(view.yaw_rate[row]),
-        acceleration=math.cos(yaw) * forward + math.sin(yaw) * left,
+        pitch=state.pitch,
+        roll=state.roll,
+        speed=state.speed,
+        yaw_rate=state.yaw_rate,
+        acceleration=math.cos(yaw) * state.acceleration_x + math.sin(yaw) * state.acceleration_y,
     )
 
 

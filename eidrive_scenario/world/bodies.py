@@ -7,6 +7,7 @@ import math
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
 from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.view import ActorState
 
 RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
 """Groups of pybullet's collision filter; a ray belongs to the first by pybullet's default."""
@@ -16,6 +17,7 @@ UNMOVED = 1e9
 RESTITUTION = 0.3
 """Of one body; two rebound with its square, about 0.1, as cars do above some 5 m/s."""
 BODY_FRICTION = 0.7
+STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Body:
@@ -44,11 +46,11 @@ class Body:
         """(7,) x y z l w h yaw of the bounding box."""
         return (self.centre_x, self.centre_y, self.centre_z, *self.spec.size, self.yaw)
 
-    def row(self) -> tuple[float, ...]:
-        """x y z yaw pitch roll, velocity, acceleration, yaw rate, speed."""
-        velocity, acceleration = self.velocity, self.acceleration
-        return (self.x, self.y, self.z, self.yaw, self.pitch, self.roll, velocity[0], velocity[1], velocity[2],
-                acceleration[0], acceleration[1], acceleration[2], self.yaw_rate, self.speed)  # fmt: skip
+    @property
+    def state(self) -> ActorState:
+        """How it stands and moves."""
+        return ActorState(self.x, self.y, self.z, self.yaw, self.pitch, self.roll, *self.velocity, *self.acceleration,
+                          self.yaw_rate, self.speed)  # fmt: skip
 
     @property
     def travel(self) -> float:
@@ -131,6 +133,8 @@ class ScriptedBody(Body):
         super().__init__(client, spec, placement, dt)
         self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
         self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+        self._resting = False
+        """Whether it did not move in the last step, and came to its stand before that."""
 
     @property
     def travel(self) -> float:
@@ -150,16 +154,19 @@ class ScriptedBody(Body):
 
         Along the heading the velocity is the given speed; across, it follows from the distance.
         """
+        p = placement
+        if self._resting and p.speed == 0.0 and self._from == (p.x, p.y, p.z, p.yaw, p.pitch, p.roll):
+            return
         x, y, z, yaw = self.x, self.y, self.z, self.yaw
         self._from = (x, y, z, yaw, self.pitch, self.roll)
-        was_moving = self.yaw_rate != 0.0 or self.velocity != (0.0, 0.0, 0.0)
+        was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
         self._stand(placement)
-        self.moved = (x, y, z, yaw) != (self.x, self.y, self.z, self.yaw) or self.pitch != self._from[4]
+        self.moved = self._from != (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
         along = self._along_heading(placement.speed)
         if placement.teleport:
             self._from = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
             self.velocity = self.velocity_before = along
-            self.acceleration, self.yaw_rate = (0.0, 0.0, 0.0), 0.0
+            self.acceleration, self.yaw_rate = STILL, 0.0
         else:
             dt = self._dt
             vx, vy, vz = (self.x - x) / dt, (self.y - y) / dt, (self.z - z) / dt
@@ -167,7 +174,9 @@ class ScriptedBody(Body):
             excess = placement.speed - (vx * fx + vy * fy + vz * fz)
             self._accelerate_to((vx + excess * fx, vy + excess * fy, vz + excess * fz))
             self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
-        self.stale = self.stale or self.moved or was_moving or self.velocity != (0.0, 0.0, 0.0)
+        is_moving = self.moved or self.velocity != STILL
+        self.stale = self.stale or was_moving or is_moving
+        self._resting = not is_moving and self.acceleration == STILL
 
     def settle(self) -> None:
         """Put the rigid body where the actor is."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,25 @@ class Contact:
     """Point of touch in the world frame [m]."""
     impact_speed: float
     """Speed of one relative to the other at the first touch [m/s]."""
+
+
+class ActorState(NamedTuple):
+    """One row of a view in plain numbers, named and measured as its arrays."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    pitch: float
+    roll: float
+    velocity_x: float
+    velocity_y: float
+    velocity_z: float
+    acceleration_x: float
+    acceleration_y: float
+    acceleration_z: float
+    yaw_rate: float
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -73,6 +92,13 @@ class WorldView:
         """Name to row."""
         return {name: row for row, name in enumerate(self.names)}
 
+    @cached_property
+    def states(self) -> Sequence[ActorState]:
+        """Of each row how the actor stands and moves: for looks at single actors, at which arrays are slow."""
+        angles = np.stack([self.yaw, self.pitch, self.roll], axis=1)
+        motion = [self.velocity, self.acceleration, self.yaw_rate[:, None], self.speed[:, None]]
+        return [ActorState(*row) for row in np.concatenate([self.position, angles, *motion], axis=1).tolist()]
+
     def without(self, names: Collection[str]) -> WorldView:
         """The same instant without some actors."""
         kept = [row for row, name in enumerate(self.names) if name not in names]
@@ -109,9 +135,7 @@ class WorldView:
     def boxes(self) -> Array:
         """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
         if 0 < len(self.names) <= _FEW:
-            bodies = zip(
-                self.position.tolist(), self.yaw.tolist(), self.offset.tolist(), self.size.tolist(), strict=True
-            )
+            bodies = zip(self.states, self.offset.tolist(), self.size.tolist(), strict=True)
             return np.array([_box(*body) for body in bodies])
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T
@@ -119,8 +143,8 @@ class WorldView:
         return np.concatenate([centres, self.size, self.yaw[:, None]], axis=1)
 
 
-def _box(position: list[float], yaw: float, offset: list[float], size: list[float]) -> tuple[float, ...]:
+def _box(state: ActorState, offset: list[float], size: list[float]) -> tuple[float, ...]:
+    x, y, z, yaw, *_ = state
     cos, sin = math.cos(yaw), math.sin(yaw)
-    x, y, z = position
     ahead, aside, up = offset
     return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + up, *size, yaw)

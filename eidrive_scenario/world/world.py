@@ -213,7 +213,8 @@ class World:
         """The truth now; the same object until something changes."""
         if self._view is None:
             cast = self._cast or self._cast_of_actors()
-            table = np.array([body.row() for body in self._in_order], dtype=float).reshape(-1, 14)
+            states = [body.state for body in self._in_order]
+            table = np.array(states, dtype=float).reshape(-1, 14)
             table.flags.writeable = False
             self._view = WorldView(
                 time=self.time,
@@ -234,7 +235,7 @@ class World:
                 unseen=self._unseen,
                 unseen_by=self._unseen_by,
             )
-            self._view.__dict__["rows"] = cast.rows
+            self._view.__dict__.update(rows=cast.rows, states=states)
         return self._view
 
     def distance(self, first: str, second: str) -> float:
