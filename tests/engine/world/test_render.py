@@ -74,11 +74,13 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
 def test_large_triangles_cover_what_small_ones_do() -> None:
     """Triangles of thousands of pixels, thin tips among them, against all centres of pixels one by one."""
     rng = np.random.default_rng(3)
-    corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [[(120.2, 0.0), (119.9, 90.0), (300.0, 200.0)]]])
+    gap_in_its_tip = [(94.18172651875673, 149.27757363317045), (20.45740141210438, 28.0104538720336), (36.576, 287.222)]
+    corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [gap_in_its_tip]])
     nearness = rng.uniform(0.1, 1.0, (3, len(corners)))
-    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 300, 200)
-    lines, columns = np.indices((200, 300)) + 0.5
-    best, nearest = np.zeros((200, 300)), np.full((200, 300), -1)
+    nearness[:, -1] = 2.0
+    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 300, 300)
+    lines, columns = np.indices((300, 300)) + 0.5
+    best, nearest = np.zeros((300, 300)), np.full((300, 300), -1)
     for number, (a, b, c) in enumerate(corners):
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         share = [
