@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.association import associate
-from eidrive_scenario.fusion.average import AverageFusion
+from eidrive_scenario.fusion.average import AverageFusion, joined, joined_few
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry
 
@@ -140,3 +140,42 @@ def test_turning_and_shifting_the_world_turns_and_shifts_the_result(angle: float
 
 def test_it_comes_through_its_entry_point() -> None:
     assert registry("fusion").load("average") is AverageFusion
+
+
+number = st.floats(-50.0, 50.0)
+perhaps = st.one_of(number, st.just(math.nan))
+
+
+@st.composite
+def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
+    """Boxes of one to four stations, and which object each is: numbered as they appear, one to a station at most."""
+    reports, labels = [], []
+    for _ in range(draw(st.integers(1, 4))):
+        count = draw(st.integers(1, 4))
+        known = max(labels, default=-1) + 1
+        objects = draw(st.lists(st.integers(0, known + count), min_size=count, max_size=count, unique=True))
+        fresh = iter(range(known, known + count))
+        labels += [label if label < known else next(fresh) for label in objects]
+
+        def rows(width: int, cell: st.SearchStrategy[float], count: int = count) -> np.ndarray:
+            return np.array(
+                draw(st.lists(st.lists(cell, min_size=width, max_size=width), min_size=count, max_size=count))
+            )
+
+        kinds = draw(st.lists(st.sampled_from(["car", "truck", "van"]), min_size=count, max_size=count))
+        scores, covariance = np.abs(rows(1, number))[:, 0], rows(4, perhaps).reshape(-1, 2, 2)
+        reports.append(Detections(0.5, rows(7, number), scores, tuple(kinds), rows(2, perhaps), covariance))
+    return reports, labels
+
+
+@settings(max_examples=150, deadline=None)
+@given(several_reports())
+def test_few_and_many_boxes_are_joined_alike(given: tuple[list[Detections], list[int]]) -> None:
+    few, many = joined_few(*given, 1.0), joined(*given, 1.0)
+    assert (few.time, few.classes) == (many.time, many.classes)
+    np.testing.assert_allclose(few.boxes[:, :6], many.boxes[:, :6], atol=1e-12)
+    lengths = [np.hypot(np.cos(box[6]) - np.cos(other[6]), np.sin(box[6]) - np.sin(other[6]))
+               for box, other in zip(few.boxes, many.boxes, strict=True)]  # fmt: skip
+    assert max(lengths) < 1e-6
+    for name in ("scores", "velocity", "covariance"):
+        np.testing.assert_allclose(getattr(few, name), getattr(many, name), atol=1e-12)
