@@ -33,6 +33,10 @@ class Path:
         self.limits = self._speed_limits()
         self._x: list[float] = self.points[:, 0].tolist()
         self._y: list[float] = self.points[:, 1].tolist()
+        step = np.diff(self.points, axis=0)
+        square = np.einsum("mi,mi->m", step, step)
+        self._segments: list[list[float]] = np.column_stack([self.points[:-1], step, square]).tolist()
+        """Start, way and its square of each segment."""
 
     def __len__(self) -> int:
         return len(self._x)
@@ -40,10 +44,16 @@ class Path:
     def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
         """Index of the point from which the nearest segment begins, among `reach` segments from `start` on."""
         best, nearest = start, math.inf
-        for index in range(start, min(start + reach, len(self._x) - 1)):
-            distance = segment_distance(x, y, self._x[index], self._y[index], self._x[index + 1], self._y[index + 1])
-            if distance < nearest - 1e-9:
-                best, nearest = index, distance
+        end = min(start + reach, len(self._x) - 1)
+        for index, (x0, y0, dx, dy, square) in enumerate(self._segments[start:end], start):
+            ax, ay = x - x0, y - y0
+            along = ax * dx + ay * dy
+            if along > 0.0:
+                share = along / square if along < square else 1.0
+                ax, ay = ax - share * dx, ay - share * dy
+            gap = ax * ax + ay * ay
+            if gap < nearest:
+                best, nearest = index, gap - 2e-9 * math.sqrt(gap)
         return best
 
     def distance(self, x: float, y: float, index: int) -> float:

@@ -54,16 +54,16 @@ def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) 
     cos, sin = math.cos(yaw), math.sin(yaw)
     ox, oy, oz = origin
     px, py, pz = cos * (ox - x) + sin * (oy - y), cos * (oy - y) - sin * (ox - x), oz - z
-    half_length, half_width, half_height = length / 2.0, width / 2.0, height / 2.0
+    # First the slab that the origin is farthest outside of: most rays miss the box by that.
+    slabs = [(0, px, length / 2.0), (1, py, width / 2.0), (2, pz, height / 2.0)]
+    slabs.sort(key=lambda slab: slab[2] - abs(slab[1]))
     starts = []
     for tx, ty, tz in targets:
         dx, dy, dz = tx - ox, ty - oy, tz - oz
+        steps = (cos * dx + sin * dy, cos * dy - sin * dx, dz)
         enter, leave = -math.inf, math.inf
-        for place, step, half in (
-            (pz, dz, half_height),
-            (px, cos * dx + sin * dy, half_length),
-            (py, cos * dy - sin * dx, half_width),
-        ):
+        for axis, place, half in slabs:
+            step = steps[axis]
             if abs(step) < PARALLEL:
                 step = PARALLEL
             first, second = (-half - place) / step, (half - place) / step
