@@ -223,7 +223,8 @@ def _numbered(message: Message) -> Detections:
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
-    return Rig(spec, settings.rig_sensors(registry("detectors").load(settings.detector).needs), seed=seed)
+    kind: type[Detector] = registry("detectors").load(settings.detector)
+    return Rig(spec, settings.rig_sensors(kind.needs, kind.usual_sensors), seed=seed)
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
@@ -280,7 +281,7 @@ def build_agent(
     if planner != NO_PLANNER and not wheels:
         raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
     detector = detector or build_detector(settings)
-    sensors = settings.rig_sensors(detector.needs)
+    sensors = settings.rig_sensors(detector.needs, detector.usual_sensors)
     installation = Installation(spec, sensors, roads, seed)
     detector.install(installation)
     fusion = build_fusion(settings, detector)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
 import yaml
@@ -16,6 +17,7 @@ from eidrive_scenario.sensing.settings import (
     KINDS,
     AnySensorSettings,
     MountSetting,
+    SensorSettings,
     TruthSettings,
 )
 from eidrive_scenario.settings import Settings, parse_settings
@@ -119,7 +121,8 @@ class AgentSettings(Settings):
     tracker         `none`, `cv`, `ctrv`, or a mapping (see TrackerSettings); None tracks what has no velocities
     localization    `oracle`, or `ekf`: the station finds out by GNSS and IMU where it is
     obey_signals    whether the vehicle stops at red traffic lights and stop signs
-    sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the detector needs
+    sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the
+                    detector usually has
     range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
     cooperates_with senders whose messages count; None is all
     message_rate    how often the station sends what it sees, None is each tick
@@ -204,12 +207,18 @@ class AgentSettings(Settings):
         """The station's own."""
         return StationClock(self.clock_offset, self.clock_drift * 1e-6)
 
-    def rig_sensors(self, needs: frozenset[str]) -> dict[str, AnySensorSettings]:
+    def rig_sensors(
+        self, needs: frozenset[str], usual: Mapping[str, SensorSettings] = MappingProxyType({})
+    ) -> dict[str, AnySensorSettings]:
         """The sensors of this station, for a detector that reads these kinds; those to localize by are added.
+
+        `usual` are those of a station that says nothing of them; where empty, it has one of each kind.
 
         Raises SettingError if the settings leave one out that the detector needs.
         """
-        sensors = dict(self.sensors) if self.sensors is not None else {kind: USUAL[kind]() for kind in sorted(needs)}
+        sensors: dict[str, Any] = dict(usual) or {kind: USUAL[kind]() for kind in sorted(needs)}
+        if self.sensors is not None:
+            sensors = dict(self.sensors)
         present = {sensor.kind for sensor in sensors.values()}
         missing = needs - present
         if missing:

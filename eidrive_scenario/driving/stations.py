@@ -254,7 +254,7 @@ def _all_detectors(
         try:
             found[name] = build_detector(station, source=source, line=line)
             source, line = controller.source, _line(controller, "sensors")
-            station.rig_sensors(found[name].needs)
+            station.rig_sensors(found[name].needs, found[name].usual_sensors)
             line = _line(controller, "fusion_settings", "fusion")
             build_fusion(station, found[name], source=controller.source, line=line)
         except SettingError as error:

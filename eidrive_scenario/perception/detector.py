@@ -36,6 +36,8 @@ class Detector(ABC):
 
     needs: ClassVar[frozenset[str]] = frozenset()
     """The kinds of sensors it reads: truth, camera, lidar."""
+    usual_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
+    """What a station gets, by name, that says nothing of its sensors; where empty, one of each kind in `needs`."""
     gives_velocity: ClassVar[bool] = False
     """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
     sees_signals: ClassVar[bool] = False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -21,7 +22,7 @@ from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_set
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
-from eidrive_scenario.sensing.settings import LidarSettings
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
 
 SHIPPED = Path(__file__).parents[1] / "weights"
@@ -74,6 +75,10 @@ class LearnedDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
+    usual_sensors: ClassVar[Mapping[str, SensorSettings]] = {
+        "camera": CameraSettings(width=512, height=384, rate=10.0),
+        "lidar": LidarSettings(rate=10.0),
+    }
     sees_signals: ClassVar[bool] = True
     settings_type: ClassVar[type[Settings] | None] = LearnedSettings
     network: ClassVar[Literal["yolov5", "ssd"]]

@@ -8,7 +8,7 @@ from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.model.properties import Properties, Property
-from eidrive_scenario.sensing.settings import CameraSettings, Mount, TruthSettings
+from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount, TruthSettings
 
 
 def controller(*entries: tuple[str, str]) -> Controller:
@@ -31,6 +31,16 @@ def test_the_defaults() -> None:
     assert (found.report_timeout, found.conflict_brake, found.conflict_hold) == (1.0, 5.0, 1.05)
     assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
+
+
+def test_what_a_detector_usually_has_gives_way_to_what_the_station_says() -> None:
+    """The learned detectors want a camera, and usually have a LiDAR to lift by as well."""
+    usual = {"camera": CameraSettings(width=512, height=384, rate=10.0), "lidar": LidarSettings(rate=10.0)}
+    needs = frozenset({"camera"})
+    assert settings().rig_sensors(needs, usual) == usual
+    assert settings(("sensors", "camera")).rig_sensors(needs, usual) == {"camera": CameraSettings()}
+    with pytest.raises(SettingError, match="needs a sensor of kind camera"):
+        settings(("sensors", "lidar")).rig_sensors(needs, usual)
 
 
 def test_which_controllers_are_ours() -> None:

@@ -130,6 +130,7 @@ def test_they_come_through_their_entry_points() -> None:
     assert registry("detectors").load("yolov5") is YoloDetector
     assert registry("detectors").load("ssd") is SsdDetector
     assert YoloDetector.needs == {"camera"}
+    assert [type(sensor) for sensor in YoloDetector.usual_sensors.values()] == [CameraSettings, LidarSettings]
     assert YoloDetector.sees_signals
 
 
