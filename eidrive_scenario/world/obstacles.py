@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 MOST_FACES = 20_000
 """In one collision shape; pybullet refuses much more."""
 _CELL = 10.0
-"""Squares by which it is known where nothing stands [m]."""
+"""Squares by which it is known what stands where [m]."""
 FOLIAGE = 0.8
 """Share of a crown's or a bush's extents that lets nobody see through."""
 CROWN = 0.3
@@ -42,7 +42,10 @@ class Obstacles:
         self._solid = _merged_rails(solid)
         self._soft = [piece for piece in furniture if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
-        self._taken = {cell for piece in self._solid for cell in _cells(piece)}
+        self._in_cell: dict[tuple[int, int], dict[int, Fixture]] = {}
+        for row, piece in enumerate(self._solid):
+            for cell in _cells(piece):
+                self._in_cell.setdefault(cell, {})[row] = piece
 
     def raise_bodies(self, client: int) -> list[int]:
         """Put the bodies into pybullet; returns their handles."""
@@ -51,12 +54,16 @@ class Obstacles:
         return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
 
     def near(self, x: float, y: float, reach: float) -> bool:
-        """Whether anything solid may be within reach of a point [m]."""
-        if not self._taken:
+        """Whether anything solid is within reach of a point [m]."""
+        if not self._in_cell:
             return False
-        columns = range(math.floor((x - reach) / _CELL), math.floor((x + reach) / _CELL) + 1)
         lines = range(math.floor((y - reach) / _CELL), math.floor((y + reach) / _CELL) + 1)
-        return any((column, line) in self._taken for column in columns for line in lines)
+        for column in range(math.floor((x - reach) / _CELL), math.floor((x + reach) / _CELL) + 1):
+            for line in lines:
+                for piece in self._in_cell.get((column, line), {}).values():
+                    if _gap(piece, x, y) <= reach:
+                        return True
+        return False
 
     def name_at(self, x: float, y: float) -> str:
         """What stands at a point at which something was touched."""
