@@ -32,7 +32,8 @@ def parse_settings(
 ) -> S:
     """`data` as an instance of `model`.
 
-    `lines` gives the line of single keys where they are known. Raises SettingError with one Problem per wrong key.
+    `lines` gives the line of single keys where they are known, those inside others as `key_lines` has them. Raises
+    SettingError with one Problem per wrong key.
     """
     try:
         return model.model_validate(dict(data))
@@ -40,7 +41,7 @@ def parse_settings(
         problems = []
         for finding in error.errors(include_url=False):
             path = ".".join(str(part) for part in finding["loc"])
-            place = (lines or {}).get(str(finding["loc"][0]) if finding["loc"] else "", line)
+            place = _line_of(finding["loc"], lines or {}, line)
             if finding["type"] == "extra_forbidden":
                 known = _known_keys(model, finding["loc"][:-1])
                 message, remedy = f"unknown setting {path!r}", suggestion(str(finding["loc"][-1]), known)
@@ -49,7 +50,14 @@ def parse_settings(
             elif finding["type"] == "union_tag_invalid":
                 word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
                 message = f"setting {path + '.' + key!r} is {word!r}"
+                place = _line_of((*finding["loc"], key), lines or {}, line)
                 remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
+            elif finding["type"] == "union_tag_not_found":
+                key = finding["ctx"]["discriminator"].strip("'")
+                message = f"setting {path + '.' + key!r} is missing"
+                remedy = suggestion("", _tags(model, finding["loc"], key))
+            elif finding["type"] in _NO_MAPPING:
+                message, remedy = f"setting {path!r} is {finding['input']!r}", "a mapping is expected: {key: value, …}"
             else:
                 own = finding["type"] == "value_error"
                 remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
@@ -58,15 +66,22 @@ def parse_settings(
         raise SettingError(problems) from error
 
 
+_NO_MAPPING = frozenset({"model_type", "model_attributes_type", "dict_type"})
+
+
+def _line_of(loc: tuple[int | str, ...], lines: Mapping[str, int], line: int | None) -> int | None:
+    """The line of the innermost key on the way to `loc` that is known; what pydantic adds of its own is passed over."""
+    path = ""
+    for part in loc:
+        longer = f"{path}.{part}" if path else str(part)
+        if longer in lines:
+            path, line = longer, lines[longer]
+    return line
+
+
 def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str]:
     """The keys allowed at `path` inside `model`; none where the path leads to one of several models."""
-    current: Any = model
-    for part in path:
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            field = current.model_fields.get(str(part))
-            current = field.annotation if field is not None else current
-        else:
-            current = next((member for member in _members(current) if _tagged(member, part)), current)
+    current = _at(model, path)
     models = [member for member in _members(current) if isinstance(member, type) and issubclass(member, BaseModel)]
     if len(models) == 1:
         current = models[0]
@@ -75,6 +90,24 @@ def _known_keys(model: type[BaseModel], path: tuple[int | str, ...]) -> list[str
             field.alias for field in current.model_fields.values() if field.alias
         ]
     return []
+
+
+def _tags(model: type[BaseModel], path: tuple[int | str, ...], key: str) -> list[str]:
+    """The words that `key` may have in the union at `path` inside `model`."""
+    fields = [getattr(member, "model_fields", {}).get(key) for member in _members(_at(model, path))]
+    return [str(word) for field in fields if field is not None for word in get_args(field.annotation)]
+
+
+def _at(model: type[BaseModel], path: tuple[int | str, ...]) -> Any:
+    """The annotation at `path` inside `model`."""
+    current: Any = model
+    for part in path:
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            field = current.model_fields.get(str(part))
+            current = field.annotation if field is not None else current
+        else:
+            current = next((member for member in _members(current) if _tagged(member, part)), current)
+    return current
 
 
 def _members(annotation: Any) -> Iterator[Any]:
@@ -117,14 +150,32 @@ def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:
 
 
 def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
-    """A YAML file and the line of each of its top-level keys. Raises SettingError."""
+    """A YAML file and the line of each of its keys. Raises SettingError."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SettingError(Problem(f"cannot read: {error}", "give the path of a YAML file", str(path))) from error
-    data = load_yaml(text, source=str(path))
-    node = yaml.compose(text, Loader=yaml.SafeLoader)
-    lines = {}
-    if isinstance(node, yaml.MappingNode):
-        lines = {str(key.value): key.start_mark.line + 1 for key, _ in node.value}
-    return data, lines
+    return load_yaml(text, source=str(path)), key_lines(text)
+
+
+def key_lines(text: str, first: int = 1) -> dict[str, int]:
+    """The line of each key of valid YAML, the first line having the number `first`. Keys inside others have dots, and
+    entries of lists numbers: `delay`, `delay.seconds`, `limits.0`."""
+    lines: dict[str, int] = {}
+    waiting = [("", yaml.compose(text, Loader=yaml.SafeLoader))]
+    seen: set[int] = set()
+    while waiting:
+        path, node = waiting.pop()
+        if id(node) in seen:
+            continue  # an alias
+        seen.add(id(node))
+        entries: list[tuple[str, yaml.Node, yaml.Node]] = []
+        if isinstance(node, yaml.MappingNode):
+            entries = [(str(key.value), key, value) for key, value in node.value]
+        elif isinstance(node, yaml.SequenceNode):
+            entries = [(str(place), value, value) for place, value in enumerate(node.value)]
+        for name, where, value in entries:
+            inner = f"{path}.{name}" if path else name
+            lines[inner] = first + where.start_mark.line
+            waiting.append((inner, value))
+    return lines
