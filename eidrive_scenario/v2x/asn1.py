@@ -8,10 +8,16 @@ open types, which is not supported.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.v2x.message import Message, StationState
 
@@ -28,7 +34,7 @@ class Asn1Encoder:
     """Writes messages with the modules in these files.
 
     Raises SettingError, naming the file or the missing type, if asn1tools is not installed, a file cannot be read, or a
-    module has no such type.
+    module has no such type or one that takes other components than ours: each kind of message is tried at once.
     """
 
     def __init__(
@@ -53,6 +59,19 @@ class Asn1Encoder:
             if TYPES[kind] not in self._modules.types:
                 message = f"the ASN.1 modules have no type {TYPES[kind]!r}, which a {kind} needs"
                 raise SettingError(Problem(message, "add the file that defines it", source, line))
+        try:
+            for kind in kinds:
+                self._try(kind)
+        except SettingError as error:
+            raise SettingError([replace(problem, source=source, line=line) for problem in error.problems]) from error
+
+    def _try(self, kind: str) -> None:
+        """Encode messages of this kind with and without what is optional."""
+        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), ("car",), *unknown(1))
+        state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
+            message = Message("station", 0, 0.0, state, seen, 0, "cam" if kind == "cam" else "cpm")
+            self.encode(message, sensors=int(more), low_frequency=more)
 
     def encode(self, message: Message, *, sensors: int = 0, low_frequency: bool = False) -> bytes:
         """The message; a CPM with so many sensors, a CAM with or without the low-frequency container.
@@ -63,13 +82,19 @@ class Asn1Encoder:
         try:
             encoded: bytes = self._modules.encode(TYPES[message.kind], value)
         except self._error as error:
-            problem = Problem(f"the ASN.1 module takes no {message.kind} of {message.sender!r}: {error}")
-            raise SettingError(problem) from error
+            why = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without all that we wanted to say
+            remedy = "docs/channels.md says after which standards messages are laid out"
+            raise SettingError(Problem(f"the ASN.1 modules take no {message.kind}: {why}", remedy)) from error
         return encoded
 
     def decode(self, kind: str, data: bytes) -> Any:
         """What such a message says, as asn1tools has it."""
         return self._modules.decode(TYPES[kind], data)
+
+
+def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocities and covariances of so many objects of which neither is known."""
+    return np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
 
 
 def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:

@@ -70,24 +70,31 @@ def _column(path: Path, column: str | int) -> list[float]:
     """The numbers in a column of a CSV file; a first row of words names the columns. Raises ValueError."""
     try:
         with path.open(newline="", encoding="utf-8") as stream:
-            rows = [row for row in csv.reader(stream) if row]
+            reader = csv.reader(stream)
+            rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
     if not rows:
         raise ValueError(f"{path} is empty")
-    header = [cell.strip() for cell in rows[0]]
+    header = [cell.strip() for cell in rows[0][1]]
     if isinstance(column, str):
         if column not in header:
             raise ValueError(f"{path} has no column {column!r}; it has {', '.join(header)}")
         place = header.index(column)
     else:
         place = column
-    body = rows[1:] if isinstance(column, str) or not _is_number(header[min(place, len(header) - 1)]) else rows
+    if not 0 <= place < len(header):
+        raise ValueError(f"{path} has no column {place}; it has {len(header)}, from 0 on")
+    body = rows[1:] if isinstance(column, str) or not _is_number(header[place]) else rows
+    if not body:
+        raise ValueError(f"{path} has no delays")
     values = []
-    for number, row in enumerate(body, start=1 + len(rows) - len(body)):
+    for number, row in body:
         if place >= len(row) or not _is_number(row[place]):
             found = row[place] if place < len(row) else "nothing"
             raise ValueError(f"{path}:{number}: {found!r} is no delay")
+        if float(row[place]) < 0.0:
+            raise ValueError(f"{path}:{number}: a delay is not negative, found {row[place]}")
         values.append(float(row[place]))
     return values
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
 from eidrive_scenario.registry import registry
-from eidrive_scenario.settings import Settings, load_yaml, load_yaml_file, parse_settings
+from eidrive_scenario.settings import Settings, key_lines, load_yaml, load_yaml_file, parse_settings
 from eidrive_scenario.v2x.channel import Channel
 
 NO_COOPERATION = "none"
@@ -51,13 +51,17 @@ def load_profile(
         if text == NO_COOPERATION:
             return None
         if "{" in text or "\n" in text or ": " in text:
-            data = load_yaml(text, source=origin or "channel", line=line)
-            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, {})
+            data = load_yaml(source, source=origin or "channel", line=line)
+            lines = {} if line is None else key_lines(source, line)
+            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines)
+        if not text:
+            raise SettingError(Problem("the channel has no name", "write `ideal`, or `none`", origin, line))
         source = Path(text)
     path = _find(source, folders)
     if path is None:
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
-        raise SettingError(Problem(f"no channel profile {str(source)!r}", suggestion(str(source), names), origin, line))
+        what = f"no file {str(source)!r}" if source.suffix in SUFFIXES else f"no channel profile {str(source)!r}"
+        raise SettingError(Problem(what, suggestion(source.stem, names), origin, line))
     data, lines = load_yaml_file(path)
     placed = _with_paths(_mapping(data, str(path), 1), path.parent)
     return _parse(placed, path.stem, str(path), 1, lines)

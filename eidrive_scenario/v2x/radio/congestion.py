@@ -29,8 +29,8 @@ class ReactiveControl(Settings):
     """
 
     kind: Literal["reactive"]
-    limits: tuple[float, ...] = (0.20, 0.30, 0.40, 0.50, 1.0)
-    intervals: tuple[float, ...] = (0.1, 0.2, 0.4, 0.5, 1.0)
+    limits: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (0.20, 0.30, 0.40, 0.50, 1.0)
+    intervals: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 0.2, 0.4, 0.5, 1.0)
 
     period: ClassVar[float] = 0.1
 
@@ -62,10 +62,17 @@ class Limeric(Settings):
     gain_up: Annotated[float, Field(gt=0.0)] = 0.0005
     share_min: Annotated[float, Field(gt=0.0)] = 0.0006
     share_max: Annotated[float, Field(gt=0.0)] = 0.03
-    interval_min: float = 0.025
-    interval_max: float = 1.0
+    interval_min: Annotated[float, Field(ge=0.0)] = 0.025
+    interval_max: Annotated[float, Field(gt=0.0)] = 1.0
 
     period: ClassVar[float] = 0.2
+
+    @model_validator(mode="after")
+    def _ranges(self) -> Limeric:
+        for low, high in (("share_min", "share_max"), ("interval_min", "interval_max")):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(f"{low} {getattr(self, low):g} is above {high} {getattr(self, high):g}")
+        return self
 
     def steady_share(self, busy: float) -> float:
         """Where the share of a station settles while the busy ratio stays what it is."""

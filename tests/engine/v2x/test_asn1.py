@@ -79,5 +79,9 @@ def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
     other.write_text("Other DEFINITIONS ::= BEGIN CAM ::= INTEGER END")
     with pytest.raises(SettingError, match="have no type 'CPM', which a cpm needs"):
         Asn1Encoder([other], ["cam", "cpm"], **place)  # type: ignore[arg-type]
-    with pytest.raises(SettingError, match="takes no cam of 'Ego'"):
-        Asn1Encoder([other], ["cam"]).encode(message("cam", 1))
+    with pytest.raises(SettingError, match=r"scenario.xosc:7: the ASN.1 modules take no cam: "):
+        Asn1Encoder([other], ["cam"], **place)  # type: ignore[arg-type]
+    asks_for_more = tmp_path / "more.asn1"
+    asks_for_more.write_text(TINY.read_text().replace("exteriorLights BIT", "gear INTEGER (0..7), exteriorLights BIT"))
+    with pytest.raises(SettingError, match=r"no cam: .*member 'gear' not found …; docs/channels.md"):
+        Asn1Encoder([asks_for_more], ["cam"])

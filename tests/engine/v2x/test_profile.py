@@ -96,3 +96,69 @@ def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
     empty.write_text("")
     with pytest.raises(SettingError, match="it is empty"):
         load_profile(empty)
+
+
+DEEP = """\
+model: radio
+path_loss:
+  kind: tr37885
+  enviroment: urban
+
+congestion: {kind: reactive,
+             limits: [0.3, 0.6, 1.4],
+             intervals: [0.1, 0.2, 0.5]}
+delay:
+  seconds: 0.1
+loss: 0.3
+background:
+  kind: 80211q
+"""
+
+
+def test_each_wrong_key_is_told_with_its_own_line_however_deep_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "deep.yaml"
+    file.write_text(DEEP)
+    told = {
+        4: "unknown setting 'path_loss.tr37885.enviroment'; did you mean 'environment'?",
+        7: "setting 'congestion.reactive.limits.2' is 1.4; input should be less than or equal to 1",
+        9: "setting 'delay.kind' is missing; "
+        "known: constant, lognormal, shifted_gamma, trace, truncated_normal, uniform",
+        11: "setting 'loss' is 0.3; a mapping is expected: {key: value, …}",
+        13: "setting 'background.kind' is '80211q'; did you mean '80211p'?",
+    }
+    with pytest.raises(SettingError) as caught:
+        load_profile(file)
+    assert {str(problem) for problem in caught.value.problems} == {f"{file}:{line}: {told[line]}" for line in told}
+    with pytest.raises(SettingError) as caught:
+        load_profile("\n  " + DEEP.replace("\n", "\n  "), origin="scenario.xosc", line=40)
+    assert {problem.line for problem in caught.value.problems} == {40 + line for line in told}
+
+
+@pytest.mark.parametrize(
+    ("rows", "more", "words"),
+    [
+        (None, "", "cannot read .*measured.csv: No such file"),
+        ("", "", "measured.csv is empty"),
+        ("delay\n", "", "measured.csv has no delays"),
+        ("delay\n0.1\n\n-0.2\n", "", r"measured.csv:4: a delay is not negative, found -0.2"),
+        ("delay\n0.1\nsoon\n", "", r"measured.csv:3: 'soon' is no delay"),
+        ("delay\n0.1\n", "column: late", "has no column 'late'; it has delay"),
+        ("delay\n0.1\n", "column: 1", "has no column 1; it has 1, from 0 on"),
+        ("delay\n0.1\n", "column: -1", "has no column -1; it has 1, from 0 on"),
+        ("delay\n0.1\n", "unit: min", "'delay.trace.unit' is 'min'; input should be 's' or 'ms'"),
+    ],
+)
+def test_a_measured_trace_that_is_none(tmp_path: Path, rows: str | None, more: str, words: str) -> None:
+    if rows is not None:
+        (tmp_path / "measured.csv").write_text(rows)
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"delay:\n  kind: trace\n  file: measured.csv\n  {more}\n")
+    with pytest.raises(SettingError, match=words):
+        load_profile(file)
+
+
+def test_a_file_that_is_not_there() -> None:
+    with pytest.raises(SettingError, match=r"--channel: no file 'latency_300mss.yaml'; did you mean 'latency_300ms'\?"):
+        load_profile("latency_300mss.yaml", [LIBRARY], origin="--channel")
+    with pytest.raises(SettingError, match="--channel: the channel has no name"):
+        load_profile(" ", [LIBRARY], origin="--channel")
