@@ -25,7 +25,7 @@ from eidrive_scenario.recording.criteria_text import (
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.v2x.books import LinkStatistics
@@ -205,6 +205,14 @@ class Simulation:
     def set_user_value(self, name: str, value: str) -> None:
         """Give a value to the UserDefinedValueConditions of this name, from the next tick on."""
         self._user_values[name] = value
+
+    def set_pose(self, name: str, pose: Pose, speed: float = 0.0) -> None:
+        """Say where an entity is in the next view, and its speed [m/s].
+
+        It counts for entities whose controller the stand-in `external` plays, while that controller is active.
+        Raises SettingError if no `external` plays a controller of that entity.
+        """
+        self.storyboard.give_pose(name, pose, speed)
 
     def run(self) -> RunResult:
         """Play to the end."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from eidrive_scenario.driving.overrides import Override
 from eidrive_scenario.errors import Problem, ScenarioError
@@ -22,6 +22,13 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 E = TypeVar("E", bound=model.Element)
+
+
+class GivenPose(NamedTuple):
+    """A pose from outside, and the speed along its heading [m/s]."""
+
+    pose: Pose
+    speed: float
 
 
 class Absent(LookupError):
@@ -88,6 +95,8 @@ class Stage:
         self.environment = Environment()
         self.user_values: Callable[[str], str | None] = lambda _: None
         """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
+        self.given_poses: dict[str, GivenPose] = {}
+        """Where somebody outside puts entities at the end of the step, by name."""
         self.wanted_values: dict[str, model.Element] = {}
         """The names of such values, and the first condition that asks for each."""
         self.commands = Commands()

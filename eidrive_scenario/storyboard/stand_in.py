@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import ClassVar
 
 from eidrive_scenario.errors import Problem, RegistryError
 from eidrive_scenario.openscenario import model
@@ -18,6 +19,9 @@ class StandIn(ABC):
     It decides while the controller is active in the longitudinal domain; speed actions of that time set the speed that
     it aims at.
     """
+
+    takes_poses: ClassVar[bool] = False
+    """True for one that moves the actor to poses from outside (`Simulation.set_pose`)."""
 
     def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
         properties = controller.properties.property if controller.properties is not None else ()

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.builder import Builder
 from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.stage import GivenPose, Stage
 from eidrive_scenario.storyboard.stand_in import left_alone, stand_ins
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind
@@ -64,6 +65,14 @@ class Storyboard:
     def changes(self) -> tuple[StateChange, ...]:
         """What changed its state in the last tick."""
         return tuple(self.stage.progress.changes)
+
+    def give_pose(self, name: str, pose: Pose, speed: float) -> None:
+        """Where an entity is after the next step, and its speed [m/s]. Raises SettingError if none waits for it."""
+        waiting = [stand_in.actor.name for stand_in in self._stand_ins if stand_in.takes_poses]
+        if name not in waiting:
+            what = f"nobody waits for poses of {name!r}"
+            raise SettingError(Problem(what, "let the stand-in `external` play its controller", "set_pose"))
+        self.stage.given_poses[name] = GivenPose(pose, speed)
 
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""

@@ -27,7 +27,7 @@ class ActivateControllerAction(ActionBehaviour):
     def update(self) -> Status:
         """Switch."""
         lateral, longitudinal = self.action.lateral, self.action.longitudinal
-        if self._means_another():
+        if self._means_another() and any(is_ours(controller) for controller in self.actor.controllers):
             lateral, longitudinal = _left_to_ours(lateral, longitudinal)
         switch(self, lateral, longitudinal)
         return Status.SUCCESS

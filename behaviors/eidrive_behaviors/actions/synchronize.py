@@ -32,7 +32,8 @@ class SynchronizeAction(ActionBehaviour):
     With a final speed v1, the way s and the master's time t there are two phases of equal and opposite acceleration a:
     a² t²/2 + a ((v0 + v1) t - 2 s) - (v1 - v0)²/2 = 0, newly solved in each step as the master's arrival changes; in
     the last phase the speed lies on the line that ends in v1. Where the middle speed would be negative the actor stops
-    and waits. Without a final speed the acceleration is constant. A steady state at the end shortens way and time.
+    and waits. While the master stands, so that it arrives never, the actor stands too. Without a final speed the
+    acceleration is constant. A steady state at the end shortens way and time.
     """
 
     domains = Domain.LONGITUDINAL
@@ -80,7 +81,7 @@ class SynchronizeAction(ActionBehaviour):
         if self._phase is Phase.STEADY:
             return final
         if math.isinf(time):
-            return max(0.0, speed - HARD * dt) if self._phase is not Phase.SWING else speed
+            return 0.0
         if self._phase is Phase.BRAKE:
             after = max(0.0, speed - HARD * dt)
             if after == 0.0:

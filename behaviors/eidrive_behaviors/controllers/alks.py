@@ -1,0 +1,114 @@
+"""Drivers for tests of automated lane keeping: the performance models of UN Regulation No. 157 at the wheel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from eidrive_behaviors.controllers.reference_driver import DriverSettings, ReferenceDriver
+from eidrive_behaviors.controllers.road_ahead import Ahead, RoadAhead
+from eidrive_behaviors.controllers.safety_models import Fsm, Own, Regulation, Rss, SafetyModel
+from eidrive_scenario.api import Actor, Problem, ScenarioError, Stage, StandIn, model, suggestion
+
+COMFORT = 2.0
+"""Back to the set speed on a free road [m/s²]."""
+STRONGEST = (-4.0, 3.0)
+"""Of following somebody [m/s²]."""
+GAINS = (2.0, 1.0)
+"""Of following: by difference of speed [1/s], by gap [1/s²]."""
+OVERRULED = 1e-3
+"""A speed that differs by more than this was set by somebody else [m/s]."""
+MODELS = ("Regulation", "ReferenceDriver", "RSS", "FSM")
+
+
+class AlksDriver(StandIn):
+    """Keeps its lane, and brakes where one of four models says that the situation is critical.
+
+    It plays esmini's ALKS_R157SM_Controller, by whose property `model` it is told which one: `Regulation`,
+    `ReferenceDriver`, `RSS` or `FSM`. With `cruise` (the default) it returns to the set speed on a free road, and else
+    follows by 2 (v_lead - v) + gap - following distance [m/s²], within -4 and 3, which is esmini's law. Further
+    properties: `fullStop`, and for the ReferenceDriver `cutInPerceptionDelayMode` (`Dist`: 0.72 m, `Time`: 0.4 s),
+    `pedestrianRiskEvaluationTime` [s], `lateralTrigDistance` [m], `aebTTC` [s], `overlapTolerance` [m],
+    `alwaysTrigOnScenario`.
+    """
+
+    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
+        super().__init__(controller, stage, actor)
+        self._controller = controller
+        self.model = self._chosen()
+        self._cruises = self._says("cruise", True)
+        slack = self._number("overlapTolerance", 0.1) or 0.0
+        self._road = RoadAhead(stage, actor, self.model.reach, slack)
+
+    def begin(self) -> None:
+        """Drive on with the speed of now."""
+        self._set = self._last = self.actor.motion.speed
+        self._acceleration = 0.0
+
+    def speed(self) -> float:
+        """By the model; where nothing is critical the set speed, or behind who is ahead."""
+        now = self.actor.motion.speed
+        if abs(now - self._last) > OVERRULED:
+            self._set = now
+        own = Own(now, self._acceleration, self.stage.dt)
+        braking = self.model.decide(own, self._road.look())
+        if braking is not None:
+            self._acceleration = braking
+            self._last = max(0.0, now + braking * own.dt)
+        else:
+            self._acceleration = self._cruising(own, self.model.lead) if self._cruises else 0.0
+            self._last = min(max(0.0, now + self._acceleration * own.dt), max(self._set, 0.0)) if self._cruises else now
+        return self._last
+
+    def _cruising(self, own: Own, lead: Ahead | None) -> float:
+        if lead is None:
+            if abs(own.speed - self._set) < OVERRULED:
+                return 0.0
+            return COMFORT if own.speed < self._set else -COMFORT
+        if own.speed < OVERRULED:
+            return 0.0
+        wanted = -GAINS[0] * lead.closing + GAINS[1] * (lead.gap - self.model.following_distance(own, lead))
+        return min(max(wanted, STRONGEST[0]), STRONGEST[1])
+
+    def _chosen(self) -> SafetyModel:
+        full_stop = self._says("fullStop", False)
+        name = self.properties.get("model", "ReferenceDriver")
+        if name == "ReferenceDriver":
+            return ReferenceDriver(self._driver(full_stop))
+        memoryless: dict[str, type[Regulation | Rss | Fsm]] = {"Regulation": Regulation, "RSS": Rss, "FSM": Fsm}
+        if name not in memoryless:
+            raise self._problem(f"knows no model {name!r}", suggestion(name, MODELS))
+        return memoryless[name](full_stop=full_stop)
+
+    def _driver(self, full_stop: bool) -> DriverSettings:
+        usual = DriverSettings()
+        mode = self.properties.get("cutInPerceptionDelayMode", "Dist")
+        if mode not in ("Dist", "Time"):
+            raise self._problem(f"knows no cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
+        return DriverSettings(
+            pedestrians=self._number("pedestrianRiskEvaluationTime", usual.pedestrians) or 0.0,
+            distance=0.72 if mode == "Dist" else None,
+            moved=self._number("lateralTrigDistance", None),
+            emergency=self._number("aebTTC", usual.emergency) or 0.0,
+            full_stop=full_stop,
+            always=self._says("alwaysTrigOnScenario", False),
+        )
+
+    def _says(self, name: str, usual: bool) -> bool:
+        text = self.properties.get(name)
+        return usual if text is None else _TRUTH.get(text.strip().lower(), usual)
+
+    def _number(self, name: str, usual: float | None) -> float | None:
+        text = self.properties.get(name)
+        if text is None:
+            return usual
+        try:
+            return float(text)
+        except ValueError as error:
+            raise self._problem(f"has the property {name} = {text!r}", "give it a number") from error
+
+    def _problem(self, message: str, remedy: str) -> ScenarioError:
+        here = self._controller
+        return ScenarioError(Problem(f"the controller {here.name!r} {message}", remedy, here.source, here.line))
+
+
+_TRUTH: Mapping[str, bool] = {"true": True, "1": True, "false": False, "0": False}

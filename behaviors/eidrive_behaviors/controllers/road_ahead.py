@@ -1,0 +1,153 @@
+"""What the driver of a car sees ahead of it: who is there, how far away, and how fast the two come nearer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from eidrive_scenario.api import Actor, LaneLocation, Stage, model
+
+Span = tuple[float, float]
+"""From, to [m]"""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Somebody ahead, in coordinates of the road: s along the own driving direction, t to the left of it.
+
+    name        of the entity
+    gap         free space along the road [m], 0 where the two overlap
+    aside       free space across the road [m], 0 where the two overlap
+    closing     by how much the own speed along the road is higher [m/s]
+    nearing     speed at which the two come nearer to each other across the road [m/s]
+    speed       of the other, along the road [m/s]
+    change      acceleration of the other, along its own heading [m/s²]
+    sideways    speed of the other across the road, whatever its direction [m/s]
+    lanes       0 in the own lane, 1 in the next one to the left, -1 to the right; further away is not seen
+    towards     how far its middle is from the middle of its lane, on our side [m]; negative on the far side
+    intrusion   how far its front wheel on our side is inside our lane [m]; negative outside
+    covers      True where it is as wide as our front, or all before it: a full wrap
+    across      t of its reference point from ours [m]
+    walks       True for a pedestrian
+    """
+
+    name: str
+    gap: float
+    aside: float
+    closing: float
+    nearing: float
+    speed: float
+    change: float
+    sideways: float
+    lanes: int
+    towards: float
+    intrusion: float
+    covers: bool
+    across: float
+    walks: bool
+
+    @property
+    def time_to_collision(self) -> float:
+        """Gap by closing speed [s]; infinite where it does not close."""
+        return self.gap / self.closing if self.closing > 0.0 else math.inf
+
+    def headway(self, speed: float) -> float:
+        """Time headway at the own speed [s]; infinite where the gap does not close."""
+        return self.gap / speed if self.closing > 0.0 and speed > 0.0 else math.inf
+
+
+class RoadAhead:
+    """Looks along the road of one actor, up to a range [m]."""
+
+    def __init__(self, stage: Stage, actor: Actor, reach: float, tolerance: float = 0.0) -> None:
+        self._stage, self._actor, self._reach, self._tolerance = stage, actor, reach, tolerance
+
+    def look(self) -> list[Ahead]:
+        """Those ahead in this lane or the next ones, and pedestrians wherever they are; the nearest first."""
+        here, roads = self._stage.location(self._actor.name), self._stage.roads
+        if here is None or roads is None:
+            return []
+        others = (other for other in self._stage.actors.values() if other is not self._actor and other.present)
+        found = (self._seen(here, other) for other in others if other.name in self._stage.view)
+        return sorted((one for one in found if one is not None), key=lambda one: one.gap)
+
+    def _seen(self, here: LaneLocation, other: Actor) -> Ahead | None:
+        roads, there = self._stage.roads, self._stage.location(other.name)
+        apart = roads.distance(here, there) if roads is not None and there is not None else None
+        if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
+            return None
+        width = roads.lane_width(here.road, here.lane, here.s)
+        own = here.lane == there.lane if here.road == there.road else abs(apart[1]) < 0.5 * width
+        walks = isinstance(other.entity, model.Pedestrian)
+        if not walks and not own and abs(apart[1]) > 1.5 * width:
+            return None
+        side = math.copysign(1.0, apart[1])
+        mine, theirs = self._box(self._actor, here), self._box(other, there, *apart)
+        way = roads.driving_direction(here.road, here.lane)
+        along, across = self._velocity(self._actor, here)
+        its_along, its_across = self._velocity(other, there)
+        border = 0.5 * width - side * here.offset * way
+        return Ahead(
+            name=other.name,
+            gap=max(0.0, theirs[0][0] - mine[0][1]),
+            aside=max(0.0, theirs[1][0] - mine[1][1], mine[1][0] - theirs[1][1]),
+            closing=along - its_along,
+            nearing=side * (across - its_across),
+            speed=its_along,
+            change=self._change(other),
+            sideways=abs(its_across),
+            lanes=0 if own else int(side),
+            towards=-side * (there.offset * way + 0.5 * sum(theirs[1]) - apart[1]),
+            intrusion=border - side * self._wheel(other, there, apart[1], side),
+            covers=self._covers(mine[1], theirs[1]),
+            across=apart[1],
+            walks=walks,
+        )
+
+    def _turn(self, actor: Actor, place: LaneLocation) -> float:
+        """Angle of an actor to the driving direction of the lane below the observer's road frame [rad]."""
+        roads = self._stage.roads
+        assert roads is not None
+        lane = roads.lane_pose_at(*place[:4]).h
+        here = self._stage.location(self._actor.name)
+        assert here is not None
+        flip = 0.0 if roads.driving_direction(here.road, here.lane) > 0 else math.pi
+        return self._stage.pose(actor.name).h - lane - flip
+
+    def _box(self, actor: Actor, place: LaneLocation, along: float = 0.0, across: float = 0.0) -> tuple[Span, Span]:
+        """What an actor takes up along and across the road, from the observer's reference point on [m]."""
+        turn, bounds = self._turn(actor, place), actor.entity.bounding_box
+        cos, sin = math.cos(turn), math.sin(turn)
+        x = along + bounds.center.x * cos - bounds.center.y * sin
+        y = across + bounds.center.x * sin + bounds.center.y * cos
+        half_x = 0.5 * (bounds.dimensions.length * abs(cos) + bounds.dimensions.width * abs(sin))
+        half_y = 0.5 * (bounds.dimensions.length * abs(sin) + bounds.dimensions.width * abs(cos))
+        return (x - half_x, x + half_x), (y - half_y, y + half_y)
+
+    def _wheel(self, actor: Actor, place: LaneLocation, across: float, side: float) -> float:
+        """t of the corner beside the front axle that is nearest to the observer [m]."""
+        turn, bounds = self._turn(actor, place), actor.entity.bounding_box
+        axles = actor.entity.axles if isinstance(actor.entity, model.Vehicle) else None
+        front = axles.front_axle if axles is not None else None
+        x = front.position_x if front is not None else bounds.center.x + 0.5 * bounds.dimensions.length
+        y = math.copysign(0.5 * bounds.dimensions.width, -side * math.cos(turn))
+        return across + x * math.sin(turn) + y * math.cos(turn)
+
+    def _velocity(self, actor: Actor, place: LaneLocation) -> tuple[float, float]:
+        """Along and across the road [m/s]."""
+        view = self._stage.view
+        vx, vy, _ = view.velocity[view.rows[actor.name]].tolist()
+        axis = self._stage.pose(actor.name).h - self._turn(actor, place)
+        cos, sin = math.cos(axis), math.sin(axis)
+        return vx * cos + vy * sin, vy * cos - vx * sin
+
+    def _change(self, actor: Actor) -> float:
+        view = self._stage.view
+        ax, ay, _ = view.acceleration[view.rows[actor.name]].tolist()
+        h = self._stage.pose(actor.name).h
+        return float(ax * math.cos(h) + ay * math.sin(h))
+
+    def _covers(self, mine: Span, theirs: Span) -> bool:
+        slack = self._tolerance
+        inside = theirs[0] >= mine[0] - slack and theirs[1] <= mine[1] + slack
+        return inside or (theirs[0] <= mine[0] + slack and theirs[1] >= mine[1] - slack)
