@@ -21,7 +21,7 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig, read_all
-from eidrive_scenario.sensing.signals import SignalLookout
+from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
@@ -98,8 +98,9 @@ class Stations:
             detector=self._detectors.pop(spec.name, None),
             encoder=self._encoders.get(spec.name),
         )
-        if settings.obey_signals and not self._agents[spec.name].perception.detector.sees_signals:
-            self._lookouts[spec.name] = SignalLookout(spec, self._roads)
+        unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.sees_signals
+        if settings.obey_signals and unseen:
+            self._lookouts[spec.name] = SignalLookout(spec, self._roads, unseen)
         if self._agents[spec.name].controller is not None:
             self._held[spec.name] = HeldControls(spec, self._dt)
 

@@ -40,8 +40,9 @@ class Detector(ABC):
     """What a station gets, by name, that says nothing of its sensors; where empty, one of each kind in `needs`."""
     gives_velocity: ClassVar[bool] = False
     """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
-    sees_signals: ClassVar[bool] = False
-    """Whether it reads traffic lights; a station with another one knows by the map and the line of sight."""
+    sees_signals: frozenset[str] = frozenset()
+    """The kinds of signals that it reads, out of `light` and `stop sign`; the others a station knows by the map and the
+    line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
     """What the property `detector_settings` may say; nothing where None."""
 
@@ -53,5 +54,5 @@ class Detector(ABC):
         """The objects in these readings."""
 
     def signals(self) -> Sequence[SignalReading]:
-        """The traffic lights and stop signs of the map that it found in the last readings, if it `sees_signals`."""
+        """The signals of the map that it found in the last readings, of the kinds that it `sees_signals` of."""
         return ()

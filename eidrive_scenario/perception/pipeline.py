@@ -55,8 +55,8 @@ class Perception:
         return readings if self._localizer is None else self._localizer.located(readings)
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
-        """The traffic lights and stop signs in sight, as the detector or else the lookout has them."""
-        return self.detector.signals() if self.detector.sees_signals else readings.signals
+        """The traffic lights and stop signs in sight: those that the detector reads, and the lookout's."""
+        return (*self.detector.signals(), *readings.signals)
 
     def perceive(self, readings: Readings) -> Detections | None:
         """The newest objects that become known now; None if there is nothing new."""

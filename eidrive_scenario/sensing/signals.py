@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
 
+SIGNAL_KINDS = frozenset({"light", "stop sign"})
+
 RANGE = 100.0
 """How far lights and signs are made out [m]."""
 ASIDE = math.radians(80.0)
@@ -28,16 +30,16 @@ BEFORE = 0.4
 
 
 class SignalLookout:
-    """Reads traffic lights and stop signs that face the station, within range and in the line of sight.
+    """Reads signals of some kinds, out of SIGNAL_KINDS, that face the station, within range and in the line of sight.
 
     It looks ahead and aside from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign
     is a reading without a state, and so is a light that shows nothing.
     """
 
-    def __init__(self, spec: ActorSpec, roads: RoadNetwork | None) -> None:
+    def __init__(self, spec: ActorSpec, roads: RoadNetwork | None, kinds: Collection[str] = SIGNAL_KINDS) -> None:
         self._mounting = mounting(TruthSettings(), spec, "roof")
         heads = [] if roads is None else signal_heads(roads)
-        heads = [head for head in heads if head.signal.dynamic or is_stop_sign(head.signal)]
+        heads = [head for head in heads if signal_kind(head.signal) in kinds]
         self._ids = [head.signal.id for head in heads]
         self._facing: Array = np.array([(math.cos(head.pose.h), math.sin(head.pose.h), 0.0) for head in heads]).reshape(
             -1, 3
@@ -61,6 +63,11 @@ class SignalLookout:
         hits = scene.cast(np.broadcast_to(eye, (near.size, 3)).copy(), self._faces[near])
         seen = near[np.asarray(hits.rows) == NOTHING]
         return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in seen.tolist())
+
+
+def signal_kind(signal: Signal) -> str | None:
+    """One of SIGNAL_KINDS, None for what is none of them."""
+    return "light" if signal.dynamic else "stop sign" if is_stop_sign(signal) else None
 
 
 def is_stop_sign(signal: Signal) -> bool:

@@ -17,7 +17,7 @@ from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.learned.classes import object_category
 from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork, Layout
 from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
-from eidrive_scenario.perception.learned.lights import LightsOnMap
+from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.surroundings import Surroundings
@@ -79,7 +79,6 @@ class LearnedDetector(Detector):
         "camera": CameraSettings(width=512, height=384, rate=10.0),
         "lidar": LidarSettings(rate=10.0),
     }
-    sees_signals: ClassVar[bool] = True
     settings_type: ClassVar[type[Settings] | None] = LearnedSettings
     network: ClassVar[Literal["yolov5", "ssd"]]
 
@@ -89,6 +88,7 @@ class LearnedDetector(Detector):
         """What was found in the last picture of each camera."""
         self._signals: tuple[SignalReading, ...] = ()
         self._network = build_network(self.network, self.settings)
+        self.sees_signals = signal_kinds(self._network.classes)
         self._surroundings = Surroundings(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
@@ -113,7 +113,7 @@ class LearnedDetector(Detector):
         return distinct(parts, readings.time)
 
     def signals(self) -> tuple[SignalReading, ...]:
-        """The traffic lights and stop signs of the map that were found in the last pictures."""
+        """The traffic lights and stop signs of the map that were seen in the last pictures."""
         return self._signals
 
     def _lifted(

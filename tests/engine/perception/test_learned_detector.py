@@ -131,7 +131,6 @@ def test_they_come_through_their_entry_points() -> None:
     assert registry("detectors").load("ssd") is SsdDetector
     assert YoloDetector.needs == {"camera"}
     assert [type(sensor) for sensor in YoloDetector.usual_sensors.values()] == [CameraSettings, LidarSettings]
-    assert YoloDetector.sees_signals
 
 
 def test_the_surest_of_several_boxes_on_one_place_counts() -> None:

@@ -1,57 +1,186 @@
-"""Which traffic light of the map a box in a picture shows."""
+"""Which traffic light of the map a box in a picture shows, and what its lamps show."""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
+import pytest
 
 from eidrive_scenario.library import library_path
+from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.learned.detector import LearnedSettings, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageDetections
-from eidrive_scenario.perception.learned.lights import LightsOnMap
+from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, WEIGHTS, crops, lamp_network
+from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.projection import pixels
+from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.readings import CameraReading, SignalReading
-from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings, SignalReading
+from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.sensing.signals import SIGNAL_KINDS
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
+from eidrive_scenario.world.furniture import signal_heads
+from eidrive_scenario.world.weather import Weather
+
+ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
+NIGHT = Weather(sun_elevation=-20.0, street_lighting=8.0)
+RAIN = Weather(cloud_cover=1.0, visual_range=3000.0, precipitation="rain", precipitation_intensity=10.0, wetness=0.6)
+CROSSING = RoadNetwork.load(library_path() / "roads" / "coop_2.xodr")
+STOPPING = RoadNetwork.load(library_path() / "roads" / "coop_1.xodr")
+TRUCK = ActorSpec("Truck", "truck", "truck", (8.3, 2.5, 3.55), (2.5, 0.0, 1.78), wheelbase=5.0, wheel_radius=0.5)
 
 
-def camera_at(x: float, y: float) -> CameraReading:
-    """At a height of 1.5 m, looking along x, 800 x 600 pixels, focal length 400 pixels."""
-    pose = np.eye(4)
-    pose[:3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
-    pose[:3, 3] = (x, y, 1.5)
-    empty = np.zeros((600, 800), dtype=np.int32)
-    lens = Pinhole(800, 600, 400.0, 400.0, 300.0)
-    return CameraReading(
-        np.zeros((600, 800, 3), dtype=np.uint8), empty.astype(np.float32), empty, lens.intrinsics, pose
-    )
+def before(roads: RoadNetwork, signal: str, distance: float, aside: float = 0.0) -> np.ndarray:
+    """Pose of a camera so far before a signal, 1.5 m above its foot's road, that looks the way the signal faces."""
+    head = next(head for head in signal_heads(roads) if head.signal.id == signal)
+    heading, pose = head.pose.h + math.pi, np.eye(4)
+    cos, sin = math.cos(heading), math.sin(heading)
+    pose[:3, :3] = np.array([[sin, 0.0, cos], [-cos, 0.0, sin], [0.0, -1.0, 0.0]])
+    pose[:3, 3] = head.pose.x - distance * cos - aside * sin, head.pose.y - distance * sin + aside * cos, 1.5
+    return pose
 
 
-def test_boxes_are_matched_with_the_signals_that_are_there() -> None:
-    roads = RoadNetwork.load(library_path() / "roads" / "coop_2.xodr")
-    camera = camera_at(-10.0, 0.0)
-    signal = roads.signals["10"]
-    pose = roads.signal_pose(signal)
-    place = np.array([[pose.x, pose.y, pose.z + signal.height / 2.0]])
-    (u, v), depth = pixels(place, camera)[0][0], pixels(place, camera)[1][0]
-    half = np.array([0.15, 0.43]) * 400.0 / depth
-    shown = [u - half[0], v - half[1], u + half[0], v + half[1]]
-    elsewhere = [10.0, 10.0, 20.0, 36.0]
-    found = ImageDetections(
-        np.array([shown, shown, elsewhere, shown]),
-        np.array([0.9, 0.95, 0.8, 0.99]),
+def photograph(
+    roads: RoadNetwork,
+    pose: np.ndarray,
+    states: dict[str, str],
+    weather: Weather | None = None,
+    others: Sequence[tuple[ActorSpec, Placement]] = (),
+) -> CameraReading:
+    with World(roads) as world:
+        for spec, there in others:
+            world.add(spec, there)
+        if weather is not None:
+            world.set_weather(weather)
+        world.show(states, {})
+        return Photographer(CameraSettings(width=800, height=600, fov=80.0)).take(world, pose, generator(3, "lights"))
+
+
+def box_around(roads: RoadNetwork, signal: str, camera: CameraReading) -> list[float]:
+    head = next(head for head in signal_heads(roads) if head.signal.id == signal)
+    x, y, z = head.pose[:3]
+    (u, low), (_, high) = pixels(np.array([[x, y, z], [x, y, z + head.height]]), camera)[0].tolist()
+    half = (low - high) * head.width / head.height / 2.0
+    return [u - half, high, u + half, low]
+
+
+def found(boxes: Sequence[Sequence[float]], scores: Sequence[float], classes: tuple[str, ...]) -> ImageDetections:
+    return ImageDetections(np.array(boxes, dtype=float).reshape(-1, 4), np.array(scores, dtype=float), classes)
+
+
+NOTHING = found([], [], ())
+
+
+@pytest.mark.parametrize("weather", [None, NIGHT, RAIN], ids=["day", "night", "rain"])
+@pytest.mark.parametrize("state", ["red", "redYellow", "yellow", "green"])
+def test_lamps_are_read_where_the_map_has_the_light(state: str, weather: Weather | None) -> None:
+    """No box of a network says that there is a light. The library's roads are not among the pictures trained on."""
+    camera = photograph(CROSSING, before(CROSSING, "10", 18.0, aside=2.0), {"10": state}, weather)
+    assert SignalReading("10", state) in LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": camera})
+
+
+def test_a_light_that_shows_nothing_is_off_and_a_hidden_one_is_not_read() -> None:
+    pose = before(CROSSING, "10", 16.0)
+    free = photograph(CROSSING, pose, {"10": ""})
+    assert SignalReading("10", "off") in LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": free})
+    x, y = (pose[:2, 3] + 9.0 * pose[:2, 2]).tolist()
+    across = Placement(x, y, yaw=math.atan2(pose[1, 0], pose[0, 0]))
+    for state in ("red", "green"):
+        hidden = photograph(CROSSING, pose, {"10": state}, others=[(TRUCK, across)])
+        seen = LightsOnMap(CROSSING).read({"camera": NOTHING}, {"camera": hidden})
+        assert "10" not in {reading.id for reading in seen}
+
+
+def test_a_light_from_behind_or_out_of_the_picture_is_not_read() -> None:
+    lights = LightsOnMap(CROSSING)
+    pose = before(CROSSING, "10", 18.0)
+    assert "10" in {view.id for view in lights.in_view(photograph(CROSSING, pose, {}))}
+    away = pose.copy()
+    away[:3, 0], away[:3, 2] = -pose[:3, 0], -pose[:3, 2]
+    assert "10" not in {view.id for view in lights.in_view(photograph(CROSSING, away, {}))}
+    past = before(CROSSING, "10", -18.0)
+    past[:3, 0], past[:3, 2] = -past[:3, 0], -past[:3, 2]
+    assert "10" not in {view.id for view in lights.in_view(photograph(CROSSING, past, {}))}
+
+
+def test_in_a_box_lamps_count_more_than_the_class_of_the_network() -> None:
+    camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "green"})
+    box = box_around(CROSSING, "10", camera)
+    lights = LightsOnMap(CROSSING)
+    for name in ("traffic light red", "traffic light off", "traffic light"):
+        seen = lights.read({"camera": found([box], [0.95], (name,))}, {"camera": camera})
+        assert SignalReading("10", "green") in seen
+
+
+def test_where_lamps_are_too_small_the_class_of_the_network_counts() -> None:
+    """At 95 m a light is 5 pixels high."""
+    camera = photograph(CROSSING, before(CROSSING, "10", 95.0), {"10": "red"})
+    u = box_around(CROSSING, "10", camera)
+    lights = LightsOnMap(CROSSING)
+    assert "10" not in {view.id for view in lights.in_view(camera)}
+    boxes = found(
+        [u, u, [10.0, 10.0, 20.0, 36.0], u],
+        [0.8, 0.9, 0.7, 0.99],
         ("traffic light red", "traffic light green", "traffic light red", "car"),
     )
-    lights = LightsOnMap(roads)
-    assert lights.read({"camera": found}, {"camera": camera}) == (SignalReading("10", "green"),)
-    stop = ImageDetections(np.array([shown]), np.array([0.9]), ("stop sign",))
-    assert lights.read({"camera": stop}, {"camera": camera}) == ()
-    assert LightsOnMap(None).read({"camera": found}, {"camera": camera}) == ()
+    readings = {reading.id: reading.state for reading in lights.read({"camera": boxes}, {"camera": camera})}
+    assert readings["10"] == "green"
+    stop = found([u], [0.9], ("stop sign",))
+    assert "10" not in {reading.id for reading in lights.read({"camera": stop}, {"camera": camera})}
+    assert LightsOnMap(None).read({"camera": boxes}, {"camera": camera}) == ()
 
 
 def test_a_stop_sign_is_matched_with_a_stop_sign() -> None:
-    roads = RoadNetwork.load(library_path() / "roads" / "coop_1.xodr")
-    camera = camera_at(-5.0, 0.0)
-    signal = roads.signals["10"]
-    pose = roads.signal_pose(signal)
-    u, v = pixels(np.array([[pose.x, pose.y, pose.z + signal.height / 2.0]]), camera)[0][0]
-    found = ImageDetections(np.array([[u - 6.0, v - 6.0, u + 6.0, v + 6.0]]), np.array([0.7]), ("stop sign",))
-    assert LightsOnMap(roads).read({"camera": found}, {"camera": camera}) == (SignalReading("10", "stop"),)
+    camera = photograph(STOPPING, before(STOPPING, "10", 15.0), {})
+    boxes = found([box_around(STOPPING, "10", camera)], [0.7], ("stop sign",))
+    assert LightsOnMap(STOPPING).read({"camera": boxes}, {"camera": camera}) == (SignalReading("10", "stop"),)
+    assert LightsOnMap(STOPPING).read({"camera": NOTHING}, {"camera": camera}) == ()
+
+
+def test_what_a_station_reads_itself_depends_on_the_classes_of_the_network() -> None:
+    assert signal_kinds(("car", "stop sign")) == SIGNAL_KINDS
+    assert signal_kinds(("car", "traffic light")) == {"light"}
+    settings = LearnedSettings(weights=str(ONNX), classes=("truck", "car"), input_size=(96, 64))
+    detector = YoloDetector(settings)
+    assert detector.sees_signals == {"light"}
+    detector.install(Installation(TRUCK, {}, CROSSING))
+    camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "red"})
+    x, y, _ = camera.pose[:3, 3].tolist()
+    detector.detect(Readings(0.0, EgoState(0.0, np.array([x, y, 0.0]), 0, 0, 0, 0, 0, 0), cameras={"camera": camera}))
+    assert SignalReading("10", "red") in detector.signals()
+
+
+def test_the_network_of_lamps_in_numpy_is_that_of_torch() -> None:
+    torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+    with np.load(WEIGHTS) as stored:
+        weights = {name: torch.from_numpy(stored[name].astype(np.float32)) for name in stored.files}
+    parts = np.random.default_rng(1).random((5, 3, 32, 16), dtype=np.float32)
+    seen = torch.from_numpy(parts)
+    for number in range(3):
+        seen = torch.nn.functional.conv2d(seen, weights[f"w{number}"], weights[f"b{number}"], padding=1).relu()
+        seen = torch.nn.functional.max_pool2d(seen, 2) if number < 2 else seen
+    expected = torch.nn.functional.linear(seen.flatten(1), weights["w3"], weights["b3"]).softmax(dim=1)
+    np.testing.assert_allclose(lamp_network().probabilities(parts), expected.numpy(), atol=1e-5)
+    assert lamp_network().probabilities(parts[:0]).shape == (0, len(SHOWN))
+    card = json.loads(WEIGHTS.with_suffix(".json").read_text())
+    assert card["shown"] == list(SHOWN)
+    assert SHOWN[-1] == NONE
+
+
+def test_parts_of_a_picture_keep_place_and_shape() -> None:
+    """A light of 32 pixels is seen with as much again above and below; beyond the border the last pixels go on."""
+    picture = np.zeros((100, 200, 3), dtype=np.uint8)
+    picture[40:72, 92:100] = (200, 0, 0)
+    part = crops(picture, np.array([[100.0, 56.0]]), np.array([32.0]))[0]
+    assert part.shape == (3, 32, 16)
+    np.testing.assert_allclose(part[0, 8:24, 4:8], 1.0)
+    assert part[0].sum() == pytest.approx(16 * 4)
+    assert not part[1:].any()
+    corner = crops(np.full((20, 20, 3), 99, dtype=np.uint8), np.array([[0.0, 0.0]]), np.array([300.0]))
+    np.testing.assert_allclose(corner, 1.0)

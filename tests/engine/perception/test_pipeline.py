@@ -92,7 +92,7 @@ class Blind(Detector):
     """Finds one box without velocity, and a light."""
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
-    sees_signals: ClassVar[bool] = True
+    sees_signals = frozenset({"light"})
 
     def __init__(self) -> None:
         self.installed: Installation | None = None
@@ -126,10 +126,11 @@ def test_a_detector_learns_where_it_works() -> None:
     assert (blind.installed.spec, set(blind.installed.sensors), blind.installed.seed) == (CAR, {"truth"}, 7)
 
 
-def test_signals_come_from_the_detector_that_sees_them_or_else_from_the_lookout() -> None:
+def test_signals_come_from_the_detector_that_sees_them_and_from_the_lookout() -> None:
+    """The lookout is asked for what the detector does not see (test_lights_on_map)."""
     looked = readings(0.0, signals=(SignalReading("map", "red"),))
     assert [one.id for one in Perception(OracleDetector()).signals(looked)] == ["map"]
-    assert [one.id for one in Perception(Blind()).signals(looked)] == ["own"]
+    assert [one.id for one in Perception(Blind()).signals(looked)] == ["own", "map"]
 
 
 def test_without_the_oracle_objects_lie_where_the_station_takes_itself_to_be() -> None:

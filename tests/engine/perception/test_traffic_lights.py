@@ -20,7 +20,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.rig import Rig
-from eidrive_scenario.sensing.signals import SignalLookout
+from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
 from eidrive_scenario.simulation import run_file
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -123,12 +123,20 @@ CAR = ActorSpec("Ego", "car", "car", (4.892, 1.837, 1.49), (1.4, 0.0, 0.745), wh
 TRUCK = ActorSpec("Truck", "firetruck", "truck", (8.5, 2.9, 3.8), (0.0, 0.0, 1.9), wheelbase=5.0)
 
 
-def seen(roads: RoadNetwork, states: Mapping[str, str], x: float, yaw: float = 0.0, *, truck: bool = False) -> set[str]:
+def seen(
+    roads: RoadNetwork,
+    states: Mapping[str, str],
+    x: float,
+    yaw: float = 0.0,
+    *,
+    truck: bool = False,
+    kinds: frozenset[str] = SIGNAL_KINDS,
+) -> set[str]:
     with World(roads, dt=0.05) as world:
         world.add(CAR, Placement(x, -1.75, yaw=yaw))
         if truck:
             world.add(TRUCK, Placement(x + 14, -2.5))
-        readings = SignalLookout(CAR, roads).read(world, world.view(), 0, states)
+        readings = SignalLookout(CAR, roads, kinds).read(world, world.view(), 0, states)
     return {f"{reading.id} {reading.state}".strip() for reading in readings}
 
 
@@ -136,6 +144,8 @@ def test_a_light_is_seen_from_its_front_within_range_and_if_nothing_hides_it() -
     roads = street(light("east", 120.0), light("west", 100.0, orientation="-"), stop_sign("stop", 130.0))
     states = {"east": "red", "west": "green"}
     assert seen(roads, states, 60.0) == {"east red", "stop"}
+    assert seen(roads, states, 60.0, kinds=frozenset({"light"})) == {"east red"}
+    assert seen(roads, states, 60.0, kinds=frozenset({"stop sign"})) == {"stop"}
     assert seen(roads, states, 10.0) == set()
     assert seen(roads, states, 125.0) == {"stop"}
     assert "east red" not in seen(roads, states, 90.0, truck=True)

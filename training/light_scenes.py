@@ -1,0 +1,176 @@
+"""Traffic lights to read: what cameras of cars see on their way to lights, in all weathers."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
+from eidrive_scenario.perception.projection import pixels
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.mounting import mounting
+from eidrive_scenario.sensing.readings import CameraReading
+from eidrive_scenario.sensing.settings import CameraSettings
+from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import Placement
+from eidrive_scenario.world.furniture import SignalHead, signal_heads
+from training.dataset import shows_enough
+from training.labels import Label, head_box, legible, signal_labels
+from training.random_roads import Place, random_place
+from training.random_scene import (
+    Spots,
+    View,
+    random_actor,
+    random_looks,
+    random_signals,
+    random_traffic,
+    random_weather,
+)
+
+Array = NDArray[np.float64]
+
+PER_WORLD = 6
+NEAREST, LEAST_PIXELS = 6.0, 8.0
+"""The camera is at least so far before a light [m], and so near that a head of usual size is so high in the picture."""
+USUAL_HEIGHT = 0.94
+ASIDE = 0.7
+"""At most so far beside the camera's way, as a share of the distance, the light is that it looks at."""
+IN_RANGE = 100.0
+CAMERAS = (CameraSettings(width=800, height=600, fov=100.0), CameraSettings(width=800, height=600, fov=60.0))
+"""EI-Drive's camera, and one that looks farther, each in half of the pictures."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A traffic light within the picture.
+
+    state     what it shows: red, redYellow, yellow, green or off
+    box       x1 y1 x2 y2 of what is seen of it [px]; None where nothing is
+    to_read   whether it shows enough to be asked for: at least 8 pixels high, not hidden, from its front, not lost in
+              fog or in the dark
+    """
+
+    id: str
+    state: str
+    distance: float
+    box: tuple[float, float, float, float] | None
+    to_read: bool
+
+
+@dataclass(frozen=True)
+class LightScene:
+    """One picture, the map, and the traffic lights of the map within the picture."""
+
+    reading: CameraReading
+    roads: RoadNetwork
+    lights: tuple[Light, ...]
+    weather: str
+
+
+def light_scenes(seed: int, split: str, worlds: int, processes: int = 1, first: int = 0) -> Iterator[LightScene]:
+    """The pictures of world after world from number `first` on; the same for any number of processes."""
+    tasks = [(seed, split, number) for number in range(first, first + worlds)]
+    if processes == 1:
+        for task in tasks:
+            yield from _scenes(task)
+        return
+    with get_context("spawn").Pool(processes) as pool:
+        for found in pool.imap(_scenes, tasks):
+            yield from found
+
+
+def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
+    cv2.setNumThreads(1)
+    seed, split, number = task
+    rng = generator(seed, "training data", split, number)
+    while True:
+        with tempfile.TemporaryDirectory() as folder:
+            place = random_place(rng, Path(folder))
+        spots = Spots.of(place.roads)
+        heads = signal_heads(place.roads)
+        chosen = [head for head in heads if head.signal.dynamic and len(_before(spots, head, CAMERAS[0]))]
+        if chosen:
+            break
+    with World(place.roads) as world:
+        for index, house in enumerate(place.houses):
+            world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+        return [_scene(world, place, spots, heads, chosen, rng) for _ in range(PER_WORLD)]
+
+
+def _scene(
+    world: World,
+    place: Place,
+    spots: Spots,
+    heads: list[SignalHead],
+    chosen: list[SignalHead],
+    rng: np.random.Generator,
+) -> LightScene:
+    for name in list(world.names):
+        world.remove(name)
+    camera = CAMERAS[int(rng.integers(len(CAMERAS)))]
+    rows = _before(spots, chosen[int(rng.integers(len(chosen)))], camera)
+    x, y, z, heading = spots.poses[int(rng.choice(rows))].tolist()
+    spec = random_actor(rng, "Carrier", "car")
+    heading += float(rng.normal(0.0, 0.05))
+    carrier = (spec, Placement(x, y, z, heading))
+    world.add(*carrier)
+    pose = mounting(camera, spec, "front").camera_pose(world.view(), 0)
+    cast = random_traffic(rng, spots, View(camera, pose, carrier))
+    for other, there in cast:
+        world.add(other, there)
+    weather = random_weather(rng)
+    world.set_weather(weather)
+    states = random_signals(rng, place.roads)
+    world.show(states, random_looks(rng, [carrier, *cast], weather))
+    reading = Photographer(camera).take(world, pose, rng, ignore=(spec.name,))
+    labels = legible(signal_labels(reading, heads, states), reading, weather)
+    return LightScene(reading, place.roads, tuple(_lights(reading, heads, labels, states)), weather.name)
+
+
+def _before(spots: Spots, head: SignalHead, camera: CameraSettings) -> NDArray[np.int64]:
+    """The places on lanes from which a driver looks at this signal, near enough for this camera."""
+    focal = camera.width / 2.0 / math.tan(math.radians(camera.fov) / 2.0)
+    farthest = focal * USUAL_HEIGHT / LEAST_PIXELS
+    rows = np.flatnonzero(spots.kinds == "driving")
+    x, y, heading = spots.poses[rows, 0], spots.poses[rows, 1], spots.poses[rows, 3]
+    dx, dy = head.pose.x - x, head.pose.y - y
+    ahead = np.cos(heading) * dx + np.sin(heading) * dy
+    aside = np.abs(np.cos(heading) * dy - np.sin(heading) * dx)
+    against = np.cos(heading - head.pose.h) < -0.8
+    near = (ahead > NEAREST) & (ahead < farthest) & (aside < ASIDE * ahead)
+    return np.asarray(rows[near & against], dtype=np.int64)
+
+
+def _lights(
+    reading: CameraReading, heads: list[SignalHead], labels: list[Label], states: Mapping[str, str]
+) -> Iterator[Light]:
+    """All traffic lights of the map within the picture, those that something hides or that look away included."""
+    by_place = {label.place[:3]: label for label in labels if IMAGE_CLASSES[label.number].startswith("traffic light")}
+    height, width = reading.segmentation.shape
+    for head in heads:
+        if not head.signal.dynamic:
+            continue
+        middle = head_box(head)[1]
+        distance = float(np.linalg.norm(middle - reading.pose[:3, 3]))
+        place, _ = pixels(middle[None], reading)
+        if np.isnan(place).any() or distance > IN_RANGE or not ((place[0] >= 0) & (place[0] < (width, height))).all():
+            continue
+        label = by_place.get(tuple(middle.tolist()))
+        box = None if label is None else label.box
+        to_read = label is not None and label.readable and _enough(label)
+        yield Light(head.signal.id, states[head.signal.id], distance, box, to_read)
+
+
+def _enough(label: Label) -> bool:
+    high = np.array([label.box[3] - label.box[1]])
+    return bool(shows_enough(high, np.array([label.seen]), np.array([label.whole]))[0])

@@ -1,0 +1,167 @@
+"""Trains what reads the lamps of traffic lights: `python -m training.train_lamps`; minutes on a CPU.
+
+Pictures are rendered anew (some 10 minutes on two cores); no road of the library is among them, and none of the
+pictures in which `make eval` reads lights. Writes training/out/lamps.npz and its card lamps.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterable
+from datetime import date
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from eidrive_scenario.perception.learned.lamps import CROP, NONE, SHOWN, crops, save
+from eidrive_scenario.perception.learned.lights import LightsOnMap
+from eidrive_scenario.randomness import generator
+from training.light_scenes import LightScene, light_scenes
+
+VERSIONS = 24
+"""Of each light: moved, of another size, mirrored, coarser, dimmer."""
+EMPTY_PER_PICTURE = 2
+LEAST_HEIGHT = 5.0
+SHIFT, STRETCH = 0.12, 0.15
+"""Standard deviations of where a light seems to be, as a share of its height, and of the logarithm of that height."""
+
+
+class Samples(NamedTuple):
+    """Parts of pictures (N, 3, 32, 16) and what they show (N,)."""
+
+    parts: NDArray[np.float32]
+    shown: NDArray[np.int64]
+
+
+def samples(scenes: Iterable[LightScene], seed: int) -> Samples:
+    """The lights that show enough, those that something hides, and places without any."""
+    parts, shown = [], []
+    for number, scene in enumerate(scenes):
+        rng = generator(seed, "lamps", number)
+        truth = {light.id: light for light in scene.lights}
+        views = [view for view in LightsOnMap(scene.roads).in_view(scene.reading) if view.height >= LEAST_HEIGHT]
+        for view in views:
+            light = truth.get(view.id)
+            if light is None or (light.box is not None and not light.to_read):
+                continue
+            state = light.state if light.to_read else NONE
+            middles = np.array(view.middle) + view.height * SHIFT * rng.standard_normal((VERSIONS, 2))
+            heights = view.height * np.exp(STRETCH * rng.standard_normal(VERSIONS))
+            parts.append(crops(coarser(scene.reading.rgb, middles, heights, rng), middles, heights))
+            shown += [SHOWN.index(state)] * VERSIONS
+        height, width = scene.reading.rgb.shape[:2]
+        places = rng.uniform((0, 0), (width, height), (EMPTY_PER_PICTURE, 2))
+        sizes = np.exp(rng.uniform(np.log(LEAST_HEIGHT), np.log(80.0), EMPTY_PER_PICTURE))
+        near = [np.abs(places - view.middle).max(axis=1) < view.height + sizes for view in views]
+        free = ~np.any(near, axis=0) if near else np.ones(EMPTY_PER_PICTURE, dtype=bool)
+        parts.append(crops(scene.reading.rgb, places[free], sizes[free]))
+        shown += [SHOWN.index(NONE)] * int(free.sum())
+    together = np.concatenate(parts)
+    rng = generator(seed, "lamps", "mirrored")
+    mirrored = rng.random(len(together)) < 0.5
+    together[mirrored] = together[mirrored, :, :, ::-1]
+    return Samples(together, np.array(shown, dtype=np.int64))
+
+
+def coarser(
+    picture: NDArray[np.uint8], middles: NDArray[np.float64], heights: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """The picture with a little noise, so that no part is seen twice alike."""
+    left, top = np.floor((middles - 2.0 * heights[:, None]).min(axis=0)).astype(int).clip(0)
+    right, bottom = np.ceil((middles + 2.0 * heights[:, None]).max(axis=0)).astype(int).clip(1)
+    part = picture[top:bottom, left:right].astype(float)
+    changed = picture.copy()
+    changed[top:bottom, left:right] = (part + rng.normal(0.0, 3.0, part.shape)).clip(0, 255).astype(np.uint8)
+    return changed
+
+
+class Network(nn.Module):
+    """The network of perception/learned/lamps.py, to be trained."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.first, self.second = nn.Conv2d(3, 12, 3, padding=1), nn.Conv2d(12, 24, 3, padding=1)
+        self.third = nn.Conv2d(24, 32, 3, padding=1)
+        self.last = nn.Linear(32 * (CROP[1] // 4) * (CROP[0] // 4), len(SHOWN))
+
+    def forward(self, parts: Tensor) -> Tensor:
+        seen = nn.functional.max_pool2d(self.first(parts).relu(), 2)
+        seen = nn.functional.max_pool2d(self.second(seen).relu(), 2)
+        seen = self.third(seen).relu().flatten(1)
+        return self.last(nn.functional.dropout(seen, 0.3, self.training))
+
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """As `LampNetwork` takes them."""
+        layers = (self.first, self.second, self.third, self.last)
+        found = {}
+        for number, layer in enumerate(layers):
+            found[f"w{number}"] = layer.weight.detach().numpy()
+            found[f"b{number}"] = layer.bias.detach().numpy()
+        return found
+
+
+def trained(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float = 2e-3) -> Network:
+    """The network, trained with equal weight on each thing that can be shown."""
+    torch.manual_seed(seed)
+    network = Network()
+    parts, shown = torch.from_numpy(data.parts), torch.from_numpy(data.shown)
+    counts = torch.bincount(shown, minlength=len(SHOWN)).float().clamp(min=1.0)
+    loss = nn.CrossEntropyLoss(weight=(counts.sum() / counts / len(SHOWN)).sqrt(), label_smoothing=0.02)
+    steps = epochs * -(-len(parts) // batch)
+    optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-2)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
+    for _ in range(epochs):
+        for rows in torch.randperm(len(parts)).split(batch):
+            gain = 0.7 + 0.6 * torch.rand(len(rows), 3, 1, 1).mean(dim=1, keepdim=True)
+            value = loss(network((parts[rows] * gain).clamp(max=1.0)), shown[rows])
+            optimizer.zero_grad()
+            value.backward()
+            optimizer.step()
+            schedule.step()
+    return network.eval()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--worlds", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--epochs", type=int, default=12)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("training/out"))
+    options = parser.parse_args()
+    data = samples(light_scenes(options.seed, "lights train", options.worlds, options.processes), options.seed)
+    train(data, options.seed, options.epochs, options.worlds, options.out)
+
+
+def train(data: Samples, seed: int, epochs: int, worlds: int, out: Path) -> None:
+    """Train on these samples; write the weights and their card."""
+    started = time.perf_counter()
+    torch.set_num_threads(2)
+    network = trained(data, seed, epochs)
+    out.mkdir(parents=True, exist_ok=True)
+    counts = np.bincount(data.shown, minlength=len(SHOWN))
+    card = {
+        "network": "lamps",
+        "shown": list(SHOWN),
+        "input_size": list(CROP),
+        "date": date.today().isoformat(),
+        "torch": torch.__version__,
+        "data": {
+            "script": "training/train_lamps.py",
+            "seed": seed,
+            "worlds": worlds,
+            "versions": dict(zip(SHOWN, counts.tolist(), strict=True)),
+        },
+        "training": {"epochs": epochs, "device": "cpu", "seconds": round(time.perf_counter() - started)},
+    }
+    save(out / "lamps.npz", network.weights(), card)
+    print(f"{len(data.shown)} parts of pictures; written: {out / 'lamps.npz'}, .json")
+
+
+if __name__ == "__main__":
+    main()
