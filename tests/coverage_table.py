@@ -45,16 +45,11 @@ def _rows(*names: str) -> tuple[Row, ...]:
 
 
 OF_1_2 = "1.2 defines it, with no place for it in the schema"
-EXACTLY = "a gap: followingMode of the dynamics is not used, curves are driven exactly, within the Performance"
 
 SECTIONS: dict[str, tuple[Row, ...]] = {
     "Private actions": (
-        Row("SpeedAction", note=EXACTLY),
-        *_rows("SpeedProfileAction", "LongitudinalDistanceAction"),
-        Row("LaneChangeAction", note=EXACTLY),
-        *_rows("LaneOffsetAction", "LateralDistanceAction"),
-        Row("VisibilityAction"),
-        Row("SynchronizeAction"),
+        *_rows("SpeedAction", "SpeedProfileAction", "LongitudinalDistanceAction", "LaneChangeAction"),
+        *_rows("LaneOffsetAction", "LateralDistanceAction", "VisibilityAction", "SynchronizeAction"),
         Row("ActivateControllerAction", note="controllers of other tools mean the default controller"),
         Row("AssignControllerAction", note="other tools' controllers only; one of ours is refused during the run"),
         Row("OverrideControllerValueAction", note="of a scripted vehicle it is recorded only: that one has no pedals"),

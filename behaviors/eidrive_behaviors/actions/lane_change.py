@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.following import Tracker, follows, largest_curvature
 from eidrive_behaviors.actions.speed import dynamics_in_words
 from eidrive_scenario.api import (
     ActionBehaviour,
@@ -35,7 +36,8 @@ class LaneChangeAction(ActionBehaviour):
     """Takes the offset from the target lane's centre over to `targetLaneOffset` by the given dynamics.
 
     A distance is measured along the lane. The actor covers its speed's distance on the slanted way; a demand to go
-    sideways faster than that is cut to it. A standing actor waits.
+    sideways faster than that is cut to it. A standing actor waits. In the following mode `follow` a vehicle accelerates
+    sideways no more than its front wheels and its tyres allow, which brake as hard as its Performance says.
     """
 
     domains = Domain.LATERAL
@@ -59,6 +61,7 @@ class LaneChangeAction(ActionBehaviour):
             raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
         self._roads = stage.roads
         self._lane = 0
+        self._tracker: Tracker | None = None
 
     def initialise(self) -> None:
         """Find the target lane, and see the actor's place as an offset from its centre."""
@@ -82,18 +85,23 @@ class LaneChangeAction(ActionBehaviour):
         else:
             self._transition = ValueTransition(shape, start, target, value)
         self._offset = start
+        if follows(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
+            sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
+            self._tracker = Tracker(start, sideways, up=math.inf, down=math.inf)
 
     def update(self) -> Status:
         """The offset at the end of the step."""
         if self.actor.driven:
             return self._ask_driver()
         way = abs(self.actor.motion.speed) * self.stage.dt
-        if self._transition.extent <= 0.0:
+        if self._transition.extent <= 0.0 and self._tracker is None:
             self.actor.motion.steer(Steering(self._transition.target, 0.0, slows=False))
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
             return Status.RUNNING
         wanted = self._next(way)
+        if self._tracker is not None:
+            wanted = self._followed(self._tracker, wanted)
         if abs(wanted - self._offset) > way:
             wanted = self._offset + math.copysign(way, wanted - self._offset)
         self._offset = wanted
@@ -110,6 +118,15 @@ class LaneChangeAction(ActionBehaviour):
         along = math.sqrt(max(0.0, way * way - sideways * sideways))
         transition.progress = before
         return transition.advance(along)
+
+    def _followed(self, tracker: Tracker, wanted: float) -> float:
+        vehicle, speed = self.actor.entity, self.actor.motion.speed
+        assert isinstance(vehicle, model.Vehicle)
+        tracker.up = tracker.down = min(
+            largest_curvature(vehicle) * speed * speed, vehicle.performance.max_deceleration
+        )
+        tracker.lowest, tracker.highest = -abs(speed), abs(speed)
+        return tracker.advance(wanted, self.stage.dt)
 
     def _target_lane(self, here: LaneLocation) -> int:
         target = self.action.lane_change_target

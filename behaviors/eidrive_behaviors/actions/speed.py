@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.following import Tracker, follows, speed_tracker
 from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Stage, ValueTransition, model
 
 TINY = 1e-6
@@ -19,8 +20,9 @@ class SpeedAction(ActionBehaviour):
 
     Speed follows its shape over time; where the dynamics say a distance, the time in which that distance is covered.
     A relative target is read anew in each step; a continuous one is kept up until a younger action ends it. The
-    vehicle's Performance bounds target and steepest slope (not those of a step). A vehicle that drives itself is given
-    the speed as its goal, and has reached it when it drives that fast; one that was just placed starts with it.
+    vehicle's Performance bounds target and steepest slope (not those of a step); in the following mode `follow` it
+    bounds all accelerations and jerks. A vehicle that drives itself is given the speed as its goal, and has reached it
+    when it drives that fast; one that was just placed starts with it.
     """
 
     domains = Domain.LONGITUDINAL
@@ -34,6 +36,7 @@ class SpeedAction(ActionBehaviour):
         self._absolute = action.speed_action_target.absolute_target_speed
         self._relative = action.speed_action_target.relative_target_speed
         self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
+        self._tracker: Tracker | None = None
 
     @property
     def _continuous(self) -> bool:
@@ -41,7 +44,11 @@ class SpeedAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Lay the transition from the present speed."""
-        self._transition = self._laid(self._present(), self._target())
+        start, target = self._present(), self._target()
+        self._transition = self._laid(start, target)
+        vehicle = self.actor.entity
+        if follows(self._dynamics) and isinstance(vehicle, model.Vehicle):
+            self._tracker = speed_tracker(vehicle, start, backwards=start + target < 0.0)
 
     def _laid(self, start: float, target: float) -> ValueTransition:
         _, faster, slower = self.actor.limits()
@@ -66,6 +73,8 @@ class SpeedAction(ActionBehaviour):
             speed = self._approach(transition.target)
         else:
             speed = transition.advance(self.stage.dt)
+        if self._tracker is not None and self.stage.dt > 0.0:
+            speed = self._tracker.advance(speed, self.stage.dt)
         self.actor.motion.speed = speed
         reached = transition.done and abs(speed - transition.target) < TINY
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvature, wheelbase_of
 from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Layout, Place, Pose, Stage, lay_out, model, resolve
 
 TINY = 1e-6
@@ -20,6 +21,10 @@ class FollowTrajectoryAction(ActionBehaviour):
     the vertex of time v is passed at `scale * v + offset`, counted from the start of the run or of the action; in the
     following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
     speed and looks for its lane.
+
+    In the mode `position` the actor is put on the trajectory. With `follow` a vehicle drives there from where it is and
+    leaves the curve where its front wheels cannot turn as far; until it is on it again it catches up with the times
+    within its Performance. Headings that the file gives are taken at their word in both.
     """
 
     action: model.FollowTrajectoryAction
@@ -34,6 +39,8 @@ class FollowTrajectoryAction(ActionBehaviour):
     ) -> None:
         super().__init__(action, stage, actor=actor, parent=parent)
         self._timing = action.time_reference.timing
+        self._pursuit: Pursuit | None = None
+        self._run: Tracker | None = None
         self._trajectory = self._found()
 
     @property
@@ -53,11 +60,25 @@ class FollowTrajectoryAction(ActionBehaviour):
         swings = follow and self._timing is not None and self._trajectory.shape.polyline is not None
         self._speeds = self._layout.speeds_from(abs(self.actor.motion.speed)) if swings else None
         self._backwards = self.actor.present and self.actor.motion.speed < 0.0
+        self._pursuit = self._run = None
+        if follow and self.actor.present and not self._layout.given and not self._backwards:
+            self._pursue()
+
+    def _pursue(self) -> None:
+        vehicle, motion = self.actor.entity, self.actor.motion
+        if not isinstance(vehicle, model.Vehicle):
+            return
+        self._pursuit = Pursuit(self._layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
+        if self._timing is not None:
+            top, faster, slower = self.actor.limits()
+            self._run = Tracker(self._s, motion.speed, up=faster, down=slower, lowest=0.0, highest=top)
 
     def update(self) -> Status:
         """The pose at the end of the step."""
         if self.actor.driven:
             return self._ask_driver()
+        if self._pursuit is not None:
+            return self._drive(self._pursuit)
         motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
         if self._timing is None:
             after, done = self._s + abs(motion.speed) * dt, False
@@ -79,6 +100,36 @@ class FollowTrajectoryAction(ActionBehaviour):
         else:
             motion.go_to(pose, land=done)
         return Status.SUCCESS if done else Status.RUNNING
+
+    def _drive(self, pursuit: Pursuit) -> Status:
+        """The pose at the end of the step of a vehicle that follows as far as it can."""
+        motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
+        if dt == 0.0:
+            return Status.RUNNING
+        if self._run is not None:
+            clock = self._clock(dt)
+            beyond = max(0.0, clock - layout.end_time) * self._last_speed()
+            wanted = layout.at_time(clock, self._speeds) + beyond
+            self._run.value = pursuit.s
+            if pursuit.on_path:
+                self._run.keep(wanted, dt)
+            else:
+                self._run.advance(wanted, dt)
+            motion.speed = self._run.rate
+        pose = pursuit.advance(abs(motion.speed) * dt, dt)
+        self._s = pursuit.s
+        done = not (layout.closed and self._run is None) and pursuit.s > layout.length - TINY
+        motion.go_to(pose, land=done)
+        return Status.SUCCESS if done else Status.RUNNING
+
+    def _last_speed(self) -> float:
+        """At which a timed trajectory ends [m per s of its clock]."""
+        if self._speeds is not None:
+            return self._speeds[-1]
+        times, stations = self._layout.times, self._layout.timed
+        assert times is not None
+        span = times[-1] - times[-2]
+        return (stations[-1] - stations[-2]) / span if span > 0.0 else 0.0
 
     def _clock(self, dt: float) -> float:
         assert self._timing is not None

@@ -1,0 +1,157 @@
+"""The following mode `follow`: a car within its limits (10 m/s², front wheels 0.5 rad, 3 m between the axles).
+
+Ego drives 20 m/s from x = 100 in lane -1 (y = -2), unless a test says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from eidrive_behaviors.actions.following import Tracker, speed_tracker
+from street_scene import private
+
+from eidrive_scenario.api import Placement, model
+
+LARGEST_CURVATURE = math.tan(0.5) / 3.0
+
+
+def speed(target: float, shape: str, value: float, mode: str) -> str:
+    return private(f"""<LongitudinalAction><SpeedAction>
+      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}" followingMode="{mode}"/>
+      <SpeedActionTarget><AbsoluteTargetSpeed value="{target}"/></SpeedActionTarget></SpeedAction>
+      </LongitudinalAction>""")
+
+
+def change(shape: str, value: float, mode: str) -> str:
+    return private(f"""<LateralAction><LaneChangeAction>
+      <LaneChangeActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{value}"
+      followingMode="{mode}"/>
+      <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>""")
+
+
+def trajectory(points: list[tuple[float, float, float | None]], mode: str) -> str:
+    timed = points[0][2] is not None
+    vertices = "".join(
+        f'<Vertex {f"time={chr(34)}{t}{chr(34)}" if timed else ""}><Position><WorldPosition x="{x}" y="{y}"/>'
+        "</Position></Vertex>"
+        for x, y, t in points
+    )
+    reference = '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>' if timed else "<None/>"
+    return private(f"""<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false">
+      <Shape><Polyline>{vertices}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>{reference}
+      </TimeReference><TrajectoryFollowingMode followingMode="{mode}"/></FollowTrajectoryAction></RoutingAction>""")
+
+
+def motion(placement: Placement) -> tuple[float, ...]:
+    return placement.x, placement.y, placement.yaw, placement.speed
+
+
+@pytest.mark.element("SpeedAction")
+def test_a_step_of_speed_takes_the_time_that_the_car_needs(scene: Any) -> None:
+    played = scene(2, ("Ego", speed(25, "step", 0, "follow")))
+    assert [played.at(t).speed for t in (0.1, 0.3, 0.5, 1.0)] == pytest.approx([21.0, 23.0, 25.0, 25.0])
+    assert played.when("action 0", "completeState") == pytest.approx(0.5)
+    assert scene(1, ("Ego", speed(25, "step", 0, "position"))).at(0.1).speed == 25.0
+
+
+def test_a_jerk_that_the_performance_states_is_kept() -> None:
+    """By 10 m/s at most 2 m/s² and 4 m/s³: 0.5 s to build up, as long to let go, 10 / 2 + 2 / 4 s in all."""
+    car = model.Performance(
+        max_speed=70, max_acceleration=2, max_deceleration=8, max_acceleration_rate=4, max_deceleration_rate=4
+    )
+    tracker = speed_tracker(vehicle(car), 20.0, backwards=False)
+    dt = 0.01
+    speeds, rates = [20.0], [0.0]
+    while tracker.value != 30.0 or tracker.rate != 0.0:
+        speeds.append(tracker.advance(30.0, dt))
+        rates.append(tracker.rate)
+    assert all(abs(after - before) <= 4.0 * dt + 1e-9 for before, after in pairwise(rates))
+    assert max(rates) == pytest.approx(2.0)
+    assert speeds == sorted(speeds)
+    assert len(speeds) * dt == pytest.approx(5.5, abs=0.1)
+
+
+def vehicle(performance: model.Performance) -> model.Vehicle:
+    axle = model.Axle(max_steering=0.5, position_x=3.0, position_z=0.3, track_width=1.8, wheel_diameter=0.6)
+    box = model.BoundingBox(
+        center=model.Center(x=1.5, y=0.0, z=0.75), dimensions=model.Dimensions(width=2.0, length=5.0, height=1.5)
+    )
+    axles = model.Axles(front_axle=axle, rear_axle=axle)
+    return model.Vehicle(
+        name="car",
+        vehicle_category=model.VehicleCategory.CAR,
+        bounding_box=box,
+        performance=performance,
+        axles=axles,
+    )
+
+
+@pytest.mark.parametrize(("start", "rate"), [(-5.0, 3.0), (0.0, 0.0), (7.0, -2.0)])
+def test_a_tracker_settles_on_a_moving_value_within_its_bound(start: float, rate: float) -> None:
+    tracker, dt = Tracker(start, rate, up=2.0, down=3.0), 0.02
+    tracker.advance(0.0, dt)
+    for tick in range(1, 800):
+        before = tracker.rate
+        value = tracker.advance(0.5 * tick * dt, dt)
+        assert -3.0 * dt - 1e-9 <= tracker.rate - before <= 2.0 * dt + 1e-9
+    assert (value, tracker.rate) == pytest.approx((0.5 * 799 * dt, 0.5))
+
+
+@pytest.mark.element("LaneChangeAction")
+def test_a_step_to_the_side_takes_the_time_that_the_tyres_need(scene: Any) -> None:
+    """4 m with 10 m/s², half of it to gain speed sideways: 2 · √(4 / 10) s = 1.26 s."""
+    played = scene(3, ("Ego", change("step", 0, "follow")), dt=0.01)
+    y = [row["Ego"].y for row in played.rows]
+    rates = [(after - before) / 0.01 for before, after in pairwise(y)]
+    assert max(abs(after - before) for before, after in pairwise(rates)) <= 10.0 * 0.01 + 1e-6
+    assert min(y) == pytest.approx(-6.0)
+    assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(0.4), abs=0.05)
+
+
+def test_what_the_car_can_do_is_the_same_in_both_modes(scene: Any) -> None:
+    """A cubic change of lane by 4 m in 4 s needs 6 · 4 / 16 m/s² = 1.5 m/s²; 5 m/s in 2 s need 2.5 m/s²."""
+    for action in (lambda mode: change("cubic", 4, mode), lambda mode: speed(25, "linear", 2, mode)):
+        one, other = (scene(5, ("Ego", action(mode))) for mode in ("position", "follow"))
+        for before, after in zip(one.rows, other.rows, strict=True):
+            assert motion(before["Ego"]) == pytest.approx(motion(after["Ego"]), abs=1e-9)
+
+
+@pytest.mark.element("FollowTrajectoryAction")
+def test_at_a_corner_the_wheels_turn_as_far_as_they_can(scene: Any) -> None:
+    corner = [(100.0, -2.0, None), (120.0, -2.0, None), (120.0, 38.0, None)]
+    played = scene(10, ("Ego", trajectory(corner, "follow")), ego=(-1, 100.0, 5.0), dt=0.05)
+    path = [row["Ego"] for row in played.rows]
+    for before, after in pairwise(path):
+        way = math.hypot(after.x - before.x, after.y - before.y)
+        assert way == pytest.approx(0.25, abs=2e-3)
+        assert abs(after.yaw - before.yaw) <= LARGEST_CURVATURE * 0.25 + 1e-6
+    assert max(p.x for p in path) > 120.5
+    late = [p for p in path if p.y > 25.0]
+    assert [p.x for p in late] == pytest.approx([120.0] * len(late), abs=0.02)
+    exact = scene(10, ("Ego", trajectory(corner, "position")), ego=(-1, 100.0, 5.0), dt=0.05)
+    assert max(row["Ego"].x for row in exact.rows) == pytest.approx(120.0)
+
+
+def test_a_vehicle_drives_to_its_trajectory_from_where_it_is(scene: Any) -> None:
+    """It begins 4 m to the left of it, and reaches the end in time."""
+    way = [(100.0, -6.0, 0.0), (200.0, -6.0, 5.0)]
+    played = scene(6, ("Ego", trajectory(way, "follow")))
+    assert (played.at(0.1).x, played.at(0.1).y) == pytest.approx((102.0, -2.0), abs=0.2)
+    assert played.at(4.0).y == pytest.approx(-6.0, abs=0.05)
+    assert played.at(5.0).x == pytest.approx(200.0, abs=0.2)
+    assert scene(1, ("Ego", trajectory(way, "position"))).at(0.1).y == pytest.approx(-6.0)
+
+
+def test_on_a_bend_that_the_car_can_drive_both_modes_are_the_same(scene: Any) -> None:
+    """Corners of 0.1 rad, which a polyline takes within 4 m: 0.025 per metre."""
+    points, heading = [(100.0, -2.0)], 0.0
+    for _ in range(6):
+        points.append((points[-1][0] + 10.0 * math.cos(heading), points[-1][1] + 10.0 * math.sin(heading)))
+        heading += 0.1
+    timed = [(x, y, 0.5 * number) for number, (x, y) in enumerate(points)]
+    one, other = (scene(4, ("Ego", trajectory(timed, mode))) for mode in ("position", "follow"))
+    for before, after in zip(one.rows, other.rows, strict=True):
+        assert motion(before["Ego"]) == pytest.approx(motion(after["Ego"]), abs=1e-9)
