@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,8 @@ from scipy.optimize import linear_sum_assignment
 
 Array = NDArray[np.float64]
 
+FEW = 64
+"""Up to so many pairs, plain numbers are faster than arrays."""
 OUTSIDE = 1e6
 """Cost of a pair beyond the gate: finite, so that a full assignment exists, and larger than any sum of gated costs."""
 
@@ -21,6 +24,14 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     """
     if not len(first) or not len(second):
         return []
+    if len(first) * len(second) <= FEW:
+        near = [
+            (row, column, distance)
+            for row, one in enumerate(first.tolist())
+            for column, other in enumerate(second.tolist())
+            if (distance := math.dist(one, other)) < gate
+        ]
+        return matched(*zip(*near, strict=True)) if near else []
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
     inside = distance < gate

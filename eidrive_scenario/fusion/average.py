@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,8 @@ class AverageFusion(FusionMethod):
         if not present:
             return Detections(now)
         if len(present) == 1:
-            return replace(present[0], time=now)
+            only = present[0]
+            return Detections(now, only.boxes, only.scores, only.classes, only.velocity, only.covariance, only.tracks)
         labels = self._labels(present)
         return joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
@@ -33,12 +33,17 @@ class TraceHash:
 
     def __init__(self) -> None:
         self._sha = hashlib.sha256()
+        self._names: tuple[str, ...] = ()
+        self._named = _packed(())
+        """The names of the last view, and how they enter."""
         self._around: dict[str, object] = dict.fromkeys(_AROUND)
 
     def observe(self, frame: Frame) -> None:
         """Take one frame in."""
         view = frame.view
-        self._texts(*view.names)
+        if view.names is not self._names:
+            self._names, self._named = view.names, _packed(view.names)
+        self._sha.update(self._named)
         self._floats(view.time)
         kinematics = (view.position, view.yaw, view.pitch, view.roll, view.velocity)
         self._sha.update(b"".join([part.astype("<f8", copy=False).tobytes() for part in kinematics]))
@@ -67,9 +72,13 @@ class TraceHash:
         """Nothing to finish; observers have it."""
 
     def _texts(self, *texts: str) -> None:
-        """Names with their lengths before them, so that ('ab', 'c') differs from ('a', 'bc')."""
-        encoded = [text.encode() for text in texts]
-        self._sha.update(struct.pack(f"<{len(encoded) + 1}I", len(encoded), *map(len, encoded)) + b"".join(encoded))
+        self._sha.update(_packed(texts))
 
     def _floats(self, *numbers: float) -> None:
         self._sha.update(struct.pack(f"<{len(numbers)}d", *numbers))
+
+
+def _packed(texts: Sequence[str]) -> bytes:
+    """Texts with their lengths before them, so that ('ab', 'c') differs from ('a', 'bc')."""
+    encoded = [text.encode() for text in texts]
+    return struct.pack(f"<{len(encoded) + 1}I", len(encoded), *map(len, encoded)) + b"".join(encoded)

@@ -55,18 +55,16 @@ def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) 
     ox, oy, oz = origin
     px, py, pz = cos * (ox - x) + sin * (oy - y), cos * (oy - y) - sin * (ox - x), oz - z
     # First the slab that the origin is farthest outside of: most rays miss the box by that.
-    slabs = [(0, px, length / 2.0), (1, py, width / 2.0), (2, pz, height / 2.0)]
-    slabs.sort(key=lambda slab: slab[2] - abs(slab[1]))
+    places = sorted([(px, length / 2.0, 0), (py, width / 2.0, 1), (pz, height / 2.0, 2)], key=_inside)
+    slabs = [(axis, -half - place, half - place) for place, half, axis in places]
     starts = []
     for tx, ty, tz in targets:
         dx, dy, dz = tx - ox, ty - oy, tz - oz
         steps = (cos * dx + sin * dy, cos * dy - sin * dx, dz)
         enter, leave = -math.inf, math.inf
-        for axis, place, half in slabs:
-            step = steps[axis]
-            if abs(step) < PARALLEL:
-                step = PARALLEL
-            first, second = (-half - place) / step, (half - place) / step
+        for axis, low, high in slabs:
+            step = steps[axis] or PARALLEL
+            first, second = low / step, high / step
             if first > second:
                 first, second = second, first
             if first > enter:
@@ -80,3 +78,8 @@ def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) 
             share = min(leave + BEYOND_OWN_BODY, 1.0)
             starts.append((ox + share * dx, oy + share * dy, oz + share * dz))
     return starts
+
+
+def _inside(slab: tuple[float, float, int]) -> float:
+    """How far a place is inside of a slab by its half width; negative outside [m]."""
+    return slab[1] - abs(slab[0])

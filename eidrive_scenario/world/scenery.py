@@ -44,6 +44,8 @@ class Scenery:
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
         self.buildings: list[Building] = []
+        self._circles: list[tuple[float, float, float]] = []
+        """Middle and radius of each, seen from above [m]."""
         self._client = client
         self._entities = frozenset(entities)
         self._names: dict[int, str] = {}
@@ -62,6 +64,7 @@ class Scenery:
     ) -> None:
         """Put up a building that stops vehicles and rays."""
         self.buildings.append(Building(name, centre, size, yaw, colour))
+        self._circles.append((centre[0], centre[1], math.hypot(size[0], size[1]) / 2))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
         self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
@@ -123,11 +126,7 @@ class Scenery:
         """Whether anything that stands may be within reach of a point [m]."""
         if self._obstacles is not None and self._obstacles.near(x, y, reach):
             return True
-        for building in self.buildings:
-            bound = reach + math.hypot(building.size[0], building.size[1]) / 2
-            if math.hypot(building.centre[0] - x, building.centre[1] - y) <= bound:
-                return True
-        return False
+        return any([(bx - x) ** 2 + (by - y) ** 2 <= (reach + radius) ** 2 for bx, by, radius in self._circles])
 
     def _add_static(self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str) -> None:
         here = {"physicsClientId": self._client}
