@@ -8,6 +8,7 @@ from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Motion
+from eidrive_scenario.storyboard.trajectory import Layout
 from eidrive_scenario.world.view import WorldView
 
 STANDSTILL = 1e-3
@@ -44,6 +45,8 @@ class Actor:
         self.lateral = self.longitudinal = any(is_ours(controller) for controller in controllers)
         """Whether its own controller is active in the domain."""
         self.goal: Goal | None = None
+        self.trajectory: Layout | None = None
+        """What it is following."""
         self.trailer: str | None = None
         """What it draws."""
         self.traveled = 0.0

@@ -9,6 +9,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.trajectory import Layout
 
 Box = tuple[float, float, float, float, float, float, float]
 """x y z of the centre, length, width, height [m], yaw [rad]"""
@@ -63,7 +64,7 @@ def distance(
 
     Longitudinal distances are positive ahead, lateral ones to the left, both as `a` looks; free space is at least 0 in
     amount, and 0 where the two overlap along that axis. In the frames of lane and road the algorithm says which way of
-    several is measured.
+    several is measured. In that of the trajectory `a` looks along the one that it follows; without one ahead.
     """
     if kind == "euclidianDistance":
         return _straight(stage, a, b, freespace)
@@ -104,9 +105,21 @@ def _offsets(
         return found[0] * sign, found[1] * sign
     if frame == "world":
         return there.x - here.x, there.y - here.y
+    trajectory = stage.actors[a].trajectory if frame == "trajectory" else None
+    if trajectory is not None:
+        return _along(trajectory, here, there)
     dx, dy = there.x - here.x, there.y - here.y
     cos, sin = math.cos(here.h), math.sin(here.h)
     return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def _along(trajectory: Layout, here: Pose, there: Pose) -> tuple[float, float]:
+    """How much further along a trajectory and to its left a place is; the shorter way round on a closed one."""
+    (s, t), (other_s, other_t) = (trajectory.beside(pose.x, pose.y) for pose in (here, there))
+    along = other_s - s
+    if trajectory.closed and trajectory.length > 0.0:
+        along = math.remainder(along, trajectory.length)
+    return along, other_t - t
 
 
 def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value: float) -> float:

@@ -6,9 +6,11 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
@@ -99,6 +101,36 @@ class Layout:
             speeds.append(speed)
             speed = 2.0 * mean - speed
         return (*speeds, speed)
+
+    def beside(self, x: float, y: float) -> tuple[float, float]:
+        """Arc length of the place that is nearest to a point, and how far to the left of it the point lies [m].
+
+        An open trajectory goes straight on beyond its ends.
+        """
+        corners, ways, lengths = self._stretches
+        to = np.array([x, y]) - corners
+        along = np.einsum("ni,ni->n", to, ways)
+        held = np.clip(along, 0.0, lengths)
+        if not self.closed:
+            held[0], held[-1] = min(along[0], held[0]), max(along[-1], held[-1])
+        apart = to - held[:, None] * ways
+        nearest = int(np.argmin(np.einsum("ni,ni->n", apart, apart)))
+        (ahead, left), (dx, dy) = ways[nearest].tolist(), to[nearest].tolist()
+        return self.s[nearest] + float(held[nearest]), ahead * dy - left * dx
+
+    @cached_property
+    def _stretches(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """The straight pieces between points: (N, 2) where they begin, (N, 2) unit vectors along, (N,) lengths [m]."""
+        points = np.array([(pose.x, pose.y) for pose in self.poses])
+        ways = np.diff(points, axis=0)
+        lengths = np.hypot(ways[:, 0], ways[:, 1])
+        headings = np.array([pose.h for pose in self.poses[:-1]])
+        standing = lengths < 1e-9
+        ways[standing] = np.stack([np.cos(headings), np.sin(headings)], axis=1)[standing]
+        lengths[standing] = 1.0
+        units = ways / lengths[:, None]
+        lengths[standing] = 0.0
+        return points[:-1], units, lengths
 
     @staticmethod
     def _between(grid: Sequence[float], value: float) -> tuple[int, float]:

@@ -67,6 +67,33 @@ def test_distances_and_what_comes_of_them(scene: Any, condition: str, time: floa
     assert first(scene(6, ("Ego", NOTHING, of(condition)))) == pytest.approx(time)
 
 
+TURN = """<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="turn" closed="false">
+  <Shape><Polyline><Vertex><Position><WorldPosition x="100" y="-2"/></Position></Vertex>
+  <Vertex><Position><WorldPosition x="110" y="-2"/></Position></Vertex>
+  <Vertex><Position><WorldPosition x="110" y="28"/></Position></Vertex></Polyline></Shape></Trajectory></TrajectoryRef>
+  <TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction>
+  </RoutingAction></PrivateAction>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "time"),
+    [("longitudinal", 11, 1.0), ("longitudinal", 1, 1.5), ("lateral", 3.5, 0.1), ("lateral", 2.5, None)],
+)
+def test_distances_along_the_trajectory_that_is_followed(
+    scene: Any, kind: str, value: float, time: float | None
+) -> None:
+    """To a place 20 m behind the corner and 3 m to the left: 30 m at first, by 2 m in each tenth of a second less.
+
+    Before the action begins it lies 7 m ahead and 20 m to the left.
+    """
+    condition = of(
+        f'<DistanceCondition value="{value}" rule="lessThan" freespace="false" relativeDistanceType="{kind}" '
+        'coordinateSystem="trajectory"><Position><WorldPosition x="107" y="18"/></Position></DistanceCondition>'
+    )
+    played = scene(1.9, ("Ego", NOTHING, condition), ("Ego", TURN), edge="rising")
+    assert first(played) == (None if time is None else pytest.approx(time))
+
+
 @pytest.mark.element("AccelerationCondition", "StandStillCondition", "SpeedCondition", "RelativeSpeedCondition")
 @pytest.mark.parametrize(
     ("condition", "time"),

@@ -42,6 +42,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._pursuit: Pursuit | None = None
         self._run: Tracker | None = None
         self._trajectory = self._found()
+        self._followed: Layout | None = None
 
     @property
     def controls(self) -> Domain:
@@ -53,6 +54,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)
         if self._timing is not None and self._layout.times is None:
             raise self.problem("has a Timing, but the trajectory has no times", "give each vertex a time, or say None")
+        self.actor.trajectory = self._followed = self._layout
         self._s = self.action.initial_distance_offset or 0.0
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
         self._started = self.stage.time
@@ -72,6 +74,12 @@ class FollowTrajectoryAction(ActionBehaviour):
         if self._timing is not None:
             top, faster, slower = self.actor.limits()
             self._run = Tracker(self._s, motion.speed, up=faster, down=slower, lowest=0.0, highest=top)
+
+    def terminate(self, new_status: Status) -> None:
+        """Nothing measures along a trajectory that nobody follows any more."""
+        if self._followed is not None and self.actor.trajectory is self._followed:
+            self.actor.trajectory = None
+        self._followed = None
 
     def update(self) -> Status:
         """The pose at the end of the step."""

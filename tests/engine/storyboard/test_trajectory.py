@@ -50,6 +50,20 @@ def test_a_closed_polyline_comes_back_to_its_start() -> None:
     assert way.at(14.0)[:2] == pytest.approx((2.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    ("point", "place"),
+    [((1, 1), (1, 1)), ((2, 3), (6, 1)), ((4, 2), (5, -1)), ((-2, 1), (-2, 1)), ((2.5, 9), (12, 0.5))],
+)
+def test_a_point_is_seen_beside_its_nearest_place(point: tuple[float, float], place: tuple[float, float]) -> None:
+    way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
+    assert way.beside(*point) == pytest.approx(place)
+
+
+def test_beside_a_closed_polyline_there_is_no_beyond() -> None:
+    way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
+    assert way.beside(-1, 0)[0] in (0.0, pytest.approx(12.0))
+
+
 @pytest.mark.element("Timing")
 def test_times_are_kept_at_the_corners_at_constant_speed_between() -> None:
     way = polyline((0, 0, 1.0, None), (10, 0, 3.0, None), (10, 30, 5.0, None))
