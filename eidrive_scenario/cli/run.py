@@ -47,8 +47,8 @@ def run(
     ] = None,
     dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
     time_limit: Annotated[float, typer.Option(help="Longest simulated time, in seconds.")] = 120.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for recording.mcap and result.json.")] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Leave out recording.mcap.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for recording.mcap, pictures and result.json.")] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Leave out recording.mcap and pictures.")] = False,
     csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
     log: Annotated[
         str | None, typer.Option(metavar="FILE|-", help="File for what the storyboard does, and why; -: print it.")

@@ -20,6 +20,7 @@ from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
@@ -66,6 +67,8 @@ class Stations:
         """What the traffic lights show, by their ids."""
         self.links: tuple[LinkEvent, ...] = ()
         """What became of the messages that were said in the last tick."""
+        self.readings: Mapping[str, Readings] = {}
+        """What the sensors of each station gave in the last tick."""
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
         self._lookouts: dict[str, SignalLookout] = {}
@@ -81,6 +84,10 @@ class Stations:
     def drivers(self) -> frozenset[str]:
         """The stations that move by their own pedals and steering."""
         return frozenset(name for name, agent in self._agents.items() if agent.controller is not None)
+
+    def detector(self, name: str) -> Detector:
+        """Of a station. Raises KeyError if it is not in the world."""
+        return self._agents[name].perception.detector
 
     def join(self, spec: ActorSpec) -> None:
         """An actor has entered the world; it becomes a station if it has a controller of ours."""
@@ -118,6 +125,7 @@ class Stations:
 
     def act(self, world: World, view: WorldView) -> dict[str, AgentStep]:
         """Sensors read, messages that have arrived are heard, every agent acts."""
+        self.readings = {}
         if not self._agents:
             return {}
         if self._channel is not None:
@@ -126,6 +134,7 @@ class Stations:
         for name, lookout in self._lookouts.items():
             seen = lookout.read(world, view, view.row(name), self.signals)
             readings[name] = replace(readings[name], signals=seen)
+        self.readings = readings
         now = view.time
         for name, agent in self._agents.items():
             agent.message_interval = 0.0 if self._channel is None else self._channel.interval(name)

@@ -1,4 +1,4 @@
-"""One run that leaves files behind: its recording, its result, its table of motions."""
+"""One run that leaves files behind: its recording, its pictures, its result, its table of motions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
-from eidrive_scenario.recording import CsvWriter, Explanation, Recorder, RunLog
+from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
 
-RECORDING, RESULT, TABLE = "recording.mcap", "result.json", "motion.csv"
+RECORDING, RESULT, TABLE, PICTURES = "recording.mcap", "result.json", "motion.csv", "pictures"
 """Names of the files in a run's folder."""
 
 
@@ -34,7 +34,7 @@ def play(
 ) -> RunResult:
     """Run a scenario, given by path or library name, or one run out of a parameter value distribution.
 
-    out     folder for `recording.mcap` (unless `record` is False) and `result.json`
+    out     folder for `result.json` and, unless `record` is False, `recording.mcap` and the cameras' `pictures`
     csv     file for one row per actor and tick
     log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
     explanations  what shall be explained afterwards; they look on
@@ -52,6 +52,9 @@ def play(
         path = resolve_scenario(source)
     scenario = load_for_seed(path, seed, settings.parameters)
     observers: list[Observer] = [*explanations]
+    pictures = CameraPictures(out / PICTURES) if out is not None and record else None
+    if pictures is not None:
+        observers.append(pictures)
     with ExitStack() as stack:
         if log is not None:
             observers.append(RunLog(log))
@@ -69,6 +72,8 @@ def play(
         with simulation:
             for explanation in explanations:
                 explanation.watch(simulation.storyboard)
+            if pictures is not None:
+                pictures.watch(simulation.stations)
             result = simulation.run()
     result = replace(result, run=number)
     if out is not None:

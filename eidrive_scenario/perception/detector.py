@@ -5,9 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.learned.image_network import ImageDetections
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
@@ -45,6 +47,8 @@ class Detector(ABC):
     line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
     """What the property `detector_settings` may say; nothing where None."""
+    pictures: Mapping[str, ImageDetections] = MappingProxyType({})
+    """What it found in the last picture of each camera, if it looks at pictures: they are kept with the boxes."""
 
     def install(self, installation: Installation) -> None:  # noqa: B027 - a hook that most do not need
         """Learn where it works, before the first reading."""

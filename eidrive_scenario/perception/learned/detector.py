@@ -84,8 +84,7 @@ class LearnedDetector(Detector):
 
     def __init__(self, settings: LearnedSettings | None = None) -> None:
         self.settings = settings or LearnedSettings()
-        self.pictures: dict[str, ImageDetections] = {}
-        """What was found in the last picture of each camera."""
+        self.pictures: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
         self._network = build_network(self.network, self.settings)
         self.sees_signals = signal_kinds(self._network.classes)
