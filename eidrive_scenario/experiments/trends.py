@@ -41,12 +41,16 @@ TRUCK = (8.5, 2.5, 3.3)
 
 @dataclass(frozen=True)
 class Curve:
-    """One measured line and what it should be: `x` (N,), `measured` (N,), `expected` (N,)."""
+    """One measured line and what it should be: `x` (N,), `measured` (N,), `expected` (N,).
+
+    chance  (N,) how far 95 % of the measured shares lie off the expected ones at most, where they are shares of draws
+    """
 
     label: str
     x: Array
     measured: Array
     expected: Array
+    chance: Array | None = None
 
 
 def largest_shift(iou: float, length: float = CAR[0]) -> float:
@@ -123,7 +127,8 @@ def reception_by_distance(distances: Sequence[float], *, truck: bool, messages: 
         measured.append(kept / messages)
     at = np.array(distances)
     label = "the firetruck in between" if truck else "nothing in between"
-    return Curve(label, at, np.array(measured), _expected_reception(at, profile, truck))
+    expected = _expected_reception(at, profile, truck)
+    return Curve(label, at, np.array(measured), expected, 1.96 * np.sqrt(expected * (1.0 - expected) / messages))
 
 
 def _seen_in_the_world(places: dict[str, tuple[float, float, float]], truck: bool) -> SightLines:

@@ -59,7 +59,7 @@ def reception_picture() -> Figure:
     axes.minorticks_off()
     axes.set_xlabel("distance between the antennas, 1.5 m high [m]")
     axes.set_ylabel("packet reception ratio")
-    axes.set_title("IEEE 802.11p, TR 37.885 highway, 350 bytes")
+    axes.set_title("IEEE 802.11p, TR 37.885 highway, 350 bytes; 300 messages at each distance")
     axes.legend(fontsize=8)
     return figure
 
@@ -80,6 +80,9 @@ def age_picture() -> Figure:
 def _draw(axes: Axes, curves: Sequence[Curve]) -> None:
     for colour, curve in zip(COLOURS, curves, strict=False):
         axes.plot(curve.x, curve.expected, "--", lw=1.2, color=colour, label=f"{curve.label}, expected")
+        if curve.chance is not None:
+            low, high = curve.expected - curve.chance, curve.expected + curve.chance
+            axes.fill_between(curve.x, low, high, color=colour, alpha=0.15, lw=0, label="  95 % of all samples")
         axes.plot(curve.x, curve.measured, "o", ms=4, color=colour, label=f"{curve.label}, measured")
         off = float(np.max(np.abs(curve.measured - curve.expected)))
         axes.plot([], [], " ", label=f"  largest difference {off:.3f}")
