@@ -27,7 +27,8 @@ DROPS_STAY = 2.0
 class Camera:
     """A camera with square pixels, its principal point in the middle of the picture.
 
-    Its noise and the drops before its lens are drawn by seed, station, name and tick.
+    Its noise and the drops before its lens are drawn by seed, station, name and tick. On a mast it does not see the mast,
+    which throws its shadow all the same.
     """
 
     def __init__(self, settings: CameraSettings, spec: ActorSpec, name: str = "camera", seed: int = 0) -> None:
@@ -35,6 +36,7 @@ class Camera:
         self.name = name
         self.mounting = mounting(settings, spec, "front")
         self._photographer = Photographer(settings)
+        self._unseen = (spec.name,) if spec.wheelbase <= 0.0 else ()
         self._key = (seed, "camera", spec.name, name)
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
@@ -45,6 +47,7 @@ class Camera:
             self.mounting.camera_pose(view, row),
             generator(seed, *key, view.tick),
             ignore=view.unseen_by.get(self.name, ()),
+            ignore=self._unseen,
             velocity=view.velocity[row],
             lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
         )

@@ -105,3 +105,13 @@ def test_an_actor_may_be_hidden_from_some_sensors_by_their_names(world: World) -
     world.show({}, {"Truck": Appearance(visibility=Visibility(sensors=False, named={"eyes": True}))})
     assert names(Rig(spec("Ego"), {"eyes": TruthSettings()}), world) == {"Truck", "Beside"}
     assert names(Rig(spec("Ego"), {"truth": TruthSettings()}), world) == {"Hidden", "Beside"}
+
+
+def test_a_camera_on_a_mast_does_not_see_the_mast(world: World) -> None:
+    """It sits inside the mast's top, of which nothing may hang in the picture; the truck before it is there."""
+    mast = ActorSpec("RSU", "rsu", "misc", (0.5, 0.5, 4.0), (0.0, 0.0, 2.0))
+    world.add(mast, Placement(5.0, 6.0, yaw=-0.5))
+    reading = Rig(mast, {"camera": CameraSettings(width=160, height=120)}).read(world, world.view()).cameras["camera"]
+    rows = world.view().rows
+    assert rows["Truck"] in reading.segmentation
+    assert rows["RSU"] not in reading.segmentation
