@@ -27,7 +27,7 @@ DROPS_STAY = 2.0
 class Camera:
     """A camera with square pixels, its principal point in the middle of the picture.
 
-    Its noise and the drops before its lens are drawn by seed, station, name and tick. On a mast it does not see the mast,
+    Its noise and the drops before its lens are drawn by seed, station, name and tick. On a mast it does not see that,
     which throws its shadow all the same.
     """
 
@@ -46,8 +46,7 @@ class Camera:
             scene,
             self.mounting.camera_pose(view, row),
             generator(seed, *key, view.tick),
-            ignore=view.unseen_by.get(self.name, ()),
-            ignore=self._unseen,
+            ignore=(*view.unseen_by.get(self.name, ()), *self._unseen),
             velocity=view.velocity[row],
             lens=generator(seed, *key, "lens", int(view.time / DROPS_STAY)),
         )
