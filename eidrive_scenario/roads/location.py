@@ -36,7 +36,7 @@ class Pose(NamedTuple):
         Pitch and roll follow: what climbs in one direction descends in the other.
         """
         if self.p == 0.0 and self.r == 0.0:
-            return self._replace(h=self.h + angle)
+            return Pose(self.x, self.y, self.z, self.h + angle, self.p, self.r)
         ca, sa = math.cos(angle), math.sin(angle)
         cp, sp, cr, sr = math.cos(self.p), math.sin(self.p), math.cos(self.r), math.sin(self.r)
         # Columns of Ry(p)·Rx(r)·Rz(angle): forward and the vertical parts of left and up.

@@ -39,10 +39,13 @@ class Actor:
     ) -> None:
         self.name = name
         self.entity = entity
-        self.controllers = list(controllers)
+        self._controllers: tuple[model.Controller, ...] = ()
+        self._has_ours = False
         self.motion = Motion(roads)
         self.present = False
-        self.lateral = self.longitudinal = any(is_ours(controller) for controller in controllers)
+        for controller in controllers:
+            self.assign(controller)
+        self.lateral = self.longitudinal = self._has_ours
         """Whether its own controller is active in the domain."""
         self.goal: Goal | None = None
         self.trajectory: Layout | None = None
@@ -59,9 +62,19 @@ class Actor:
         self._found_at = -1
 
     @property
+    def controllers(self) -> tuple[model.Controller, ...]:
+        """Those that were assigned to it."""
+        return self._controllers
+
+    def assign(self, controller: model.Controller) -> None:
+        """Give it one more controller."""
+        self._controllers = (*self._controllers, controller)
+        self._has_ours = self._has_ours or is_ours(controller)
+
+    @property
     def driven(self) -> bool:
         """True where its own controller drives it."""
-        return self.lateral and self.longitudinal and any(is_ours(controller) for controller in self.controllers)
+        return self.lateral and self.longitudinal and self._has_ours
 
     @property
     def drives(self) -> bool:
@@ -77,8 +90,8 @@ class Actor:
 
     def observe(self, view: WorldView, row: int) -> None:
         """Keep the histories up to date with a new view."""
-        x, y = float(view.position[row, 0]), float(view.position[row, 1])
-        speed = float(view.speed[row])
+        state = view.states[row]
+        x, y, speed = state.x, state.y, state.speed
         if self._last is not None and not self.motion.jumped:
             self.traveled += math.hypot(x - self._last[0], y - self._last[1])
         self._last = (x, y)
@@ -110,5 +123,4 @@ class Actor:
 
 def pose_of(view: WorldView, row: int) -> Pose:
     """The pose of one row of a view."""
-    x, y, z = view.position[row].tolist()
-    return Pose(x, y, z, float(view.yaw[row]), float(view.pitch[row]), float(view.roll[row]))
+    return Pose(*view.states[row][:6])

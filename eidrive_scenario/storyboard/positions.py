@@ -17,6 +17,8 @@ from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.trajectory import lay_out
 
+FIXED = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
+"""Positions that mean the same place all the time."""
 CARLA = "CARLA:"
 """How the description of a scenario in CARLA's axes begins."""
 
@@ -27,8 +29,14 @@ def resolve(position: model.Position, stage: Stage, actor: str | None = None) ->
     Raises ScenarioError if the road network does not have it, Absent if it refers to an entity that is not in the
     world.
     """
+    held = stage.fixed_places.get(id(position))
+    if held is not None and held[0] is position:
+        return held[1]
     frame = position.chosen()
-    return FRAMES[type(frame)](frame, stage, actor)
+    place = FRAMES[type(frame)](frame, stage, actor)
+    if isinstance(frame, FIXED):
+        stage.fixed_places[id(position)] = (position, place)
+    return place
 
 
 def references(position: model.Position) -> tuple[str, ...]:

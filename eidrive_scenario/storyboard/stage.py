@@ -113,6 +113,8 @@ class Stage:
         )
         self.arriving = False
         """Whether the step that goes on brings an action to its goal."""
+        self.fixed_places: dict[int, tuple[model.Position, Place]] = {}
+        """What positions mean that do not move, by `id` of the position."""
         self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
 
     @property
@@ -151,7 +153,7 @@ class Stage:
     def speed(self, name: str) -> float:
         """Speed along the heading in this view [m/s]; of what was just placed, the speed that it was given."""
         row = self.view.rows.get(name)
-        return float(self.view.speed[row]) if row is not None else self.actors[name].motion.speed
+        return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
 
     def _centre(self, name: str) -> Centre | None:
         """Where an entity is and moves, for the traffic around it; None while it is not in the world."""
@@ -162,8 +164,8 @@ class Stage:
         if row is None:
             pose = actor.motion.pose
             return Centre(pose.x, pose.y, pose.h, actor.motion.speed)
-        x, y, _ = self.view.position[row].tolist()
-        return Centre(x, y, float(self.view.yaw[row]), float(self.view.speed[row]))
+        state = self.view.states[row]
+        return Centre(state.x, state.y, state.yaw, state.speed)
 
     def enter(self, name: str, place: Place) -> None:
         """Put an actor at a place; it enters the world if it was not there."""

@@ -22,6 +22,8 @@ def declared_trailer(entity: model.Element) -> str | None:
 def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
     """Drawing and drawn actors, from the front of each train to its end."""
     drawn = {actor.trailer for actor in actors.values() if actor.trailer is not None}
+    if not drawn:
+        return
     for name, front in actors.items():
         actor = front
         while name not in drawn and actor.trailer is not None and actor.trailer in actors:

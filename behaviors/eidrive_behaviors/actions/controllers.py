@@ -79,7 +79,7 @@ class AssignControllerAction(ActionBehaviour):
     def update(self) -> Status:
         """Assign it; domains in which it is activated are no longer those of a controller of ours."""
         if self._controller is not None and self._controller not in self.actor.controllers:
-            self.actor.controllers.append(self._controller)
+            self.actor.assign(self._controller)
         switch(self, *_left_to_ours(self.action.activate_lateral, self.action.activate_longitudinal))
         return Status.SUCCESS
 

@@ -42,6 +42,7 @@ def view_of(placements: Any, tick: Any, like: Any) -> Any:
         roll=np.zeros(count),
         velocity=zeros,
         acceleration=zeros,
+        yaw_rate=np.zeros(count),
         speed=np.array([p.speed for p in rows]),
         size=zeros,
         offset=zeros,
