@@ -80,7 +80,9 @@ class Scenery:
         here = {"physicsClientId": self._client}
         if self.level or self.roads is None:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
-            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
+            # Without a shape to show, pybullet loads a textured plane from a file, which takes 7 ms.
+            shown = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=0.01, **here)
+            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND, shown)
             return True
         for mesh in surface_meshes(self.roads, 4.0):
             if mesh.kind.startswith("marking"):
@@ -128,10 +130,13 @@ class Scenery:
             return True
         return any([(bx - x) ** 2 + (by - y) ** 2 <= (reach + radius) ** 2 for bx, by, radius in self._circles])
 
-    def _add_static(self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str) -> None:
+    def _add_static(
+        self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1
+    ) -> None:
         here = {"physicsClientId": self._client}
+        turn = quaternion(yaw, 0.0, 0.0)
         handle = bullet.createMultiBody(
-            0.0, shape, basePosition=at, baseOrientation=quaternion(yaw, 0.0, 0.0), useMaximalCoordinates=1, **here
+            0.0, shape, shown, basePosition=at, baseOrientation=turn, useMaximalCoordinates=1, **here
         )
         bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
         bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
