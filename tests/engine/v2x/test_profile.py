@@ -37,13 +37,15 @@ def test_every_profile_of_the_library_makes_a_channel() -> None:
             assert profile.name == name
             assert profile.description
             assert isinstance(channel, RadioChannel if profile.model == "radio" else ComposedChannel)
-            assert channel.own_perception == name.startswith("paper_")
+            assert channel.own_perception == name.startswith("paper")
 
 
 def test_the_paper_s_settings() -> None:
     assert composed("latency_300ms").delay == ConstantDelay(seconds=0.3)
     assert composed("latency_300ms").loss == NoLoss()
     assert composed("error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="link")
+    both, late, lossy = composed("paper"), composed("paper_latency_300ms"), composed("paper_error_30pct")
+    assert (both.delay, both.loss) == (late.delay, lossy.loss)
     assert composed("paper_error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="frame")
 
 
