@@ -70,6 +70,7 @@ class BackgroundTraffic:
         self._started: dict[str, int] = {}
         self._foreign = np.empty((0, 7))
         self._changes = Changes()
+        self._begun = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -88,6 +89,7 @@ class BackgroundTraffic:
     def start(self, instance: Instance) -> None:
         """An instance begins; it works from the next step on."""
         self.instances.append(instance)
+        self._begun = True
 
     def stop(self, name: str | None) -> None:
         """End all instances of this name, or all: nothing comes and goes by them any more; their cars drive on."""
@@ -96,22 +98,28 @@ class BackgroundTraffic:
                 instance.active = False
 
     def step(self, view: WorldView, dt: float) -> Changes:
-        """Let the instances bring in and take out cars at this instant, and all cars drive on by dt."""
-        self.time, self.dt = view.time, dt
+        """Let the instances bring in and take out cars as often as drivers decide, and all cars drive on by dt."""
+        self.time, self.dt = view.time, self.fleet.interval(dt)
         changes = self._changes = Changes()
         if self.instances or len(self.fleet):
-            growing = any(instance.wants(self) for instance in self.instances)
-            self.fleet.observe(view, everywhere=growing)
-            if growing:
-                rows = [row for row, name in enumerate(view.names) if name not in self.fleet]
-                self._foreign = view.boxes[rows]
-            for instance in self.instances:
-                instance.step(self)
-            self.instances = [instance for instance in self.instances if instance.active]
+            if self._begun or self.fleet.decides:
+                self._work(view)
             changes.placements = self.fleet.step(None, dt)
             for name in self.fleet.departed:
                 self._forget(name)
         return changes
+
+    def _work(self, view: WorldView) -> None:
+        """Look where the others are; let the instances bring in and take out cars."""
+        self._begun = False
+        growing = any(instance.wants(self) for instance in self.instances)
+        self.fleet.observe(view, everywhere=growing)
+        if growing:
+            rows = [row for row, name in enumerate(view.names) if name not in self.fleet]
+            self._foreign = view.boxes[rows]
+        for instance in self.instances:
+            instance.step(self)
+        self.instances = [instance for instance in self.instances if instance.active]
 
     def positions(self, names: list[str]) -> tuple[Array, Array]:
         """x and y of cars [m]."""

@@ -30,7 +30,7 @@ def _integers() -> Integers:
 class Cars:
     """Columns (N,) and (N, PLANNED + 1), all of one length.
 
-    progress, speed  along the lane [m], [m/s]
+    progress, speed, acceleration  along the lane [m], [m/s], [m/s²]
     front, rear   from the reference point to the bumpers [m]
     own_speed     desired speed, NaN for the limit [m/s];  factor  of the limit that the car keeps to
     top_speed     what the vehicle can do [m/s]
@@ -46,6 +46,7 @@ class Cars:
 
     progress: Array = field(default_factory=_floats)
     speed: Array = field(default_factory=_floats)
+    acceleration: Array = field(default_factory=_floats)
     front: Array = field(default_factory=_floats)
     rear: Array = field(default_factory=_floats)
     own_speed: Array = field(default_factory=_floats)

@@ -32,6 +32,9 @@ from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
 
+REACT_EACH = 0.05
+"""Drivers look and decide as often; in shorter steps they keep their acceleration in between [s]."""
+
 
 class Fleet:
     """Cars on the lanes of a road network.
@@ -62,10 +65,20 @@ class Fleet:
         self._cars = Cars()
         self._index: dict[str, int] = {}
         self._made = 0
-        self._ticks = 0
+        self._ticks = self._decisions = 0
+        self._until = 0.0
         self._poses: Array | None = None
         self._foreign, self._moving = nobody(), set[int]()
         self._ends = self._ends_of_lanes()
+
+    @property
+    def decides(self) -> bool:
+        """Whether the drivers look around in the next step."""
+        return self._until < 1e-9
+
+    def interval(self, dt: float) -> float:
+        """The time between two decisions in steps of dt [s]."""
+        return max(round(REACT_EACH / dt), 1) * dt
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -169,7 +182,7 @@ class Fleet:
         self._made += 1
         self._index[spec.name] = index
         self._cars.plan[index, 0] = row
-        self._poses = None
+        self._poses, self._until = None, 0.0
         if self.lanes.in_junction[row] and not self.lanes.walkable[row]:
             self._right_of_way.take(self._cars, index)
         self._plans.extend(self._cars, index)
@@ -216,11 +229,26 @@ class Fleet:
         """
         self.departed = frozenset()
         self._ticks += 1
-        if view is not None:
+        decides = self.decides
+        self._until = (self.interval(dt) if decides else self._until) - dt
+        if decides and view is not None:
             self.observe(view, everywhere=False)
         if not len(self):
             return {}
+        if decides:
+            self._decide(dt)
         cars = self._cars
+        covered, cars.speed = ballistic(cars.speed, cars.acceleration, dt)
+        cars.progress = cars.progress + covered / self.lanes.stretch(cars.row, cars.progress)
+        self._changes.advance(cars, covered)
+        self._poses = None
+        self._pass_ends()
+        return self.placements()
+
+    def _decide(self, dt: float) -> None:
+        """Look ahead: who accelerates how, enters which junction, changes which lane."""
+        cars = self._cars
+        self._decisions += 1
         row_lengths = np.where(cars.plan >= 0, self.lanes.length[cars.plan], 0.0)
         begins = np.cumsum(row_lengths, axis=1) - row_lengths - cars.progress[:, None]
         occupants = self.occupants()
@@ -229,14 +257,8 @@ class Fleet:
         self._right_of_way.hand_out(cars, leaders.or_nearer(lights), lights, begins, self._moving, self._ticks * dt)
         desired = self._plans.desired_speeds(cars, begins)
         halted = leaders.or_nearer(lights).or_nearer(self._right_of_way.waits(cars, begins))
-        acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
-        self._change_lanes(dt, leaders, desired, occupants, begins)
-        covered, cars.speed = ballistic(cars.speed, acceleration, dt)
-        cars.progress = cars.progress + covered / self.lanes.stretch(cars.row, cars.progress)
-        self._changes.advance(cars, covered)
-        self._poses = None
-        self._pass_ends()
-        return self.placements()
+        cars.acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
+        self._change_lanes(self.interval(dt), leaders, desired, occupants, begins)
 
     def occupants(self) -> Occupants:
         """Everything on the lanes: the fleet, also on the lanes that its cars are leaving, others, lanes' ends."""
@@ -271,11 +293,13 @@ class Fleet:
             leaders = Leaders(gap, speed)
         return Leaders(leaders.gap * self.lanes.stretch(cars.row, cars.progress), leaders.speed)
 
-    def _change_lanes(self, dt: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array) -> None:
+    def _change_lanes(
+        self, interval: float, leaders: Leaders, desired: Array, occupants: Occupants, begins: Array
+    ) -> None:
         """Let the drivers whose turn it is think of another lane."""
         cars = self._cars
-        every = max(round(DECIDE_EACH / dt), 1)
-        who = np.flatnonzero(cars.number % every == self._ticks % every)
+        every = max(round(DECIDE_EACH / interval), 1)
+        who = np.flatnonzero(cars.number % every == self._decisions % every)
         if not who.size:
             return
         junction = (cars.plan >= 0) & self.lanes.in_junction[cars.plan]
