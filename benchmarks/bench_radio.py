@@ -88,13 +88,16 @@ def main() -> None:
     for technology in (given.technology,) if given.technology else ("80211p", "cv2x_mode4"):
         for look in (False, True):
             wall, channel = run(given.stations, given.seconds, technology, look)
+            begin = time.process_time()
             books = channel.statistics(given.seconds).values()
+            reading = time.process_time() - begin
             sent, received = sum(book.sent for book in books), sum(book.received for book in books)
             what = "with an event for each fate" if look else "messages and books only"
             aim = "" if look else "   (aim: above 1)"
             print(f"  {technology:11} {what:28} {given.seconds / wall:6.2f} times real time{aim}")
         busy = np.mean([channel.busy_ratio(f"{row:03d}") or 0.0 for row in range(given.stations)])
         print(f"  {technology:11} {sent} fates, {100 * received / sent:.1f} % heard, busy ratio {busy:.3f}")
+        print(f"  {technology:11} to read the books of {len(books)} links at the end takes {reading:.2f} s, once")
         if given.profile:
             profile = cProfile.Profile()
             profile.runcall(run, given.stations, given.seconds, technology, False)

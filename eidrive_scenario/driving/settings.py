@@ -127,8 +127,8 @@ class AgentSettings(Settings):
     cooperates_with senders whose messages count; None is all
     message_rate    how often the station sends what it sees, None is each tick
     report_timeout  a report older than this is forgotten. Where it is not given: 1 s for a list of all that its sender
-                    sees; 1.5 s for what is told by the rules of ETSI, which repeat what stands still once a second
-                    (T_GenCpmMax, T_GenCamMax), so that a message may be half a second late
+                    sees; 1.5 s for CAMs and for CPMs by the rules of ETSI, which repeat what stands still once a second
+                    (T_GenCamMax, T_GenCpmMax), so that a message may be half a second late
     antenna_height  over the reference point; None is the roof
     messages        what it sends: `cpm` (the objects that it perceives), `cam` (itself)
     generation      `each_tick`, `rate` (message_rate), or `etsi`: by the triggers of EN 302 637-2 and TS 103 324; None
