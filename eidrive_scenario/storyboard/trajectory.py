@@ -243,8 +243,10 @@ def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     """Points of a rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4).
 
-    The time of a control point holds where its basis function is largest (of as many even steps of the parameter as
-    the control polygon has metres, the last one before that); between, the parameter grows evenly with time.
+    The curve passes through its first and last control points only, and the standard does not say where on it the time
+    of another one holds. As in esmini (its NurbsShape) that is where its basis function is largest, on as many even
+    steps of the parameter as the control polygon has metres; between, the parameter grows evenly with time. Which of
+    the two steps around the peak counts its traces alone tell: the one before.
     """
     knots = [knot.value for knot in shape.knot]
     control = [(resolve(p.position), p.weight if p.weight is not None else 1.0, p.time) for p in shape.control_point]

@@ -25,6 +25,7 @@ NAMED: Mapping[str, tuple[float, float, float]] = {
 """Red, green, blue of the standard's ColorType."""
 
 MOTION = "motion"
+TINY = 1e-6
 
 
 class VisibilityAction(ActionBehaviour):
@@ -66,6 +67,7 @@ class LightStateAction(ActionBehaviour):
     """
 
     domains = Domain.LIGHTING
+    immediate = True
     action: model.LightStateAction
 
     @property
@@ -88,12 +90,11 @@ class LightStateAction(ActionBehaviour):
         )
         before = stage.appearance(name)
         stage.look(name, replace(before, lights={**before.lights, self._light: light}))
-        self._left = light.fade
+        self._until = light.since + light.fade
 
     def update(self) -> Status:
         """Wait for the transition's end."""
-        self._left -= self.stage.dt
-        over = self._left < 1e-6 and self._mode != model.LightMode.FLASHING.value
+        over = self.stage.time > self._until - TINY and self._mode != model.LightMode.FLASHING.value
         return Status.SUCCESS if over else Status.RUNNING
 
     @property
@@ -121,6 +122,7 @@ class AnimationAction(ActionBehaviour):
     """
 
     domains = Domain.ANIMATION
+    immediate = True
     action: model.AnimationAction
 
     @property
@@ -144,12 +146,11 @@ class AnimationAction(ActionBehaviour):
         )
         before = stage.appearance(name)
         stage.look(name, replace(before, animations={**before.animations, self.resource: animation}))
-        self._left = math.inf if animation.loop else animation.duration or 0.0
+        self._until = math.inf if animation.loop else animation.since + (animation.duration or 0.0)
 
     def update(self) -> Status:
         """Wait for its end."""
-        self._left -= self.stage.dt
-        return Status.SUCCESS if self._left < 1e-6 else Status.RUNNING
+        return Status.SUCCESS if self.stage.time > self._until - TINY else Status.RUNNING
 
     def _kind_and_what(self) -> tuple[str, str]:
         kind = self.action.animation_type
