@@ -37,9 +37,12 @@ class Detections:
         count = len(self.boxes)
         if self.boxes.shape != (count, 7):
             raise ValueError(f"boxes have shape {self.boxes.shape}, expected (N, 7)")
-        for name, shape in (("scores", (count,)), ("velocity", (count, 2)), ("covariance", (count, 2, 2))):
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name} has shape {getattr(self, name).shape}, expected {shape}")
+        if self.scores.shape != (count,):
+            raise ValueError(f"scores has shape {self.scores.shape}, expected {(count,)}")
+        if self.velocity.shape != (count, 2):
+            raise ValueError(f"velocity has shape {self.velocity.shape}, expected {(count, 2)}")
+        if self.covariance.shape != (count, 2, 2):
+            raise ValueError(f"covariance has shape {self.covariance.shape}, expected {(count, 2, 2)}")
         if len(self.classes) != count:
             raise ValueError(f"{len(self.classes)} classes for {count} boxes")
         if self.tracks and len(self.tracks) != count:

@@ -99,14 +99,17 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
     The heading turns evenly from one segment's middle to the next one's, so that the steering does not jump.
     """
     best, nearest, place = 0, math.inf, 0.0
-    for index in range(len(points) - 1):
-        (x0, y0), (x1, y1) = points[index], points[index + 1]
+    x0, y0 = points[0]
+    for index, (x1, y1) in enumerate(points[1:]):
         dx, dy = x1 - x0, y1 - y0
-        share = ((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy)
-        held = min(max(share, 0.0), 1.0)
-        distance = math.hypot(x - x0 - held * dx, y - y0 - held * dy)
-        if distance < nearest - 1e-9:
-            best, nearest, place = index, distance, held
+        ax, ay = x - x0, y - y0
+        share = (ax * dx + ay * dy) / (dx * dx + dy * dy)
+        held = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+        ax, ay = ax - held * dx, ay - held * dy
+        gap = ax * ax + ay * ay
+        if gap < nearest:
+            best, nearest, place = index, gap - 2e-9 * math.sqrt(gap), held
+        x0, y0 = x1, y1
     heading = _heading(points, best)
     (x0, y0), (x1, y1) = points[best], points[best + 1]
     left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
