@@ -250,6 +250,16 @@ class CurveTable:
         cos, sin = np.cos(h), np.sin(h)
         return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
 
+    def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
+        """Curvature and metres of path per metre of s at s (N,) of lines (N,): `at` without the places."""
+        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        ds = s - self._starts[curve]
+        curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
+        mask = self._kind[curve] == 2
+        if mask.any():
+            _, _, _, curvature[mask], speed[mask] = self._cubics(curve[mask], ds[mask])
+        return curvature, speed
+
     def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
         k, rate = self._curvature[curve], self._rate[curve]
         scale = np.sqrt(np.abs(rate) / np.pi)

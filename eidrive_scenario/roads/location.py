@@ -81,13 +81,13 @@ class LaneKey(NamedTuple):
 
 @dataclass(frozen=True)
 class LaneLocations:
-    """Places in lane coordinates, as arrays of one shape (N,).
+    """Places in lane coordinates, as arrays of one shape (N,). Without a road within reach, only road and lane count.
 
     road      index into `roads`, -1 where no road is within reach
     lane      lane id; 0 where no road is within reach
     s, t      road coordinates [m]; offset  from the lane's centre line, positive in the direction of t [m]
     heading   of the reference line at s [rad]
-    outside   distance from the edge of the road, 0 on the road [m]
+    outside   distance from the edge of the road, 0 on the road [m]; at least `reach` where none is within it
     """
 
     roads: Sequence[str]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +17,8 @@ SPACING = 4.0
 NARROW = 1.0
 """Lanes narrower than this are found by way of their neighbours [m]."""
 CANDIDATES = 12
+MANY = 1000
+"""More points than this are put in order first."""
 REACH = 30.0
 """How far from a road a point may lie to be located on it [m]."""
 
@@ -43,17 +46,31 @@ class Locator:
         solid = z is not None and self._solid is not None
         tree = self._solid if solid and self._solid is not None else self._flat
         points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
-        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1))
+        # What is far from all samples is out of reach of every road.
+        hopeless = np.inf if solid else reach + self._from_samples
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
+        if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
+            return self._located(tree, points, nearest, reach)
+        # Neighbours one after the other: tables are searched faster in order.
+        order = np.flatnonzero(distance < np.inf)
+        order = order[np.argsort(nearest[order])]
+        some = self._located(tree, points[order], nearest[order], reach)
+        found = LaneLocations(self._tables.ids, *_nowhere(len(points)))
+        for entry in fields(found)[1:]:
+            getattr(found, entry.name)[order] = getattr(some, entry.name)
+        return found
+
+    def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
+        """Points (N, 2), or (N, 3) where height counts, by the samples of `tree` that are nearest to them."""
+        x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
         road, s = self._road[nearest], self._s[nearest]
         s, t, beyond = self._refine(road, s, x, y)
         row, outside = self._tables.lane_beside(road, s, t)
         outside = np.hypot(outside, beyond)
-        # What is far from all samples is out of reach of every road: no need to look for the nearest one.
-        hopeless = np.inf if solid else reach + self._from_samples
-        doubtful = np.flatnonzero((outside > 0.0) & (distance <= hopeless))
+        doubtful = np.flatnonzero(outside > 0.0)
         if doubtful.size and len(self._s) > 1:
-            height = z[doubtful] if solid and z is not None else None
-            limit = np.full(len(doubtful), np.inf) if solid else outside[doubtful] + self._from_samples
+            height = None if z is None else z[doubtful]
+            limit = outside[doubtful] + self._from_samples if z is None else np.full(len(doubtful), np.inf)
             best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height, limit)
             road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
         heading = self._tables.curves.at(road, s)[2]
@@ -135,6 +152,12 @@ class Locator:
                 break
         roll = self._tables.superelevation.value(road, s)
         return s, across / np.cos(roll), beyond
+
+
+def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:
+    """The columns of LaneLocations for places that no road is near."""
+    s, t, offset, heading = np.zeros((4, count))
+    return np.full(count, -1), np.zeros(count, dtype=np.int64), s, t, offset, heading, np.full(count, np.inf)
 
 
 def _samples(tables: RoadTables) -> tuple[Integers, Array]:

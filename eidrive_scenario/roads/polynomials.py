@@ -112,8 +112,11 @@ class PolynomialTable:
         self._keys = self.base[owner] + pieces[:, 0]
         self._a, self._b, self._c, self._d = (np.ascontiguousarray(column) for column in pieces[:, 1:].T)
         self._constant = bool(np.all(pieces[:, 2:] == 0.0))
+        self._single = len(pieces) == len(functions)
 
     def _piece(self, function: Integers, s: Array) -> Integers:
+        if self._single:
+            return function
         found: Integers = np.searchsorted(self._keys, self.base[function] + s, side="right") - 1
         return found
 

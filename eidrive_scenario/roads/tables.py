@@ -132,7 +132,7 @@ class RoadTables:
     def stretch(self, row: Integers, s: Array) -> Array:
         """Metres of path per metre of s along lanes' centre lines, in plan view."""
         t, slope = self.lane_t(row, s)
-        _, _, _, curvature, speed = self.curves.at(self.section_road[self.lane_section[row]], s)
+        curvature, speed = self.curves.bend(self.section_road[self.lane_section[row]], s)
         return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), 0.05))
 
     def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:

@@ -150,12 +150,26 @@ def test_points_beside_and_beyond_the_road(road: Text, map_of: Text) -> None:
     found = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
     assert found.found.tolist() == [True, True, True, False]
     assert found.lane.tolist() == [-1, 1, 1, 0]
-    assert found.outside == pytest.approx([0.0, 2.5, 3.0, 86.5])
+    assert found.outside[:3] == pytest.approx([0.0, 2.5, 3.0])
+    assert found.outside[3] > 30.0
+    assert network.locate(50.0, 90.0, reach=100.0).outside == pytest.approx([86.5])
     assert found.offset[:2] == pytest.approx([0.75, 4.25])
     assert found.location(3) is None
     beside = network.locate_at(50.0, 6.0)
     assert beside is not None
     assert not network.on_road(beside)
+
+
+def test_many_points_are_located_as_each_of_them(road: Text, map_of: Text) -> None:
+    """Beyond a thousand they are put in order; what is far from the road has no place on it either way."""
+    network = RoadNetwork.parse(map_of(road(), road("2", y=20.0, hdg=0.4)))
+    rng = np.random.default_rng(7)
+    x, y = rng.uniform(-80.0, 180.0, (2, 1500))
+    many = network.locate(x, y)
+    for n in range(0, 1500, 7):
+        one, other = many.location(n), network.locate(x[n], y[n]).location(0)
+        assert one == (None if other is None else pytest.approx(other))
+    assert 0 < np.count_nonzero(many.found) < 1500
 
 
 def test_a_bridge_is_told_from_the_road_below_by_its_height(road: Text, map_of: Text) -> None:

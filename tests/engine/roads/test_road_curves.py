@@ -100,3 +100,4 @@ def test_the_table_of_many_lines_gives_what_each_line_gives() -> None:
     s = np.concatenate([np.linspace(0, 55, 12), np.linspace(0, 12.5, 6), [0.0, 3.0, 7.0]])
     found = np.column_stack(table.at(index, s))
     assert found == pytest.approx(np.array([lines[i].at(v) for i, v in zip(index, s, strict=True)]), abs=1e-12)
+    assert np.column_stack(table.bend(index, s)) == pytest.approx(found[:, 3:], abs=1e-12)
