@@ -227,8 +227,14 @@ class SingleTrack:
         if demand.throttle > 0.0:
             direction = demand.direction
             ahead = direction * forward
-            drive = demand.throttle * min(self._full_drive, p.power / max(ahead, 0.1))
-            drive = direction * min(drive, max(self._stop * (p.max_speed - ahead) - direction * free, 0.0))
+            drive = self._full_drive
+            if drive * ahead > p.power:
+                drive = p.power / ahead
+            drive *= demand.throttle
+            to_top = self._stop * (p.max_speed - ahead) - direction * free
+            if drive > to_top:
+                drive = max(to_top, 0.0)
+            drive *= direction
             front = _limited(drive * p.drive_front, traction_front)
             rear = _limited(drive * (1.0 - p.drive_front), traction_rear)
         # Brakes and rolling resistance stop the vehicle and hold it; they never push it.
@@ -244,11 +250,10 @@ class SingleTrack:
 def _fiala(slip: float, stiffness: float, largest: float) -> float:
     """Side force of an axle [N] at a tangent of its slip angle, saturating at `largest`, in the slip's direction."""
     used = stiffness * slip / (3.0 * largest)
-    if used >= 1.0:
-        return largest
-    if used <= -1.0:
-        return -largest
-    return largest * used * (3.0 - abs(used) * (3.0 - abs(used)))
+    size = abs(used)
+    if size >= 1.0:
+        return math.copysign(largest, used)
+    return largest * used * (3.0 - size * (3.0 - size))
 
 
 def _left_by(grip: float, along: float) -> float:
