@@ -23,7 +23,7 @@ from eidrive_scenario.perception.learned.lights import LightsOnMap
 from eidrive_scenario.randomness import generator
 from training.light_scenes import LightScene, light_scenes
 
-VERSIONS = 24
+VERSIONS = 12
 """Of each light: moved, of another size, mirrored, coarser, dimmer."""
 EMPTY_PER_PICTURE = 2
 LEAST_HEIGHT = 5.0
@@ -93,16 +93,15 @@ class Network(nn.Module):
         seen = nn.functional.max_pool2d(self.first(parts).relu(), 2)
         seen = nn.functional.max_pool2d(self.second(seen).relu(), 2)
         seen = self.third(seen).relu().flatten(1)
-        return self.last(nn.functional.dropout(seen, 0.3, self.training))
+        logits: Tensor = self.last(nn.functional.dropout(seen, 0.3, self.training))
+        return logits
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """As `LampNetwork` takes them."""
-        layers = (self.first, self.second, self.third, self.last)
-        found = {}
-        for number, layer in enumerate(layers):
-            found[f"w{number}"] = layer.weight.detach().numpy()
-            found[f"b{number}"] = layer.bias.detach().numpy()
-        return found
+        names = ("first", "second", "third", "last")
+        values = {name: value.detach().numpy() for name, value in self.state_dict().items()}
+        kernels = {f"w{number}": values[f"{name}.weight"] for number, name in enumerate(names)}
+        return kernels | {f"b{number}": values[f"{name}.bias"] for number, name in enumerate(names)}
 
 
 def trained(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float = 2e-3) -> Network:
@@ -116,7 +115,7 @@ def trained(data: Samples, seed: int, epochs: int, batch: int = 128, rate: float
     optimizer = torch.optim.AdamW(network.parameters(), rate, weight_decay=1e-2)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps)
     for _ in range(epochs):
-        for rows in torch.randperm(len(parts)).split(batch):
+        for rows in torch.split(torch.randperm(len(parts)), batch):
             gain = 0.7 + 0.6 * torch.rand(len(rows), 3, 1, 1).mean(dim=1, keepdim=True)
             value = loss(network((parts[rows] * gain).clamp(max=1.0)), shown[rows])
             optimizer.zero_grad()

@@ -78,6 +78,16 @@ class LightsOnMap:
                     best[row] = (score, state)
         return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
 
+    def by_class(
+        self, found: Mapping[str, ImageDetections], cameras: Mapping[str, CameraReading]
+    ) -> tuple[SignalReading, ...]:
+        """The same by the classes of the boxes alone."""
+        best: dict[int, tuple[float, str]] = {}
+        for name, detections in found.items() if self._ids else ():
+            for row, look in self._matched(detections, cameras[name]).items():
+                best[row] = max(best.get(row, look), look)
+        return tuple(SignalReading(self._ids[row], best[row][1]) for row in sorted(best))
+
     def in_view(self, camera: CameraReading) -> list[LightView]:
         """The lights that are near enough, within the picture, and look towards the camera."""
         to_eye = camera.pose[:2, 3] - self._feet[:, :2]
