@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.roads import poses
+from eidrive_scenario.roads.attributes import Roads
 from eidrive_scenario.roads.distance import Chain, RoadDistances
 from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
@@ -21,7 +22,6 @@ from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import (
     Array,
     Integers,
-    LaneKey,
     LaneLocation,
     LaneLocations,
     Pose,
@@ -30,16 +30,10 @@ from eidrive_scenario.roads.location import (
 )
 from eidrive_scenario.roads.locator import REACH, Locator
 from eidrive_scenario.roads.model import (
-    Header,
-    Junction,
-    Road,
     RoadMap,
-    RoadObject,
-    Signal,
-    SignalController,
-    SignalPlace,
 )
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
+from eidrive_scenario.roads.nearby import locate_near
 from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import read_road_map
 from eidrive_scenario.roads.reading.document import parse_road_map
@@ -47,20 +41,14 @@ from eidrive_scenario.roads.route import Route, joined
 from eidrive_scenario.roads.tables import RoadTables
 
 
-class RoadNetwork:
+class RoadNetwork(Roads):
     """Roads, lanes, junctions, signals and objects of one OpenDRIVE file, with their geometry.
 
     Coordinates as in the standard: s along a road's reference line, t to its left, lane ids positive to the left.
     """
 
     def __init__(self, road_map: RoadMap) -> None:
-        self.source = road_map.source
-        self.header: Header = road_map.header
-        self.roads: Mapping[str, Road] = road_map.roads
-        self.junctions: Mapping[str, Junction] = road_map.junctions
-        self.signals: Mapping[str, Signal] = road_map.signals
-        self.controllers: Mapping[str, SignalController] = road_map.controllers
-        self.objects: tuple[RoadObject, ...] = road_map.objects
+        super().__init__(road_map)
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
         self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
@@ -102,13 +90,6 @@ class RoadNetwork:
     @cached_property
     def _locator(self) -> Locator:
         return Locator(self.tables)
-
-    def road(self, road_id: str) -> Road:
-        """The road with this id. Raises PositionError with the nearest right id."""
-        road = self.roads.get(road_id)
-        if road is None:
-            raise poses.unknown_road(road_id, list(self.roads))
-        return road
 
     # Road and lane coordinates to the world
 
@@ -179,36 +160,11 @@ class RoadNetwork:
         lies on one of their lanes; so something that crosses a junction stays on its own connecting road.
         """
         if hint is not None and hint.road in self.roads:
-            near = self._locate_near(x, y, hint)
+            near = locate_near(self.roads, self.links, x, y, hint)
             if near is not None:
                 return near
         found = self._locator.locate(np.array([x]), np.array([y]), None if z is None else np.array([z]), reach)
         return found.location(0)
-
-    def _locate_near(self, x: float, y: float, hint: LaneLocation) -> LaneLocation | None:
-        road = self.roads[hint.road]
-        here = self._on(road, x, y, hint.s)
-        if here is not None:
-            return here
-        for direction in (driving_direction(road, hint.lane), -driving_direction(road, hint.lane)):
-            key = LaneKey(road.id, road.section_at(hint.s).index, hint.lane)
-            last = len(road.sections) - 1 if direction > 0 else 0
-            ways = self.links.beyond(LaneKey(road.id, last, hint.lane), direction) if key.lane else ()
-            for other, way in ways:
-                target = self.roads[other.road]
-                found = self._on(target, x, y, 0.0 if way > 0 else target.length)
-                if found is not None:
-                    return found
-        return None
-
-    def _on(self, road: Road, x: float, y: float, s: float) -> LaneLocation | None:
-        s, t, beyond = poses.project(road, x, y, s)
-        if beyond:
-            return None
-        section, lane, outside = poses.lane_beside(road, s, t)
-        if outside:
-            return None
-        return LaneLocation(road.id, lane.id, s, t - poses.lane_t(road, section, lane, s)[0], t)
 
     def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
         """The lane location with these coordinates, its t filled in. Raises PositionError."""
@@ -223,53 +179,6 @@ class RoadNetwork:
             raise poses.off_road(road, s)
         section, lane, _ = poses.lane_beside(road, s, t)
         return LaneLocation(road_id, lane.id, s, t - poses.lane_t(road, section, lane, s)[0], t)
-
-    # Lanes
-
-    def driving_direction(self, road_id: str, lane_id: int) -> int:
-        """+1 where the lane's traffic drives in the direction of s, -1 where against it."""
-        return driving_direction(self.road(road_id), lane_id)
-
-    def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
-        """The lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
-        lanes = self.road(road_id).section_at(s).lanes
-        return tuple(number for number, lane in lanes.items() if number and (lane.drivable or not drivable))
-
-    def lane_width(self, road_id: str, lane_id: int, s: float) -> float:
-        """Width of a lane at s [m]. Raises PositionError."""
-        section, lane = poses.lane_at(self.road(road_id), lane_id, s)
-        return lane.width.value(s - section.s)
-
-    def lane_type(self, road_id: str, lane_id: int, s: float) -> str:
-        """Type of a lane at s, as the standard names it. Raises PositionError."""
-        return poses.lane_at(self.road(road_id), lane_id, s)[1].type
-
-    def curvature(self, road_id: str, s: float) -> float:
-        """Curvature of the reference line at s, left positive [1/m]."""
-        return self.road(road_id).reference.at(s).curvature
-
-    def speed_limit(self, road_id: str, s: float, lane_id: int | None = None) -> float | None:
-        """The limit at s [m/s]: the lane's own, else the road's; inf for no limit, None where the map is silent."""
-        road = self.road(road_id)
-        if lane_id is not None:
-            section, lane = poses.lane_at(road, lane_id, s)
-            own = [limit for start, limit in lane.speeds if start <= s - section.s + 1e-9]
-            if own:
-                return own[-1]
-        kinds = [kind for kind in road.types if kind.s <= s + 1e-9]
-        return kinds[-1].speed if kinds else None
-
-    def on_road(self, location: LaneLocation) -> bool:
-        """True where the location lies within its lane's width."""
-        width = self.lane_width(location.road, location.lane, location.s)
-        return abs(location.offset) <= 0.5 * width
-
-    def signal_pose(self, signal: Signal, place: SignalPlace | None = None) -> Pose:
-        """Where a signal stands, its face turned against the traffic that it is for."""
-        at = place or signal.place
-        pose = self.road_pose_at(at.road, at.s, at.t)
-        turn = 0.0 if at.orientation == "-" else np.pi
-        return pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)
 
     # Movement
 

@@ -1,0 +1,86 @@
+"""What a map says of its roads and their lanes, without their geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from eidrive_scenario.roads import poses
+from eidrive_scenario.roads.location import LaneLocation, Pose
+from eidrive_scenario.roads.model import (
+    Header,
+    Junction,
+    Road,
+    RoadMap,
+    RoadObject,
+    Signal,
+    SignalController,
+    SignalPlace,
+)
+from eidrive_scenario.roads.movement import driving_direction
+
+
+class Roads:
+    """The roads, junctions, signals and objects of a map, and what holds where on them."""
+
+    def __init__(self, road_map: RoadMap) -> None:
+        self.source = road_map.source
+        self.header: Header = road_map.header
+        self.roads: Mapping[str, Road] = road_map.roads
+        self.junctions: Mapping[str, Junction] = road_map.junctions
+        self.signals: Mapping[str, Signal] = road_map.signals
+        self.controllers: Mapping[str, SignalController] = road_map.controllers
+        self.objects: tuple[RoadObject, ...] = road_map.objects
+
+    def road(self, road_id: str) -> Road:
+        """The road with this id. Raises PositionError with the nearest right id."""
+        road = self.roads.get(road_id)
+        if road is None:
+            raise poses.unknown_road(road_id, list(self.roads))
+        return road
+
+    def driving_direction(self, road_id: str, lane_id: int) -> int:
+        """+1 where the lane's traffic drives in the direction of s, -1 where against it."""
+        return driving_direction(self.road(road_id), lane_id)
+
+    def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
+        """The lanes at s from left to right, without lane 0; with `drivable` only those that cars drive on."""
+        lanes = self.road(road_id).section_at(s).lanes
+        return tuple(number for number, lane in lanes.items() if number and (lane.drivable or not drivable))
+
+    def lane_width(self, road_id: str, lane_id: int, s: float) -> float:
+        """Width of a lane at s [m]. Raises PositionError."""
+        section, lane = poses.lane_at(self.road(road_id), lane_id, s)
+        return lane.width.value(s - section.s)
+
+    def lane_type(self, road_id: str, lane_id: int, s: float) -> str:
+        """Type of a lane at s, as the standard names it. Raises PositionError."""
+        return poses.lane_at(self.road(road_id), lane_id, s)[1].type
+
+    def curvature(self, road_id: str, s: float) -> float:
+        """Curvature of the reference line at s, left positive [1/m]."""
+        return self.road(road_id).reference.at(s).curvature
+
+    def speed_limit(self, road_id: str, s: float, lane_id: int | None = None) -> float | None:
+        """The limit at s [m/s]: the lane's own, else the road's; inf for no limit, None where the map is silent."""
+        road = self.road(road_id)
+        if lane_id is not None:
+            section, lane = poses.lane_at(road, lane_id, s)
+            own = [limit for start, limit in lane.speeds if start <= s - section.s + 1e-9]
+            if own:
+                return own[-1]
+        kinds = [kind for kind in road.types if kind.s <= s + 1e-9]
+        return kinds[-1].speed if kinds else None
+
+    def on_road(self, location: LaneLocation) -> bool:
+        """True where the location lies within its lane's width."""
+        width = self.lane_width(location.road, location.lane, location.s)
+        return abs(location.offset) <= 0.5 * width
+
+    def signal_pose(self, signal: Signal, place: SignalPlace | None = None) -> Pose:
+        """Where a signal stands, its face turned against the traffic that it is for."""
+        at = place or signal.place
+        pose = poses.road_pose_at(self.road(at.road), at.s, at.t)
+        turn = 0.0 if at.orientation == "-" else np.pi
+        return pose._replace(z=pose.z + signal.z_offset).turned(turn + signal.h_offset)
