@@ -63,7 +63,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
     """Plays actions: `play(seconds, (actor, action, condition), …, ego=(lane, s, speed), other=…)`.
 
     Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it. `cruise`
-    gives it one of another tool, with these properties, for which an adaptive cruise control stands in.
+    gives it one of another tool, with these properties, for which an adaptive cruise control or `stand_in` stands in.
     """
     (tmp_path / "street.xodr").write_text(STREET)
 
@@ -75,6 +75,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         dt: float = 0.1,
         driven: bool = False,
         cruise: str | None = None,
+        stand_in: str = "adaptive_cruise",
         everywhere: str = "",
         edge: str = "none",
     ) -> Played:
@@ -90,9 +91,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         path.write_text(text)
         scenario = load_scenario(path)
         assert scenario.road_file is not None
-        storyboard = Storyboard(
-            scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": "adaptive_cruise"}
-        )
+        storyboard = Storyboard(scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": stand_in})
         world, played = KinematicWorld(scenario, dt), Played(dt)
         first = storyboard.initial()
         world.add(first.additions)

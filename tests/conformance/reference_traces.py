@@ -40,7 +40,16 @@ once, where the standard ends them. State and time are compared all the same."""
 LINE = "line of the reference table"
 """Name of the property by which a test hands on its line of the table, from whatever worker it ran on."""
 
-STAND_INS = {"ACCController": "adaptive_cruise", "ALKSController": "adaptive_cruise"}
+END = "how a scenario of the corpora ended"
+"""Name of the property by which a test hands on the end of its run."""
+
+STAND_INS = {
+    "ACCController": "adaptive_cruise",
+    "ALKSController": "adaptive_cruise",
+    "ALKS_R157SM_Controller": "alks",
+    "ExternalController": "external",
+    "InteractiveController": "external",
+}
 """Controllers of esmini that the reference was recorded with, and who plays their part here."""
 
 FOLDERS = {
@@ -68,6 +77,8 @@ class Run:
     seconds: float = 0.0
     ticks: int = 0
     cpu: float = 0.0
+    played_by: tuple[str, ...] = ()
+    """Who stood in for controllers of esmini."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +124,8 @@ def play(path: Path, *, limit: float) -> Run:
     """Play a scenario file at steps of 0.01 s to its end or to the time limit [s]."""
     settings = RunSettings(dt=0.01, time_limit=limit, controllers=STAND_INS)
     simulation = Simulation(load_scenario(path), settings=settings)
-    run, end = Run(), None
+    held = [one.name for controllers in simulation.scenario.controllers.values() for one in controllers]
+    run, end = Run(played_by=tuple(sorted({STAND_INS[name] for name in held if name in STAND_INS}))), None
     started = time.process_time()
     with simulation:
         names = _names(simulation)
@@ -225,6 +237,7 @@ def line_of(name: str, found: Deviation) -> str:
         f"{name:66s} {'ok ' if found.agrees else 'NOT'} rms {found.worst('rms'):7.3f} m  "
         f"max {found.worst('worst'):7.3f} m  heading {found.worst('heading'):6.4f} rad  events {found.events:5.2f} s  "
         f"unmatched {len(found.unmatched):2d}  {found.run.ended} at {found.run.seconds:.2f} s"
+        + (f"  with {', '.join(found.run.played_by)}" if found.run.played_by else "")
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from reference_traces import END
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
@@ -61,10 +62,11 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
 @pytest.mark.filterwarnings("default")
-def test_a_scenario_loads_and_plays_to_an_end(name: str) -> None:
+def test_a_scenario_loads_and_plays_to_an_end(name: str, record_property: pytest.RecordProperty) -> None:
     scenario, watch = load_scenario(Path(CORPORA) / name), Watch()
     settings = RunSettings(dt=0.05, time_limit=60.0)
     result = Simulation(scenario, settings=settings, observers=[watch]).run()
+    record_property(END, f"{name}: {result.end} at {result.simulated_s:.2f} s")
     assert result.end in ENDS
     assert watch.frames > 1
     placed = {private.entity_ref for private in scenario.storyboard.init.actions.private if _placed(private)}
@@ -77,9 +79,11 @@ def _placed(private: object) -> bool:
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_scenario_says_what_is_wrong_with_it(name: str) -> None:
-    with pytest.raises(ScenarioError):
+def test_a_broken_scenario_says_what_is_wrong_with_it(name: str, record_property: pytest.RecordProperty) -> None:
+    with pytest.raises(ScenarioError) as caught:
         load_scenario(Path(CORPORA) / name)
+    assert all(problem.line for problem in caught.value.problems)
+    record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.problems[0].line}")
 
 
 def test_no_scenario_is_left_out() -> None:

@@ -1,0 +1,74 @@
+"""A car whose poses come from outside of the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from street_scene import CAR, STREET, at, private
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+SCENARIO = """<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="scene" author="test"/>
+  <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork><Entities>{cars}</Entities>
+  <Storyboard><Init><Actions><Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private>
+  </Actions></Init></Storyboard></OpenSCENARIO>"""
+JOYSTICK = """<ObjectController name="seat"><Controller name="joystick" controllerType="movement"><Properties/>
+  </Controller></ObjectController>"""
+ON = """<ControllerAction><ActivateControllerAction {named} lateral="true" longitudinal="true"/></ControllerAction>"""
+
+
+@pytest.fixture
+def simulation(tmp_path: Path, request: pytest.FixtureRequest) -> Simulation:
+    """Ego at 20 m/s in lane -1; its controller of another tool is switched on unless the test says otherwise."""
+    named = getattr(request, "param", "")
+    cars = CAR.format(name="Ego", controller=JOYSTICK) + CAR.format(name="Other", controller="")
+    ego = at(-1, 100.0, 20.0) + (private(ON.format(named=named)) if named is not None else "")
+    (tmp_path / "street.xodr").write_text(STREET)
+    (tmp_path / "scene.xosc").write_text(SCENARIO.format(cars=cars, ego=ego, other=at(-2, 50.0, 10.0)))
+    settings = RunSettings(dt=0.1, controllers={"joystick": "external"})
+    return Simulation(load_scenario(tmp_path / "scene.xosc"), settings=settings)
+
+
+@pytest.mark.parametrize("simulation", ["", 'objectControllerRef="seat"'], indirect=True)
+def test_without_poses_it_stands_where_it_is(simulation: Simulation) -> None:
+    with simulation:
+        views = [simulation.tick()[0].view for _ in range(11)]
+    assert [round(float(view.position[view.row("Ego"), 0]), 6) for view in views] == [100.0] * 11
+    assert float(views[-1].speed[views[-1].row("Ego")]) == 0.0
+    assert views[-1].position[views[-1].row("Other"), 0] == pytest.approx(60.0)
+
+
+def test_it_is_where_it_is_put_in_the_next_view(simulation: Simulation) -> None:
+    with simulation:
+        simulation.tick()
+        simulation.set_pose("Ego", Pose(123.0, -5.5, 0.0, 0.2, 0.0, 0.0), speed=7.0)
+        simulation.tick()
+        view = simulation.tick()[0].view
+        row = view.row("Ego")
+        assert view.position[row].tolist() == pytest.approx([123.0, -5.5, 0.0])
+        assert float(view.yaw[row]) == pytest.approx(0.2)
+        assert float(view.speed[row]) == pytest.approx(7.0)
+        where = simulation.storyboard.stage.location("Ego")
+        assert where is not None
+        assert where.lane == -2
+        view = simulation.tick()[0].view
+    assert view.position[view.row("Ego"), 0] == pytest.approx(123.0)
+    assert float(view.speed[view.row("Ego")]) == 0.0
+
+
+@pytest.mark.parametrize("simulation", [None], indirect=True)
+def test_while_its_controller_is_off_it_keeps_lane_and_speed(simulation: Simulation) -> None:
+    with simulation:
+        simulation.set_pose("Ego", Pose(500.0, -2.0, 0.0, 0.0, 0.0, 0.0))
+        view = [simulation.tick()[0].view for _ in range(11)][-1]
+    assert view.position[view.row("Ego"), 0] == pytest.approx(120.0)
+
+
+def test_poses_for_somebody_else_are_an_error(simulation: Simulation) -> None:
+    with simulation, pytest.raises(SettingError, match="nobody waits for poses of 'Other'"):
+        simulation.set_pose("Other", Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
