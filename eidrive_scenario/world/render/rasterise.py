@@ -74,6 +74,70 @@ def rasterise(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
 def rasterised(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
     """The same for the part of the picture that holds all of them. What one triangle shows does not depend on others
     but for what lies before it."""
+    rows = _rows(x, y, nearness, width, height)
+    if rows is None:
+        return Cover(np.full((0, 0), -1, dtype=np.int32), np.zeros((0, 0), dtype=np.float32))
+    (top, left), shape = rows.corner, rows.shape
+    triangle, near = np.full(shape, -1, dtype=np.int32), np.zeros(shape, dtype=np.float32)
+    for one in rows.large:
+        window, value, inside = _block(one, top, left)
+        inside &= value >= near[window]
+        np.copyto(near[window], value, where=inside)
+        np.copyto(triangle[window], np.int32(one.number), where=inside)
+    if len(rows.small.line):
+        _scatter(triangle, near, rows.small, top, left)
+    return Cover(triangle, near, top, left)
+
+
+def greatest(x: Array, y: Array, nearness: Array, width: int, height: int) -> tuple[Floats, int, int]:
+    """The nearness alone, 0 where nothing is, of the part of the picture that holds all triangles, and its first line
+    and column."""
+    rows = _rows(x, y, nearness, width, height)
+    if rows is None:
+        return np.zeros((0, 0), dtype=np.float32), 0, 0
+    (top, left), near = rows.corner, np.zeros(rows.shape, dtype=np.float32)
+    for one in rows.large:
+        window, value, inside = _block(one, top, left)
+        np.maximum(near[window], value, out=near[window], where=inside)
+    if len(rows.small.line):
+        pixel, value = _fragments(rows.small, top, left, near.shape[1])
+        np.maximum.at(near.reshape(-1), pixel, value)
+    return near, top, left
+
+
+class _Large(NamedTuple):
+    """One triangle: its number, its rows, and how nearness grows along them; level (M,) is that at column 0."""
+
+    number: int
+    line: Integers
+    left: Integers
+    right: Integers
+    level: Array
+    slope: float
+
+
+class _Small(NamedTuple):
+    """Rows of many triangles."""
+
+    number: Integers
+    line: Integers
+    left: Integers
+    right: Integers
+    level: Array
+    slope: Array
+
+
+class _Rows(NamedTuple):
+    """All rows that hold centres of pixels, and the part of the picture in which they lie."""
+
+    large: list[_Large]
+    small: _Small
+    corner: tuple[int, int]
+    shape: tuple[int, int]
+
+
+def _rows(x: Array, y: Array, nearness: Array, width: int, height: int) -> _Rows | None:
+    """Of triangles with corners (3, N); None where there are none."""
     # Over so short an axis, comparing rows is many times as fast as a reduction.
     low, high = np.minimum(np.minimum(y[0], y[1]), y[2]), np.maximum(np.maximum(y[0], y[1]), y[2])
     left_end, right_end = np.minimum(np.minimum(x[0], x[1]), x[2]), np.maximum(np.maximum(x[0], x[1]), x[2])
@@ -81,35 +145,31 @@ def rasterised(x: Array, y: Array, nearness: Array, width: int, height: int) -> 
     last = np.clip(np.ceil(high - 0.5), 0, height).astype(np.int64)
     chosen = np.flatnonzero((last > first) & (right_end > 0.5) & (left_end < width))
     if not len(chosen):
-        return Cover(np.full((0, 0), -1, dtype=np.int32), np.zeros((0, 0), dtype=np.float32))
+        return None
     corners = _from_top(np.stack([x[:, chosen], y[:, chosen], nearness[:, chosen]]))
-    rightwards, downwards = _slopes(corners)
     spans = _spans(corners, first[chosen], last[chosen], width)
-    if not len(spans.whose):
-        return Cover(np.full((0, 0), -1, dtype=np.int32), np.zeros((0, 0), dtype=np.float32))
-    top, left = int(spans.line.min()), int(spans.left.min())
-    shape = (int(spans.line.max()) + 1 - top, int(spans.right.max()) - left)
-    triangle, near = np.full(shape, -1, dtype=np.int32), np.zeros(shape, dtype=np.float32)
-
-    lengths = spans.right - spans.left
-    # How near the middle of the line's first pixel would be at column 0, and the first span of each triangle.
+    whose, line, left, right = spans
+    if not len(whose):
+        return None
+    rightwards, downwards = _slopes(corners)
     start = corners.nearness[0] - corners.x[0] * rightwards
-    level = start[spans.whose] + (spans.line + 0.5 - corners.y[0][spans.whose]) * downwards[spans.whose]
-    begins = np.flatnonzero(np.diff(spans.whose, prepend=-1))
-    area = np.add.reduceat(lengths, begins)
-    ends = np.append(begins[1:], len(lengths))
-    widths = np.maximum.reduceat(spans.right, begins) - np.minimum.reduceat(spans.left, begins)
+    level = start[whose] + (line + 0.5 - corners.y[0][whose]) * downwards[whose]
+    begins = np.flatnonzero(np.diff(whose, prepend=-1))
+    ends = np.append(begins[1:], len(whose))
+    area = np.add.reduceat(right - left, begins)
+    widths = np.maximum.reduceat(right, begins) - np.minimum.reduceat(left, begins)
     large = (area >= _LARGE) & (area >= _FULL * widths * (ends - begins))
+    alone = []
     for begin, end in zip(begins[large].tolist(), ends[large].tolist(), strict=True):
-        row = int(spans.whose[begin])
-        part = _Spans(*(column[begin:end] for column in spans))
-        _fill(triangle, near, part, level[begin:end], float(rightwards[row]), int(chosen[row]), top, left)
-
+        row, part = int(whose[begin]), slice(begin, end)
+        one = _Large(int(chosen[row]), line[part], left[part], right[part], level[part], float(rightwards[row]))
+        alone.append(one)
     small = np.flatnonzero(np.repeat(~large, ends - begins))
-    if len(small):
-        few = _Spans(*(column[small] for column in spans))
-        _scatter(triangle, near, few, level[small], rightwards[few.whose], chosen[few.whose], top, left)
-    return Cover(triangle, near, top, left)
+    slope, number = rightwards[whose[small]], chosen[whose[small]]
+    few = _Small(number, line[small], left[small], right[small], level[small], slope)
+    top, start_column = int(line.min()), int(left.min())
+    shape = (int(line.max()) + 1 - top, int(right.max()) - start_column)
+    return _Rows(alone, few, (top, start_column), shape)
 
 
 def _from_top(corners: Array) -> _Corners:
@@ -148,65 +208,49 @@ def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _S
     return _Spans(whose[some], line[some], left[some].astype(np.int64), right[some].astype(np.int64))
 
 
-def _fill(
-    triangle: NDArray[np.int32],
-    near: Floats,
-    spans: _Spans,
-    level: Array,
-    slope: float,
-    number: int,
-    top: int,
-    left: int,
-) -> None:
-    """Draw one triangle, numbers rising from call to call."""
-    first, last = int(spans.line[0]), int(spans.line[-1]) + 1
-    begin, end = int(spans.left.min()), int(spans.right.max())
-    window = (slice(first - top, last - top), slice(begin - left, end - left))
+def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Floats, NDArray[np.bool_]]:
+    """The lines and columns that a triangle spans, nearness there, and which of it lies inside."""
+    first, last = int(one.line[0]), int(one.line[-1]) + 1
+    begin, end = int(one.left.min()), int(one.right.max())
     # Where a tip is thinner than a pixel, some of its lines hold no centre of one.
-    rows = spans.line - first
+    rows = one.line - first
     levels = np.zeros(last - first)
-    levels[rows] = level
+    levels[rows] = one.level
     from_column, to_column = np.zeros((2, last - first, 1), dtype=np.int32)
-    from_column[rows, 0], to_column[rows, 0] = spans.left, spans.right
+    from_column[rows, 0], to_column[rows, 0] = one.left, one.right
     columns = np.arange(begin, end, dtype=np.int32)
     value = np.empty((last - first, end - begin), dtype=np.float32)
-    np.add(levels[:, None], (columns + 0.5) * slope, out=value, casting="same_kind")
+    np.add(levels[:, None], (columns + 0.5) * one.slope, out=value, casting="same_kind")
     np.maximum(value, np.float32(_LEAST), out=value)
-    better = value >= near[window]
-    better &= columns >= from_column
-    better &= columns < to_column
-    np.copyto(near[window], value, where=better)
-    np.copyto(triangle[window], np.int32(number), where=better)
+    inside = columns >= from_column
+    inside &= columns < to_column
+    return (slice(first - top, last - top), slice(begin - left, end - left)), value, inside
 
 
-def _scatter(
-    triangle: NDArray[np.int32],
-    near: Floats,
-    spans: _Spans,
-    level: Array,
-    slope: Array,
-    number: Integers,
-    top: int,
-    left: int,
-) -> None:
+def _fragments(few: _Small, top: int, left: int, width: int) -> tuple[Integers, Floats]:
+    """The pixels of a window of this width in which rows lie, one after the other, and nearness there."""
+    lengths = few.right - few.left
+    step = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    value = np.repeat(few.slope, lengths)
+    value *= step
+    value += np.repeat(few.level + (few.left + 0.5) * few.slope, lengths)
+    pixel = np.repeat((few.line - top) * width + few.left - left, lengths)
+    pixel += step
+    return pixel, np.maximum(value.astype(np.float32), np.float32(_LEAST))
+
+
+def _scatter(triangle: NDArray[np.int32], near: Floats, few: _Small, top: int, left: int) -> None:
     """Draw the rows of many triangles over what is there, all fragments at once."""
-    first = int(spans.line.min())
-    rows = slice(first - top, int(spans.line.max()) + 1 - top)
+    first = int(few.line.min())
+    rows = slice(first - top, int(few.line.max()) + 1 - top)
     triangle, near = triangle[rows], near[rows]
     held = near.view(np.uint32).astype(np.uint64)
     held <<= _SHIFT
     held |= (triangle + 1).astype(np.uint64)
-    lengths = spans.right - spans.left
-    start = np.cumsum(lengths) - lengths
-    step = np.arange(int(lengths.sum())) - np.repeat(start, lengths)
-    value = np.repeat(slope, lengths)
-    value *= step
-    value += np.repeat(level + (spans.left + 0.5) * slope, lengths)
-    pixel = np.repeat((spans.line - first) * triangle.shape[1] + spans.left - left, lengths)
-    pixel += step
-    key = np.maximum(value.astype(np.float32), np.float32(_LEAST)).view(np.uint32).astype(np.uint64)
+    pixel, value = _fragments(few, first, left, near.shape[1])
+    key = value.view(np.uint32).astype(np.uint64)
     key <<= _SHIFT
-    key |= np.repeat((number + 1).astype(np.uint64), lengths)
+    key |= np.repeat((few.number + 1).astype(np.uint64), few.right - few.left)
     np.maximum.at(held.reshape(-1), pixel, key)
     np.subtract(held & _LOW, 1, out=triangle, casting="unsafe")
     held >>= _SHIFT

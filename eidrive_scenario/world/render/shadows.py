@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.render.eye import Eye
 from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import rasterised
+from eidrive_scenario.world.render.rasterise import greatest
 
 REACH = 80.0
 """How far from the camera shadows are drawn [m]."""
@@ -71,14 +72,14 @@ class ShadowGrid:
             np.ascontiguousarray((corners @ axis).reshape(-1, 3).T) for axis in (*self.axes, self.towards)
         )
         across, up = (across - self.low[0]) * self.scale, (up - self.low[1]) * self.scale
-        cover = rasterised(across, up, level - self.base, self.width, self.height)
+        found_heights, line, column = greatest(across, up, level - self.base, self.width, self.height)
         # A margin of one cell, where nothing is, belongs to it: points are looked up between four cells.
-        lines, columns = cover.window
-        top, left = max(lines.start - 1, 0), max(columns.start - 1, 0)
-        bottom, right = min(lines.stop + 1, self.height), min(columns.stop + 1, self.width)
+        rows, columns = found_heights.shape
+        top, left = max(line - 1, 0), max(column - 1, 0)
+        bottom, right = min(line + rows + 1, self.height), min(column + columns + 1, self.width)
         heights = np.full((bottom - top, right - left), np.float32(-np.inf))
-        inner = heights[lines.start - top : lines.stop - top, columns.start - left : columns.stop - left]
-        np.copyto(inner, cover.nearness, where=cover.triangle >= 0)
+        inner = heights[line - top : line - top + rows, column - left : column - left + columns]
+        np.copyto(inner, found_heights, where=found_heights > 0.0)
         return ShadowMap(self, heights, top, left)
 
 
@@ -111,18 +112,30 @@ class ShadowMap:
             return found
         sx, sy, sz = self.grid.towards.astype(np.float32)
         margin = np.float32(_SLACK + 0.35 / self.grid.scale - self.grid.base)
+        at = (top[some].astype(np.int32) - np.int32(self.top)) * np.int32(width)
+        at += left[some].astype(np.int32) - np.int32(self.left)
         level = sx * x[some] + sy * y[some] + sz * z[some] + margin
-        left, top = left[some], top[some]
-        right, down = column[some] - left, row[some] - top
-        at = (top.astype(np.int32) - np.int32(self.top)) * np.int32(width) + (
-            left.astype(np.int32) - np.int32(self.left)
-        )
+        below = np.flatnonzero(self._highest.take(at) > level)
+        if not len(below):
+            return found
+        some, at, level = some[below], at[below], level[below]
+        right, down = column[some] - left[some], row[some] - top[some]
         heights = self.heights.ravel()
         upper = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
         at += np.int32(width)
         lower = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
         found[some] = np.float32(1.0) - (upper + (lower - upper) * down)
         return found
+
+    @cached_property
+    def _highest(self) -> Floats:
+        """(h · w,) the greatest of the four cells between whose middles a point lies; -inf at the last line and
+        column."""
+        heights = self.heights
+        found = np.full_like(heights, -np.inf)
+        pairs = np.maximum(heights[:-1], heights[1:])
+        np.maximum(pairs[:, :-1], pairs[:, 1:], out=found[:-1, :-1])
+        return found.ravel()
 
     def over(self, still: Floats) -> tuple[ShadowMap, NDArray[np.bool_]]:
         """Together with the heights (height, width) of what stands still; and the cells (height · width + 1,) for whose

@@ -15,14 +15,20 @@ Floats = NDArray[np.float32]
 SIZE = 512
 
 
+def _blurred(draws: Floats, deviation: float) -> Floats:
+    """A table (SIZE, SIZE) that repeats, blurred by a Gaussian of this deviation without a seam."""
+    margin = int(np.ceil(4.5 * deviation)) + 1
+    blurred = np.asarray(cv2.GaussianBlur(np.pad(draws, margin, mode="wrap"), (0, 0), deviation), dtype=np.float32)
+    return blurred[margin:-margin, margin:-margin]
+
+
 @lru_cache(maxsize=1)
 def patches() -> Floats:
     """(SIZE, SIZE) smooth noise of mean 0 and deviation 1 that repeats without a seam."""
     draws = generator(0, "surfaces").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((3, 0.5), (9, 1.0), (27, 1.6)):
-        tiled = np.tile(draws, (3, 3))
-        layer = np.asarray(cv2.GaussianBlur(tiled, (0, 0), width / 2.0))[SIZE : 2 * SIZE, SIZE : 2 * SIZE]
+        layer = _blurred(draws, width / 2.0)
         total += weight * layer / layer.std()
     found: Floats = (total / total.std()).astype(np.float32)
     return found
@@ -32,7 +38,7 @@ def patches() -> Floats:
 def grit() -> Floats:
     """(SIZE, SIZE) noise of mean 0 and deviation 1 from one place to the next."""
     draws = generator(0, "grit").standard_normal((SIZE, SIZE), dtype=np.float32)
-    layer = np.asarray(cv2.GaussianBlur(np.tile(draws, (3, 3)), (0, 0), 0.7))[SIZE : 2 * SIZE, SIZE : 2 * SIZE]
+    layer = _blurred(draws, 0.7)
     found: Floats = (layer / layer.std()).astype(np.float32)
     return found
 
@@ -43,7 +49,7 @@ def hollows() -> Floats:
     draws = generator(0, "hollows").standard_normal((SIZE, SIZE), dtype=np.float32)
     total = np.zeros((SIZE, SIZE), dtype=np.float32)
     for width, weight in ((8.0, 0.35), (22.0, 1.0)):
-        layer = np.asarray(cv2.GaussianBlur(np.tile(draws, (3, 3)), (0, 0), width))[SIZE : 2 * SIZE, SIZE : 2 * SIZE]
+        layer = _blurred(draws, width)
         total += weight * layer / layer.std()
     found: Floats = (total / total.std()).astype(np.float32)
     return found
