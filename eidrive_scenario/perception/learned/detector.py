@@ -77,7 +77,7 @@ class LearnedDetector(Detector):
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
     usual_sensors: ClassVar[Mapping[str, SensorSettings]] = {
         "camera": CameraSettings(width=512, height=384, rate=10.0),
-        "lidar": LidarSettings(rate=10.0),
+        "lidar": LidarSettings(rate=10.0, field_of_view=110.0),
     }
     settings_type: ClassVar[type[Settings] | None] = LearnedSettings
     network: ClassVar[Literal["yolov5", "ssd"]]
