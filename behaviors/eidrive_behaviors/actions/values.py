@@ -7,74 +7,73 @@ from py_trees.common import Status
 from eidrive_scenario.api import ActionBehaviour, model
 
 
-class ParameterSetAction(ActionBehaviour):
+class ValueAction(ActionBehaviour):
+    """An action on one parameter or one variable: texts by their names, both."""
+
+    immediate = True
+    parent_element: model.ParameterAction | model.VariableAction
+
+    @property
+    def kind(self) -> str:
+        """What it is called."""
+        return "parameter" if isinstance(self.parent_element, model.ParameterAction) else "variable"
+
+    @property
+    def which(self) -> str:
+        """Its name."""
+        around = self.parent_element
+        return around.parameter_ref if isinstance(around, model.ParameterAction) else around.variable_ref
+
+    @property
+    def values(self) -> dict[str, str]:
+        """All of its kind."""
+        return self.stage.parameters if self.kind == "parameter" else self.stage.variables
+
+
+class SetAction(ValueAction):
+    """Gives it a value."""
+
+    action: model.ParameterSetAction | model.VariableSetAction
+
+    def update(self) -> Status:
+        """Set it."""
+        self.values[self.which] = self.action.value
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Which one, to what."""
+        return f"set {self.kind} {self.which} to {self.action.value}"
+
+
+class ModifyAction(ValueAction):
+    """Adds to its value, or multiplies it."""
+
+    action: model.ParameterModifyAction | model.VariableModifyAction
+
+    def update(self) -> Status:
+        """Modify it."""
+        self.values[self.which] = modified(self, self.values.get(self.which, ""), self.which, self.action.rule)
+        return Status.SUCCESS
+
+    def describe(self) -> str:
+        """Which one, how."""
+        return f"{in_words(self.action.rule)} {self.kind} {self.which}"
+
+
+class ParameterSetAction(SetAction):
     """Sets a parameter for the conditions that come; what the file took from it when it was read stays."""
 
-    immediate = True
-    action: model.ParameterSetAction
-    parent_element: model.ParameterAction
 
-    def update(self) -> Status:
-        """Set it."""
-        self.stage.parameters[self.parent_element.parameter_ref] = self.action.value
-        return Status.SUCCESS
-
-    def describe(self) -> str:
-        """Which one, to what."""
-        return f"set parameter {self.parent_element.parameter_ref} to {self.action.value}"
+class ParameterModifyAction(ModifyAction):
+    """Adds to a parameter, or multiplies it, for the conditions that come."""
 
 
-class ParameterModifyAction(ActionBehaviour):
-    """Adds to a parameter, or multiplies it."""
-
-    immediate = True
-    action: model.ParameterModifyAction
-    parent_element: model.ParameterAction
-
-    def update(self) -> Status:
-        """Modify it."""
-        name = self.parent_element.parameter_ref
-        self.stage.parameters[name] = modified(self, self.stage.parameters.get(name, ""), name, self.action.rule)
-        return Status.SUCCESS
-
-    def describe(self) -> str:
-        """Which one, how."""
-        return f"{in_words(self.action.rule)} parameter {self.parent_element.parameter_ref}"
-
-
-class VariableSetAction(ActionBehaviour):
+class VariableSetAction(SetAction):
     """Sets a variable."""
 
-    immediate = True
-    action: model.VariableSetAction
-    parent_element: model.VariableAction
 
-    def update(self) -> Status:
-        """Set it."""
-        self.stage.variables[self.parent_element.variable_ref] = self.action.value
-        return Status.SUCCESS
-
-    def describe(self) -> str:
-        """Which one, to what."""
-        return f"set variable {self.parent_element.variable_ref} to {self.action.value}"
-
-
-class VariableModifyAction(ActionBehaviour):
+class VariableModifyAction(ModifyAction):
     """Adds to a variable, or multiplies it."""
-
-    immediate = True
-    action: model.VariableModifyAction
-    parent_element: model.VariableAction
-
-    def update(self) -> Status:
-        """Modify it."""
-        name = self.parent_element.variable_ref
-        self.stage.variables[name] = modified(self, self.stage.variables.get(name, ""), name, self.action.rule)
-        return Status.SUCCESS
-
-    def describe(self) -> str:
-        """Which one, how."""
-        return f"{in_words(self.action.rule)} variable {self.parent_element.variable_ref}"
 
 
 def modified(
