@@ -19,19 +19,9 @@ from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
 from eidrive_scenario.roads.links import LaneLinks
-from eidrive_scenario.roads.location import (
-    Array,
-    Integers,
-    LaneLocation,
-    LaneLocations,
-    Pose,
-    Poses,
-    PositionError,
-)
+from eidrive_scenario.roads.location import Array, Integers, LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.locator import REACH, Locator
-from eidrive_scenario.roads.model import (
-    RoadMap,
-)
+from eidrive_scenario.roads.model import RoadMap
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
 from eidrive_scenario.roads.nearby import locate_near
 from eidrive_scenario.roads.preferences import Cost, speed_on
