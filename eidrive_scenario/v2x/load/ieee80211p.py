@@ -43,6 +43,10 @@ REACH, FARTHEST_INTERFERER = 1500, 1000
 
 FRAME_ERRORS = ((5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0), (1.0, 0.4, 0.015, 0.004, 0.003, 0.002, 0.001))
 """Frame error rate by Eb/N0 [dB]: O. Goubet et al., IEEE Transactions on Vehicular Technology 64(9), 2015, fig. 14."""
+FIT = (-0.2481, 0.913, 0.003844)
+"""From the offered load to the busy ratio (35)."""
+FULL = -FIT[1] / (2.0 * FIT[0])
+"""From this offered load on, 1.84, the fit falls, and means nothing."""
 
 
 def airtime(size: int, bit_rate: float) -> float:
@@ -71,8 +75,9 @@ def ieee80211p_errors(
 
     duration = airtime(size, bit_rate)
     sensed = sensed_share(received(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
-    unsaturated = density * rate * duration * float(sensed.sum())  # (34)
-    busy_ratio = -0.2481 * unsaturated**2 + 0.913 * unsaturated + 0.003844  # (35)
+    unsaturated = offered_load(density, rate, size, power, bit_rate, height)
+    square, linear, constant = FIT
+    busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
     overlap = autocorrelation(sensed)
     overlap /= overlap.max()  # (20)
 
@@ -98,6 +103,12 @@ def ieee80211p_errors(
     collision = _any(np.where(closer, 0.0, spoils * same_slot) + spoils * hidden * (2.0 - hears))  # (26), (28), (32)
     given = {"sensing": not_sensed, "busy": busy, "propagation": propagation, "collision": collision}
     return ErrorTable(distance, given, busy_ratio)
+
+
+def offered_load(density: float, rate: float, size: int, power: float, bit_rate: float, height: float) -> float:
+    """(34): how much of its time the channel would be busy if no two transmissions overlapped; `height` of antennas."""
+    around = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
+    return density * rate * airtime(size, bit_rate) * float(sensed_share(around, SENSING, SHADOWING).sum())
 
 
 def _interferers(density: float) -> Array:

@@ -6,11 +6,11 @@ from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.load.cv2x_mode4 import cv2x_mode4_errors
-from eidrive_scenario.v2x.load.ieee80211p import ieee80211p_errors
+from eidrive_scenario.v2x.load.cv2x_mode4 import CANDIDATES, cv2x_mode4_errors
+from eidrive_scenario.v2x.load.ieee80211p import ANTENNA, FULL, ieee80211p_errors, offered_load
 from eidrive_scenario.v2x.load.table import ErrorTable
 
 FARTHEST, STEP = 1000.0, 10.0
@@ -35,6 +35,18 @@ class Ieee80211pLoss(Settings):
     data_rate_mbps: PositiveFloat = 6.0
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.5
 
+    @model_validator(mode="after")
+    def _not_too_much(self) -> Ieee80211pLoss:
+        height = ANTENNA - self.environment_height
+        bit_rate = self.data_rate_mbps * 1e6
+        load = offered_load(self.density, self.rate, self.size, self.power_dbm, bit_rate, height)
+        if load > FULL:
+            raise ValueError(
+                f"vehicles in reach would need {load:.3g} times the time there is; the model holds up to {FULL:.3g}: "
+                "lower density, rate or size"
+            )
+        return self
+
     def table(self) -> ErrorTable:
         """What the model says."""
         return _ieee80211p(self)
@@ -51,10 +63,20 @@ class Cv2xMode4Loss(Settings):
 
     kind: Literal["cv2x_mode4"]
     density: Density
-    rate: PositiveFloat = 10.0
+    rate: Annotated[float, Field(ge=1.0)] = 10.0
     power_dbm: float = 20.0
     subchannels: Literal[2, 4] = 4
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.0
+
+    @model_validator(mode="after")
+    def _not_too_much(self) -> Cv2xMode4Loss:
+        busy = self.table().busy_ratio
+        if busy > 1.0 - CANDIDATES:
+            raise ValueError(
+                f"vehicles in reach would keep {busy:.3g} of the resources, and the model holds while {CANDIDATES:g} "
+                "are left to choose from: lower density or rate"
+            )
+        return self
 
     def table(self) -> ErrorTable:
         """What the model says."""

@@ -61,6 +61,38 @@ def test_more_vehicles_cost_delivery_at_every_distance() -> None:
     assert dense.busy_ratio > sparse.busy_ratio
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"kind": "80211p", "density": 1e-4, "rate": 0.1, "size": 10},
+        {"kind": "80211p", "density": 0.3, "rate": 10, "size": 300},
+        {"kind": "80211p", "density": 0.0065, "rate": 1000, "size": 190},
+        {"kind": "80211p", "density": 1.0, "rate": 1, "size": 1500},
+        {"kind": "cv2x_mode4", "density": 1e-4, "rate": 1},
+        {"kind": "cv2x_mode4", "density": 0.2, "rate": 25},
+        {"kind": "cv2x_mode4", "density": 1.0, "rate": 2},
+    ],
+    ids=str,
+)
+def test_whatever_the_models_take_they_give_probabilities(settings: dict[str, Any]) -> None:
+    model = Ieee80211pLoss if settings["kind"] == "80211p" else Cv2xMode4Loss
+    table = model.model_validate(settings).table()
+    assert 0.0 <= table.busy_ratio <= 0.85
+    for probability in [*table.errors.values(), table.delivery_ratio]:
+        assert probability.min() >= -1e-9
+        assert probability.max() <= 1.0 + 1e-9
+
+
+def test_more_than_the_models_can_tell_of_is_refused() -> None:
+    """The fit of the busy ratio of 802.11p turns down at 0.913 / (2 · 0.2481) times the channel: 0.3 cars per metre, 25
+    messages a second and 2.08 ms for each, over the 584 m in which one is sensed, are 9.1. Mode 4 needs a fifth to
+    choose from."""
+    with pytest.raises(ValueError, match=r"need 9\.1\d* times the time there is; the model holds up to 1.84: lower"):
+        Ieee80211pLoss(kind="80211p", density=0.3, rate=25, size=1500)
+    with pytest.raises(ValueError, match=r"keep 0.8\d* of the resources, and the model holds while 0.2 are left"):
+        Cv2xMode4Loss(kind="cv2x_mode4", density=0.23, rate=25)
+
+
 def test_causes_share_the_draw_in_their_order() -> None:
     """Draws spread evenly over (0, 1) meet each cause as often as the table says, and none as often as it delivers."""
     table = Ieee80211pLoss(kind="80211p", density=0.12, rate=25, size=500).table()
