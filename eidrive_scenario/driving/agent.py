@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,24 +14,13 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.received_objects import ReceivedObjects
-from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.speaker import Speaker
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
-from eidrive_scenario.errors import Problem, SettingError
-from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.perception.detector import Detector, Installation
-from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
-from eidrive_scenario.registry import registry
-from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, Readings
-from eidrive_scenario.sensing.rig import Rig
-from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
-from eidrive_scenario.settings import parse_settings
-from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.message import Message, Received, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
 
@@ -219,111 +208,3 @@ def _numbered(message: Message) -> Detections:
     if message.objects is None or message.detections.tracks:
         return message.detections
     return replace(message.detections, tracks=message.objects)
-
-
-def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
-    """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
-    kind: type[Detector] = registry("detectors").load(settings.detector)
-    return Rig(spec, settings.rig_sensors(kind.needs, kind.usual_sensors), seed=seed)
-
-
-def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
-    """The detector that the settings name. Raises SettingError, with this place, if its own settings are wrong."""
-    kind: type[Detector] = registry("detectors").load(settings.detector)
-    given = settings.detector_settings
-    if kind.settings_type is not None:
-        own = parse_settings(kind.settings_type, given, source=source, line=line)
-        return kind(own)  # type: ignore[call-arg]
-    if given:
-        message = f"detector {settings.detector!r} has no settings of its own"
-        raise SettingError(Problem(message, "remove the property 'detector_settings'", source, line))
-    return kind()
-
-
-def build_fusion(
-    settings: AgentSettings, detector: Detector, *, source: str = "", line: int | None = None
-) -> FusionMethod:
-    """The fusion method that the settings name. Raises SettingError, with this place, if its own settings are wrong,
-    or if it joins points and the detector looks at none."""
-    kind: type[FusionMethod] = registry("fusion").load(settings.fusion)
-    given = settings.fusion_settings
-    if given and kind.settings_type is None:
-        message = f"fusion {settings.fusion!r} has no settings of its own"
-        raise SettingError(Problem(message, "remove the property 'fusion_settings'", source, line))
-    if issubclass(kind, EarlyFusion) and "lidar" not in detector.needs:
-        message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
-        raise SettingError(Problem(message, "give it a detector for LiDAR: lidar", source, line))
-    if kind.settings_type is None:
-        return kind()
-    return kind(parse_settings(kind.settings_type, given, source=source, line=line))  # type: ignore[call-arg]
-
-
-def build_agent(
-    settings: AgentSettings,
-    spec: ActorSpec,
-    roads: RoadNetwork | None,
-    *,
-    seed: int,
-    dt: float,
-    own_perception: bool = False,
-    detector: Detector | None = None,
-    encoder: Asn1Encoder | None = None,
-) -> Agent:
-    """The agent of the station on this body. Extensions are built as `Detector()` or `Detector(detector_settings)`,
-    `FusionMethod()` or `FusionMethod(fusion_settings)`, and `Planner(settings, spec, roads, dt=dt, seed=seed)`;
-    `detector` gives one that is built already.
-
-    A body with wheels follows a route if the settings name no planner; one without drives never.
-    Raises SettingError if a planner is asked of a body without wheels.
-    """
-    wheels = spec.wheelbase > 0.0
-    planner = settings.planner or ("route" if wheels else NO_PLANNER)
-    if planner != NO_PLANNER and not wheels:
-        raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
-    detector = detector or build_detector(settings)
-    sensors = settings.rig_sensors(detector.needs, detector.usual_sensors)
-    installation = Installation(spec, sensors, roads, seed)
-    detector.install(installation)
-    fusion = build_fusion(settings, detector)
-    points = None
-    if isinstance(fusion, EarlyFusion):
-        points = SharedPoints(fusion, _joint(settings, installation) if planner != NO_PLANNER else None)
-    return Agent(
-        spec,
-        settings,
-        perception=Perception(
-            detector,
-            tracker=_tracker(settings, detector),
-            localizer=_localizer(spec.name, seed, sensors) if settings.localization == "ekf" else None,
-            latency=settings.detector_latency,
-        ),
-        fusion=fusion,
-        planner=None
-        if planner == NO_PLANNER
-        else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
-        controller=Controller(spec, dt) if wheels else None,
-        speaker=Speaker(spec, settings, sensors=len(sensors), encoder=encoder),
-        dt=dt,
-        own_perception=own_perception,
-        points=points,
-    )
-
-
-def _joint(settings: AgentSettings, installation: Installation) -> Perception:
-    """What looks for objects in the points of all stations: as the station's own, on readings that are located."""
-    detector = build_detector(settings)
-    detector.install(installation)
-    return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
-
-
-def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:
-    """The tracker that the settings ask for; without a word of theirs, one where the detector gives no velocities."""
-    if settings.tracker is None:
-        return None if detector.gives_velocity else Tracker(TrackerSettings())
-    return None if settings.tracker.kind == "none" else Tracker(settings.tracker)
-
-
-def _localizer(name: str, seed: int, sensors: Mapping[str, SensorSettings]) -> Localizer:
-    """A filter that knows the data sheet of the station's inertial unit."""
-    units = [sensor for sensor in sensors.values() if isinstance(sensor, ImuSettings)]
-    return Localizer(name, seed, noise=motion_noise(units[0]))

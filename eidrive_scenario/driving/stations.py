@@ -6,24 +6,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from eidrive_scenario.driving.agent import Agent, build_agent, build_detector, build_fusion, build_rig
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.building import build_agent, build_rig
+from eidrive_scenario.driving.declared import declared_detectors, declared_encoders, declared_settings
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
 from eidrive_scenario.driving.step import AgentStep, Goal
-from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
-from eidrive_scenario.registry import registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
-from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.message import LinkEvent, Received
@@ -73,10 +69,10 @@ class Stations:
         self._rigs: dict[str, Rig] = {}
         self._lookouts: dict[str, SignalLookout] = {}
         self._held: dict[str, HeldControls] = {}
-        self._settings = _all_settings(scenario, detector, cooperate)
-        self._detectors = _all_detectors(scenario, self._settings, detector)
+        self._settings = declared_settings(scenario, detector, cooperate)
+        self._detectors = declared_detectors(scenario, self._settings, detector)
         """Built beforehand, as what they cannot work with shall be told before the run."""
-        self._encoders = _all_encoders(scenario, self._settings)
+        self._encoders = declared_encoders(scenario, self._settings)
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None)
 
@@ -213,99 +209,3 @@ class Stations:
         self.channel_name = profile.name if profile is not None else NO_COOPERATION
         for agent in self._agents.values():
             agent.own_perception = self._own_perception
-
-
-def _all_settings(
-    scenario: Scenario, detector: str | None, cooperate: tuple[str, ...] | None
-) -> dict[str, AgentSettings]:
-    """The settings of every entity with a controller of ours, options applied; all that is wrong in one error."""
-    if detector is not None and detector not in registry("detectors"):
-        remedy = suggestion(detector, registry("detectors"))
-        raise SettingError(Problem(f"unknown detector {detector!r}", remedy, "--detector"))
-    problems: list[Problem] = []
-    found: dict[str, AgentSettings] = {}
-    controllers: dict[str, Controller] = {}
-    for name, assigned in scenario.controllers.items():
-        for controller in filter(is_agent, assigned):
-            try:
-                found[name] = agent_settings(controller)
-            except SettingError as error:
-                problems.extend(error.problems)
-            controllers[name] = controller
-    for name, settings in found.items():
-        problems.extend(_unknown_senders(name, settings, controllers))
-    for sender in cooperate or ():
-        if sender not in controllers:
-            problems.append(Problem(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
-    if problems:
-        raise SettingError(problems)
-    options = {"detector": detector, "cooperates_with": cooperate}
-    update = {key: value for key, value in options.items() if value is not None}
-    return {name: settings.model_copy(update=update | _own(settings, detector)) for name, settings in found.items()}
-
-
-def _own(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
-    """What a detector by option changes: the settings in the file are those of the detector in the file."""
-    return {"detector_settings": {}} if detector is not None and detector != settings.detector else {}
-
-
-def _all_detectors(
-    scenario: Scenario, settings: Mapping[str, AgentSettings], option: str | None
-) -> dict[str, Detector]:
-    """The detector of every station. Raises SettingError with all that is wrong with any of them, their sensors or
-    their methods of fusion."""
-    problems: list[Problem] = []
-    found: dict[str, Detector] = {}
-    for name, station in settings.items():
-        controller = list(filter(is_agent, scenario.controllers[name]))[-1]
-        by_option = option is not None and not station.detector_settings
-        source = "--detector" if by_option else controller.source
-        line = None if by_option else _line(controller, "detector_settings", "detector")
-        try:
-            found[name] = build_detector(station, source=source, line=line)
-            source, line = controller.source, _line(controller, "sensors")
-            station.rig_sensors(found[name].needs, found[name].usual_sensors)
-            line = _line(controller, "fusion_settings", "fusion")
-            build_fusion(station, found[name], source=controller.source, line=line)
-        except SettingError as error:
-            problems += [
-                problem if problem.source else replace(problem, source=source, line=line) for problem in error.problems
-            ]
-    if problems:
-        raise SettingError(list(dict.fromkeys(problems)))
-    return found
-
-
-def _all_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:
-    """The encoder of every station that has ASN.1 modules. Raises SettingError, with the place of the property."""
-    found = {}
-    folder = Path(scenario.path).parent if scenario.path is not None else Path()
-    for name, station in settings.items():
-        if station.asn1_files:
-            controller = list(filter(is_agent, scenario.controllers[name]))[-1]
-            files = [folder / file for file in station.asn1_files]
-            line = _line(controller, "asn1_files")
-            found[name] = Asn1Encoder(files, station.messages, source=controller.source, line=line)
-    return found
-
-
-def _line(controller: Controller, *properties: str) -> int:
-    """The line of the first of these properties that a controller has, else its own."""
-    entries = controller.properties.property if controller.properties is not None else ()
-    lines = {entry.name: entry.line for entry in entries}
-    return next((lines[name] for name in properties if name in lines), controller.line)
-
-
-def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Problem]:
-    line = _line(controllers[name], "cooperates_with")
-    others = [other for other in controllers if other != name]
-    return [
-        Problem(
-            f"{name!r} cooperates with {sender!r}, which is no station",
-            suggestion(sender, others),
-            controllers[name].source,
-            line,
-        )
-        for sender in settings.cooperates_with or ()
-        if sender not in controllers
-    ]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.agent import Agent, build_agent
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.building import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.agent import Agent, build_agent
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.building import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.agent import build_agent
+from eidrive_scenario.driving.building import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.localization import Localizer
