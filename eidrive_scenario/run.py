@@ -1,0 +1,109 @@
+"""What is asked of a run, what it comes to, and who may watch it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.recording.criterion import Verdict
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.v2x.books import LinkStatistics
+
+PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
+"""Exit codes of a run."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What a caller may say beside the file; None leaves it to the file.
+
+    channel         profile name or file; 'none' is no cooperation
+    detector        for all stations
+    cooperate       the senders whom driven stations hear; () is nobody
+    parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
+    dt              step [s]
+    controllers     who stands in for controllers of other tools, by the controller's name; without an entry its entity
+                    keeps lane and speed
+    time_limit      [s] of simulated time, for files that do not end by themselves
+    weather         preset or file; it wins over all that the file says of weather and road
+    user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
+    """
+
+    channel: str | Path | None = None
+    detector: str | None = None
+    cooperate: tuple[str, ...] | None = None
+    parameters: Mapping[str, str | Assignment] = field(default_factory=dict)
+    dt: float = 0.05
+    time_limit: float = 120.0
+    controllers: Mapping[str, str] = field(default_factory=dict)
+    weather: str | Path | None = None
+    user_values: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run came to."""
+
+    scenario: str
+    seed: int
+    channel: str
+    passed: bool
+    end: str
+    """stop trigger, storyboard complete, criterion: NAME, or time limit"""
+    exit_code: int
+    criteria: tuple[Verdict, ...]
+    metrics: Mapping[str, float]
+    trace_hash: str
+    simulated_s: float
+    wall_s: float
+    warnings: tuple[str, ...] = ()
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Of the scenario as a whole, with the values that counted."""
+    run: int | None = None
+    """Its number among the runs of a parameter value distribution, from 0 on."""
+    links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
+    """The books of the radio, by (sender, receiver)."""
+
+    def as_json(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        return {
+            "scenario": self.scenario,
+            **({} if self.run is None else {"run": self.run}),
+            "parameters": dict(self.parameters),
+            "seed": self.seed,
+            "channel": self.channel,
+            "passed": self.passed,
+            "end": self.end,
+            "criteria": [
+                {
+                    "name": verdict.name,
+                    "passed": verdict.passed,
+                    "value": verdict.value,
+                    "limit": verdict.limit,
+                    "unit": verdict.unit,
+                    "reason": verdict.reason,
+                }
+                for verdict in self.criteria
+            ],
+            "metrics": dict(self.metrics),
+            "links": [
+                {"sender": sender, "receiver": receiver, **book.as_json()}
+                for (sender, receiver), book in self.links.items()
+            ],
+            "trace_hash": self.trace_hash,
+            "simulated_s": self.simulated_s,
+            "wall_s": self.wall_s,
+        }
+
+
+class Observer(Protocol):
+    """Watches a run without changing it: a recorder, a CSV writer, a collector of pictures."""
+
+    def observe(self, frame: Frame) -> None:
+        """Take one frame."""
+
+    def close(self) -> None:
+        """The run is over."""
