@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.nurbs import Nurbs, along_the_curve
 
 SPACING = 0.1
 """Distance between the points at which curved shapes are laid out [m]."""
@@ -241,59 +242,30 @@ def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list
 
 
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
-    """Points of a rational B-spline by de Boor's recursion (Piegl and Tiller, The NURBS Book, ch. 4).
+    """A rational B-spline; it looks where its control points do, if they say (1.3.1, 6.9), else along the curve.
 
     The curve passes through its first and last control points only, and the standard does not say where on it the time
     of another one holds. As in esmini (its NurbsShape) that is where its basis function is largest, on as many even
     steps of the parameter as the control polygon has metres; between, the parameter grows evenly with time. Which of
     the two steps around the peak counts its traces alone tell: the one before.
     """
-    knots = [knot.value for knot in shape.knot]
-    control = [(resolve(p.position), p.weight if p.weight is not None else 1.0, p.time) for p in shape.control_point]
-    degree = shape.order - 1
-    low, high = knots[degree], knots[len(control)]
-    rough = sum(math.hypot(b[0].x - a[0].x, b[0].y - a[0].y) for a, b in pairwise(control))
+    weights = [1.0 if point.weight is None else point.weight for point in shape.control_point]
+    control = [(resolve(point.position), weight) for point, weight in zip(shape.control_point, weights, strict=True)]
+    curve = Nurbs(shape.order, [knot.value for knot in shape.knot], control)
+    rough = sum(math.hypot(b.x - a.x, b.y - a.y) for (a, _), (b, _) in pairwise(control))
     count = max(2, math.ceil(rough / SPACING))
-    s: list[float] = [0.0]
-    points: list[tuple[float, float, float]] = []
-    peaks = [(0.0, 0)] * len(control)
-    for number in range(count + 1):
-        u = low + (high - low) * number / count
-        weights = _basis(u, degree, knots, len(control))
-        total = sum(share * entry[1] for share, entry in zip(weights, control, strict=True))
-        rational = [share * entry[1] / total for share, entry in zip(weights, control, strict=True)]
-        x, y, z = (sum(r * entry[0][axis] for r, entry in zip(rational, control, strict=True)) for axis in range(3))
-        if points:
-            s.append(s[-1] + math.hypot(x - points[-1][0], y - points[-1][1]))
-        points.append((x, y, z))
-        for index, share in enumerate(weights):
-            if share > peaks[index][0]:
-                peaks[index] = (share, number)
-    poses = []
-    for number, (x, y, z) in enumerate(points):
-        a, b = points[max(0, number - 1)], points[min(count, number + 1)]
-        poses.append(Pose(x, y, z, math.atan2(b[1] - a[1], b[0] - a[0]), 0.0, 0.0))
-    given = _times([time for _, _, time in control])
-    if given is None:
-        return Layout(tuple(s), tuple(poses), None, closed)
+    poses = curve.sampled(count)
+    given = any(has_heading(point.position) for point in shape.control_point)
+    if not given:
+        poses = along_the_curve(poses)
+    s = [0.0, *accumulate(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(poses))]
+    times = _times([point.time for point in shape.control_point])
+    if times is None:
+        return Layout(tuple(s), tuple(poses), None, closed, given)
     metres = 1 + int(rough)
-    stations = [math.floor((number + 1) / count * metres) / metres * count for _, number in peaks]
-    clock = np.interp(np.arange(count + 1), stations, given)
-    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed)
-
-
-def _basis(u: float, degree: int, knots: Sequence[float], count: int) -> list[float]:
-    span = count - 1 if u >= knots[count] else min(max(bisect_right(knots, u) - 1, degree), count - 1)
-    values = [0.0] * (len(knots) - 1)
-    values[span] = 1.0
-    for order in range(1, degree + 1):
-        for index in range(len(knots) - order - 1):
-            left = knots[index + order] - knots[index]
-            right = knots[index + order + 1] - knots[index + 1]
-            before = (u - knots[index]) / left * values[index] if left > 0.0 else 0.0
-            after = (knots[index + order + 1] - u) / right * values[index + 1] if right > 0.0 else 0.0
-            values[index] = before + after
-    return values[:count]
+    stations = [math.floor((number + 1) / count * metres) / metres * count for number in curve.peaks(count)]
+    clock = np.interp(np.arange(count + 1), stations, times)
+    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given)
 
 
 def has_heading(position: model.Position) -> bool:

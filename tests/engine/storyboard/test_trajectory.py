@@ -122,3 +122,33 @@ def test_a_rational_spline_makes_an_exact_circle() -> None:
     for share in (0.1, 0.37, 0.8):
         pose = way.at(share * way.length)
         assert math.hypot(pose.x, pose.y) == pytest.approx(10.0, abs=1e-3)
+
+
+@pytest.mark.element("Nurbs")
+def test_control_points_with_headings_say_where_a_spline_looks() -> None:
+    """Half way the quadratic Bernstein polynomials are 1/4, 1/2, 1/4: 0.25 · 3.0 + 0.5 · 3.2 + 0.25 · 3.0 = 3.1 rad, as
+    -3.083 is 3.2 less a whole turn."""
+    points = ((0, 0, 3.0), (10, 0, 3.2 - 2 * math.pi), (20, 0, 3.0))
+    shape = model.Nurbs(
+        order=3,
+        control_point=tuple(model.ControlPoint(position=at(x, y, h)) for x, y, h in points),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
+    )
+    way = lay_out(trajectory(nurbs=shape), resolve)
+    assert way.given
+    assert way.at(10.0)[:4] == pytest.approx((10.0, 0.0, 0.0, 3.1), abs=1e-6)
+    assert way.at(0.0).h == pytest.approx(3.0)
+
+
+@pytest.mark.element("Nurbs")
+def test_the_time_of_a_control_point_holds_where_its_basis_function_peaks() -> None:
+    """In the middle of three: at half of the parameter, on steps of a metre of the control polygon."""
+    points = ((0, 0, 0.0), (10, 0, 2.0), (20, 0, 6.0))
+    shape = model.Nurbs(
+        order=3,
+        control_point=tuple(model.ControlPoint(position=at(x, y), time=t) for x, y, t in points),
+        knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
+    )
+    way = lay_out(trajectory(nurbs=shape), resolve)
+    assert way.at_time(2.0) == pytest.approx(10.0, abs=1.0)
+    assert (way.at_time(0.0), way.at_time(6.0)) == pytest.approx((0.0, 20.0))
