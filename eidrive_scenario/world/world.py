@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +16,13 @@ from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body, ScriptedBody
 from eidrive_scenario.world.bullet import bullet, connect
 from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
+from eidrive_scenario.world.cast import Cast
 from eidrive_scenario.world.contacts import ContactTracker
 from eidrive_scenario.world.driven_body import DrivenBody
 from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
-from eidrive_scenario.world.rays import GROUND, NOTHING, Point, RayHits, cast_rays, first_met
+from eidrive_scenario.world.rays import Point, RayHits, cast_rays, first_met
 from eidrive_scenario.world.render.tones import toned, white_level
 from eidrive_scenario.world.roadside import FIRST_LABEL
 from eidrive_scenario.world.scenery import Scenery
@@ -31,16 +31,6 @@ from eidrive_scenario.world.visuals import Shown, Visuals
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
-
-
-class _Cast(NamedTuple):
-    """What the view says of the actors that stays as long as nobody enters or leaves."""
-
-    names: tuple[str, ...]
-    categories: tuple[str, ...]
-    rows: Mapping[str, int]
-    size: Array
-    offset: Array
 
 
 class World:
@@ -76,11 +66,7 @@ class World:
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
         self._view: WorldView | None = None
-        self._rows: dict[str, int] = {}
-        self._in_order: list[Body] = []
-        self._cast: _Cast | None = None
-        self._row_of_handle = np.empty(0, dtype=np.int64)
-        self._row_in_list: list[int] = []
+        self._cast: Cast | None = None
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
@@ -120,7 +106,7 @@ class World:
         if spec.name in self._bodies:
             raise SimulationError(f"actor {spec.name!r} is in the world already")
         self._enter(spec, placement, driven)
-        self._contacts = self._contacts + self._tracker.update(self._in_order, {})
+        self._contacts = self._contacts + self._tracker.update(tuple(self._bodies.values()), {})
 
     def remove(self, name: str) -> None:
         """Take an actor out of the world. Raises SimulationError if it is not there."""
@@ -207,35 +193,12 @@ class World:
         touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._contacts = self._tracker.update(self._in_order, touches)
+        self._contacts = self._tracker.update(self._actors.bodies, touches)
 
     def view(self) -> WorldView:
         """The truth now; the same object until something changes."""
         if self._view is None:
-            cast = self._cast or self._cast_of_actors()
-            states = [body.state for body in self._in_order]
-            table = np.array(states, dtype=float).reshape(-1, 14)
-            table.flags.writeable = False
-            self._view = WorldView(
-                time=self.time,
-                tick=self.tick,
-                names=cast.names,
-                categories=cast.categories,
-                position=table[:, 0:3],
-                yaw=table[:, 3],
-                pitch=table[:, 4],
-                roll=table[:, 5],
-                velocity=table[:, 6:9],
-                acceleration=table[:, 9:12],
-                yaw_rate=table[:, 12],
-                speed=table[:, 13],
-                size=cast.size,
-                offset=cast.offset,
-                contacts=self._contacts,
-                unseen=self._unseen,
-                unseen_by=self._unseen_by,
-            )
-            self._view.__dict__.update(rows=cast.rows, states=states)
+            self._view = self._actors.view(self.time, self.tick, self._contacts, self._unseen, self._unseen_by)
         return self._view
 
     def distance(self, first: str, second: str) -> float:
@@ -253,7 +216,7 @@ class World:
         passed = np.array([*(rows[name] for name in ignore), *unseen], dtype=np.int64)
         begin, end = (np.ascontiguousarray(np.reshape(points, (-1, 3)), dtype=float) for points in (origins, targets))
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
-        return cast_rays(self._client, begin, end, self._row_of_handle, passed)
+        return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
     def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
         """The rows that rays meet first, as `cast` has them: quicker for up to a thousand rays in plain numbers."""
@@ -261,7 +224,7 @@ class World:
         if self._unseen:
             rows: list[int] = self.cast(origins, targets).rows.tolist()
             return rows
-        return first_met(self._client, origins, targets, self._row_in_list)
+        return first_met(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
         """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
@@ -317,24 +280,14 @@ class World:
 
     def _changed(self) -> None:
         """Somebody entered or left: what was prepared for the former actors is void."""
-        self._view = self._cast = None
+        self._view = None
         self._physics.changed()
-        self._in_order = list(self._bodies.values())
-        self._rows = {name: row for row, name in enumerate(self._bodies)}
-        highest = max([self._scenery.highest_handle, *(body.handle for body in self._in_order)])
-        self._row_of_handle = np.full(highest + 2, GROUND, dtype=np.int64)
-        self._row_of_handle[-1] = NOTHING
-        for row, body in enumerate(self._in_order):
-            self._row_of_handle[body.handle] = row
-        self._row_in_list = self._row_of_handle.tolist()
+        self._cast = None
 
-    def _cast_of_actors(self) -> _Cast:
-        specs = [body.spec for body in self._in_order]
-        size = np.array([spec.size for spec in specs], dtype=float).reshape(-1, 3)
-        offset = np.array([spec.offset for spec in specs], dtype=float).reshape(-1, 3)
-        size.flags.writeable = offset.flags.writeable = False
-        names, categories = tuple(self._bodies), tuple(spec.category for spec in specs)
-        self._cast = _Cast(names, categories, dict(self._rows), size, offset)
+    @property
+    def _actors(self) -> Cast:
+        if self._cast is None:
+            self._cast = Cast.of(self._bodies, self._scenery.highest_handle)
         return self._cast
 
     def _refresh(self) -> None:
@@ -342,4 +295,4 @@ class World:
         raised = self._scenery.raise_ground()
         if self._scenery.raise_obstacles() or raised:
             self._changed()
-        self._physics.refresh(self._in_order)
+        self._physics.refresh(self._actors.bodies)

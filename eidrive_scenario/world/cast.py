@@ -1,0 +1,91 @@
+"""The actors of a world, in the order in which they entered, and the views of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.bodies import Body
+from eidrive_scenario.world.rays import GROUND, NOTHING
+from eidrive_scenario.world.view import Contact, WorldView
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cast:
+    """What stays as long as nobody enters or leaves.
+
+    row_of_handle  the row of the actor whose body has that number in pybullet, GROUND for what is no actor; the last
+                   entry, that of the handle -1, is NOTHING
+    """
+
+    bodies: tuple[Body, ...]
+    names: tuple[str, ...]
+    categories: tuple[str, ...]
+    rows: Mapping[str, int]
+    size: Array
+    offset: Array
+    row_of_handle: NDArray[np.int64]
+    row_in_list: list[int]
+    """The same as a list."""
+
+    @classmethod
+    def of(cls, bodies: Mapping[str, Body], highest_handle: int) -> Cast:
+        """From the bodies by name; `highest_handle` is that of other bodies in pybullet."""
+        order = tuple(bodies.values())
+        size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)
+        offset = np.array([body.spec.offset for body in order], dtype=float).reshape(-1, 3)
+        size.flags.writeable = offset.flags.writeable = False
+        highest = max([highest_handle, *(body.handle for body in order)])
+        row_of_handle = np.full(highest + 2, GROUND, dtype=np.int64)
+        row_of_handle[-1] = NOTHING
+        for row, body in enumerate(order):
+            row_of_handle[body.handle] = row
+        return cls(
+            bodies=order,
+            names=tuple(bodies),
+            categories=tuple(body.spec.category for body in order),
+            rows={name: row for row, name in enumerate(bodies)},
+            size=size,
+            offset=offset,
+            row_of_handle=row_of_handle,
+            row_in_list=row_of_handle.tolist(),
+        )
+
+    def view(
+        self,
+        time: float,
+        tick: int,
+        contacts: tuple[Contact, ...],
+        unseen: tuple[str, ...],
+        unseen_by: Mapping[str, tuple[str, ...]],
+    ) -> WorldView:
+        """How all stand and move now, and what else the view says of this instant."""
+        states = [body.state for body in self.bodies]
+        table = np.array(states, dtype=float).reshape(-1, 14)
+        table.flags.writeable = False
+        view = WorldView(
+            time=time,
+            tick=tick,
+            names=self.names,
+            categories=self.categories,
+            position=table[:, 0:3],
+            yaw=table[:, 3],
+            pitch=table[:, 4],
+            roll=table[:, 5],
+            velocity=table[:, 6:9],
+            acceleration=table[:, 9:12],
+            yaw_rate=table[:, 12],
+            speed=table[:, 13],
+            size=self.size,
+            offset=self.offset,
+            contacts=contacts,
+            unseen=unseen,
+            unseen_by=unseen_by,
+        )
+        view.__dict__.update(rows=self.rows, states=states)
+        return view
