@@ -38,7 +38,7 @@ reproduce-trends: install  ## known trends, measured and expected: reports/trend
 bench: install  ## simulated seconds per wall second, and where the time goes
 	$(BIN)/python benchmarks/bench_scenario_1.py
 	$(BIN)/python benchmarks/bench_fusion.py
-	$(BIN)/python benchmarks/bench_perception.py
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/bench_perception.py
 	$(BIN)/python benchmarks/bench_radio.py
 	@test -z "$$EIDRIVE_MAPS" && echo 'EIDRIVE_MAPS is not set: no bench_traffic' || $(BIN)/python benchmarks/bench_traffic.py
 	@test -z "$$EIDRIVE_CORPORA" && echo 'EIDRIVE_CORPORA is not set: no bench_corpora' || $(BIN)/python benchmarks/bench_corpora.py

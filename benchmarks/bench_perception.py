@@ -1,9 +1,10 @@
-"""What perception without learning finds on scenarios 1 and 2, and how long it takes on one core.
+"""What perception without learning finds on scenarios 1 and 2, and how long all detectors take on one core.
 
 Recall and errors of the detector `lidar` for objects with three points or more, of all stations; milliseconds of
-sensor, detector and tracker; simulated seconds per second of processor time of whole runs with `--detector lidar`.
+sensor, detector and tracker; simulated seconds per second of processor time of whole runs with each detector, and what
+takes the time. `OPENBLAS_NUM_THREADS=1` gives numpy's matrix products one thread, as torch and OpenCV have here.
 
-    python benchmarks/bench_perception.py [--every 5] [--seed 1]
+    python benchmarks/bench_perception.py [--every 5] [--seed 1] [--repeats 1] [--runs-only]
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
+from detector_runs import print_table
 from random_scenes import random_scenes
 
 from eidrive_scenario.detections import Detections
@@ -26,7 +28,7 @@ from eidrive_scenario.perception.lidar_detector import LidarDetector
 from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings
-from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed, run_file
+from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 
 SCENARIOS = {"coop/scenario_1": ("Ego", "RSU"), "coop/scenario_2": ("Ego", "Spectator")}
 FOUND = 2.5
@@ -141,11 +143,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--every", type=int, default=5, help="look on at every n-th tick")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--repeats", type=int, default=1, help="of each whole run; the best counts")
+    parser.add_argument("--runs-only", action="store_true", help="leave out what the detector `lidar` finds")
     arguments = parser.parse_args()
+    if not arguments.runs_only:
+        print_findings(arguments.every, arguments.seed)
+    print_table(arguments.seed, arguments.repeats)
+
+
+def print_findings(every: int, seed: int) -> None:
+    """What the detector `lidar` finds, and how long a sweep takes."""
     print("scenarios 1 and 2, by which thresholds were chosen")
     found = Findings()
     for name, stations in SCENARIOS.items():
-        look(name, stations, arguments.every, arguments.seed, found)
+        look(name, stations, every, seed, found)
     for kind, errors in sorted(found.errors.items()):
         hits = [error for error in errors if math.isfinite(error)]
         share, middle = 100 * len(hits) / len(errors), median(hits)
@@ -157,12 +168,6 @@ def main() -> None:
         f"LiDAR {1e3 * median(found.sensor):.1f} ms, detector {1e3 * median(found.detector):.1f} ms per sweep (medians)"
     )
     print(*(f"tracker {kind}, 10 objects: {tracker_milliseconds(kind):.2f} ms" for kind in ("cv", "ctrv")), sep="\n")
-    for name in SCENARIOS:
-        began = time.process_time()
-        result = run_file(resolve_scenario(name), seed=arguments.seed, settings=RunSettings(detector="lidar"))
-        spent = time.process_time() - began
-        verdict = "passed" if result.passed else "failed"
-        print(f"{name} --detector lidar: {verdict}, {result.simulated_s / spent:.1f} times real time on one core")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,16 @@
 """How long a picture and a sweep take on one core: `python benchmarks/bench_sensors.py`.
 
-The street is that of the weather sheet: a crossing with 14 road users and eight houses. CPU time of the process, the
-best of many, so that other programs on the machine count little. OpenCV gets one thread, and so should numpy's matrix
-products: `OPENBLAS_NUM_THREADS=1`.
+The street is that of the weather sheet: a crossing with 14 road users and eight houses. Once all is drawn anew, as for a
+moving camera, and once for one that stands still, which keeps its scenery. CPU time of the process, the best of many, so
+that other programs on the machine count little. OpenCV gets one thread, and so should numpy's matrix products:
+`OPENBLAS_NUM_THREADS=1`.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import cv2
 
@@ -19,9 +21,10 @@ from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.sensing.camera import Photographer
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
+from eidrive_scenario.world.render.renderer import Renderer
 from eidrive_scenario.world.weather import load_weather
 
-SIZES = ((320, 192), (640, 360), (800, 600))
+SIZES = ((320, 192), (512, 384), (640, 360), (800, 600))
 REPEATS = 15
 
 
@@ -36,20 +39,38 @@ def best(task: Callable[[], object]) -> float:
     return 1e3 * min(times)
 
 
+@contextmanager
+def _nothing_kept() -> Iterator[None]:
+    """All scenery is drawn anew."""
+    usual = Renderer.MOST_KEPT
+    Renderer.MOST_KEPT = 0
+    try:
+        yield
+    finally:
+        Renderer.MOST_KEPT = usual
+
+
 def main() -> None:
     """Print a table."""
     cv2.setNumThreads(1)
     pose = look_at((1.9, -0.2, 1.35), (22.0, 0.1, 1.15))
     with street() as world:
         view = world.view()
-        print("camera, with noise [ms]   " + "".join(f"{width} x {height:<8}" for width, height in SIZES))
+        print("camera, with noise: moving / standing [ms]")
+        print(f"{'':<18}" + "".join(f"{f'{width} x {height}':<16}" for width, height in SIZES))
         for weather in names("weather"):
             world.set_weather(load_weather(weather))
             row = []
             for width, height in SIZES:
                 camera = Photographer(CameraSettings(width=width, height=height, fov=80.0))
-                row.append(best(lambda camera=camera: camera.take(world, pose, generator(1, "bench"), ignore=("Ego",))))
-            print(f"{weather:<26}" + "".join(f"{value:<14.1f}" for value in row))
+
+                def take(camera: Photographer = camera) -> object:
+                    return camera.take(world, pose, generator(1, "bench"), ignore=("Ego",))
+
+                standing = best(take)
+                with _nothing_kept():
+                    row.append(f"{best(take):.1f} / {standing:.1f}")
+            print(f"{weather:<18}" + "".join(f"{value:<16}" for value in row))
         print("\nLiDAR, 32 channels, 5760 rays a sweep [ms]")
         for weather in ("sunny", "foggy_morning"):
             world.set_weather(load_weather(weather))
