@@ -1,8 +1,8 @@
 """How long a picture and a sweep take on one core: `python benchmarks/bench_sensors.py`.
 
-The street is that of the weather sheet: a crossing with 14 road users and eight houses. Once all is drawn anew, as for a
-moving camera, and once for one that stands still, which keeps its scenery. CPU time of the process, the best of many, so
-that other programs on the machine count little. OpenCV gets one thread, and so should numpy's matrix products:
+The street is that of the weather sheet: a crossing with 14 road users and eight houses. Once all is drawn anew, as for
+a moving camera, and once for one that stands still, which keeps its scenery. CPU time of the process, the best of many,
+so that other programs on the machine count little. OpenCV gets one thread, and so should numpy's matrix products:
 `OPENBLAS_NUM_THREADS=1`.
 """
 
