@@ -35,8 +35,12 @@ class Pose(NamedTuple):
 
         Pitch and roll follow: what climbs in one direction descends in the other.
         """
+        if angle == 0.0:
+            return self
         if self.p == 0.0 and self.r == 0.0:
             return Pose(self.x, self.y, self.z, self.h + angle, self.p, self.r)
+        if abs(angle) == math.pi:
+            return Pose(self.x, self.y, self.z, self.h + angle, -self.p, -self.r)
         ca, sa = math.cos(angle), math.sin(angle)
         cp, sp, cr, sr = math.cos(self.p), math.sin(self.p), math.cos(self.r), math.sin(self.r)
         # Columns of Ry(p)·Rx(r)·Rz(angle): forward and the vertical parts of left and up.
@@ -44,7 +48,7 @@ class Pose(NamedTuple):
         left_z, up_z = sp * sa + cp * sr * ca, cp * cr
         heading = math.atan2(forward[1], forward[0])
         pitch = math.atan2(-forward[2], math.hypot(forward[0], forward[1]))
-        return self._replace(h=self.h + heading, p=pitch, r=math.atan2(left_z, up_z))
+        return Pose(self.x, self.y, self.z, self.h + heading, pitch, math.atan2(left_z, up_z))
 
 
 class Poses(NamedTuple):

@@ -206,8 +206,8 @@ class Motion:
         assert self.roads is not None
         pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
         turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
-        pose = pose.turned(turn)
-        return pose._replace(h=wrap_angle(pose.h))
+        x, y, z, h, p, r = pose.turned(turn)
+        return Pose(x, y, z, wrap_angle(h), p, r)
 
     def _last_place(self, here: LaneLocation, along: float) -> LaneLocation:
         assert self.roads is not None
