@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.generation.cam import LONGEST, SHORTEST, CamTriggers
+from eidrive_scenario.v2x.generation.cam import EQUAL, LONGEST, SHORTEST, CamTriggers
 from eidrive_scenario.v2x.generation.cpm import CpmTriggers
 from eidrive_scenario.v2x.generation.numbering import Numbering
 from eidrive_scenario.v2x.message import Message, StationState
@@ -39,6 +39,8 @@ class Speaker:
         self._cam = CamTriggers()
         self._cpm = CpmTriggers()
         self._numbering = Numbering()
+        self._said = dict.fromkeys(settings.messages, -math.inf)
+        """When each kind of message was last made [s]."""
 
     def speak(
         self,
@@ -52,26 +54,34 @@ class Speaker:
         """The messages of this tick, none where none is due; the first CPM carries the points.
 
         interval  least time between two messages of this station by congestion control [s]; the rules of ETSI keep to
-                  it, and each of two kinds of messages has half of them
+                  it. Of two kinds of messages then only one is made at a time, first that which was made longer ago
         """
         etsi = self._settings.generation == "etsi"
         if not etsi and not self._in_turn(now):
             return ()
-        kinds = self._settings.messages
-        shortest = min(max(interval * len(kinds), SHORTEST), LONGEST)
+        interval = min(interval, LONGEST)
         said: list[Message] = []
-        if "cam" in kinds and (not etsi or self._cam.due(state, now, shortest)):
-            said.append(self._awareness(state, now))
-        if "cpm" in kinds:
-            perceived = (
-                self._triggered(state, detections, now, shortest)
-                if etsi
-                else [self._everything(state, detections, now)]
-            )
-            if points is not None and perceived:
-                perceived[0] = replace(perceived[0], points=points, size=perceived[0].size + points.size)
-            said += perceived
+        for kind in sorted(self._settings.messages, key=lambda kind: (self._said[kind], kind)):
+            if etsi and interval > 0.0 and now - max(self._said.values()) < interval - EQUAL:
+                break
+            if etsi:
+                messages = self._due(kind, state, detections, now, max(interval, SHORTEST))
+            else:
+                messages = [self._awareness(state, now) if kind == "cam" else self._everything(state, detections, now)]
+            if points is not None and messages and kind == "cpm":
+                messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
+            if messages:
+                self._said[kind] = now
+            said += messages
         return tuple(self._clock.stamped(message, now) for message in said)
+
+    def _due(
+        self, kind: str, state: StationState, detections: Detections, now: float, shortest: float
+    ) -> list[Message]:
+        """The messages of this kind that the rules of ETSI ask for now."""
+        if kind == "cpm":
+            return self._triggered(state, detections, now, shortest)
+        return [self._awareness(state, now)] if self._cam.due(state, now, shortest) else []
 
     def _in_turn(self, now: float) -> bool:
         """Each tick, or at a rate."""

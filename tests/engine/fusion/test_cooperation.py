@@ -175,7 +175,7 @@ def test_what_stands_still_and_is_told_once_a_second_stays_known(latency: float)
 
 
 def test_congestion_control_spaces_the_messages_by_the_rules_of_etsi() -> None:
-    """At 25 m/s a CAM is due every 0.2 s and the car that B sees too; with 0.4 s asked for, each kind has half."""
+    """At 25 m/s a CAM is due every 0.2 s and the car that B sees too; with 0.4 s asked for, kinds take turns."""
     for kinds, interval, gap in (("cpm", 0.4, 0.4), ("cam", 0.4, 0.4), ("[cpm, cam]", 0.4, 0.8), ("cpm", 0.0, 0.2)):
         talk = Conversation(PLACES, None, generation="etsi", messages=kinds.strip("[]"))
         agent = talk.agents["A"]
@@ -187,6 +187,8 @@ def test_congestion_control_spaces_the_messages_by_the_rules_of_etsi() -> None:
                 said[message.kind].append(now)
         for times in filter(None, said.values()):
             assert np.diff(times) == pytest.approx(gap), (kinds, interval)
+        if interval:
+            assert np.diff(sorted(said["cam"] + said["cpm"])) == pytest.approx(interval), "one at a time"
 
 
 def fast(time: float) -> Readings:
