@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.furniture import Fixture
+from eidrive_scenario.world.nearby import SQUARE, Nearby
 
 Array = NDArray[np.float64]
 
 MOST_FACES = 20_000
 """In one collision shape; pybullet refuses much more."""
-_CELL = 10.0
-"""Squares by which it is known what stands where [m]."""
 FOLIAGE = 0.8
 """Share of a crown's or a bush's extents that lets nobody see through."""
 CROWN = 0.3
@@ -42,10 +41,9 @@ class Obstacles:
         self._solid = _merged_rails(solid)
         self._soft = [piece for piece in furniture if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
-        self._in_cell: dict[tuple[int, int], dict[int, Fixture]] = {}
-        for row, piece in enumerate(self._solid):
-            for cell in _cells(piece):
-                self._in_cell.setdefault(cell, {})[row] = piece
+        self._nearby: Nearby[Fixture] = Nearby()
+        for piece in self._solid:
+            self._nearby.add(piece, _cells(piece))
 
     def raise_bodies(self, client: int) -> list[int]:
         """Put the bodies into pybullet; returns their handles."""
@@ -55,15 +53,7 @@ class Obstacles:
 
     def near(self, x: float, y: float, reach: float) -> bool:
         """Whether anything solid is within reach of a point [m]."""
-        if not self._in_cell:
-            return False
-        lines = range(math.floor((y - reach) / _CELL), math.floor((y + reach) / _CELL) + 1)
-        for column in range(math.floor((x - reach) / _CELL), math.floor((x + reach) / _CELL) + 1):
-            for line in lines:
-                for piece in self._in_cell.get((column, line), {}).values():
-                    if _gap(piece, x, y) <= reach:
-                        return True
-        return False
+        return any(_gap(piece, x, y) <= reach for piece in self._nearby.around(x, y, reach))
 
     def name_at(self, x: float, y: float) -> str:
         """What stands at a point at which something was touched."""
@@ -159,7 +149,7 @@ def _corners(boxes: Array) -> Array:
 
 def _cells(piece: Fixture) -> Iterator[tuple[int, int]]:
     """The squares that a piece may touch."""
-    steps = max(math.ceil(max(piece.length, piece.width) / _CELL), 1)
+    steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
     dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)
     extent, side = max(piece.length, piece.width), min(piece.length, piece.width) / 2
@@ -167,7 +157,7 @@ def _cells(piece: Fixture) -> Iterator[tuple[int, int]]:
         at = (step / steps - 0.5) * extent
         x, y = piece.pose.x + at * dx, piece.pose.y + at * dy
         for ox, oy in ((-side, -side), (side, -side), (side, side), (-side, side)):
-            yield math.floor((x + ox) / _CELL), math.floor((y + oy) / _CELL)
+            yield math.floor((x + ox) / SQUARE), math.floor((y + oy) / SQUARE)
 
 
 def _gap(piece: Fixture, x: float, y: float) -> float:

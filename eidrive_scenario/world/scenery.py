@@ -15,6 +15,7 @@ from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTI
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.furniture import Fixture, fixtures
 from eidrive_scenario.world.ground import is_level
+from eidrive_scenario.world.nearby import Nearby, squares
 from eidrive_scenario.world.obstacles import MOST_FACES, Obstacles
 
 GROUND = "ground"
@@ -44,8 +45,8 @@ class Scenery:
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
         self.buildings: list[Building] = []
-        self._circles: list[tuple[float, float, float]] = []
-        """Middle and radius of each, seen from above [m]."""
+        self._nearby: Nearby[tuple[float, float, float]] = Nearby()
+        """Middle and radius of each building, seen from above [m]."""
         self._client = client
         self._entities = frozenset(entities)
         self._names: dict[int, str] = {}
@@ -64,7 +65,8 @@ class Scenery:
     ) -> None:
         """Put up a building that stops vehicles and rays."""
         self.buildings.append(Building(name, centre, size, yaw, colour))
-        self._circles.append((centre[0], centre[1], math.hypot(size[0], size[1]) / 2))
+        radius = math.hypot(size[0], size[1]) / 2
+        self._nearby.add((centre[0], centre[1], radius), squares(centre[0], centre[1], radius))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
         self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
@@ -128,7 +130,8 @@ class Scenery:
         """Whether anything that stands may be within reach of a point [m]."""
         if self._obstacles is not None and self._obstacles.near(x, y, reach):
             return True
-        return any([(bx - x) ** 2 + (by - y) ** 2 <= (reach + radius) ** 2 for bx, by, radius in self._circles])
+        around = self._nearby.around(x, y, reach)
+        return any((bx - x) ** 2 + (by - y) ** 2 <= (reach + radius) ** 2 for bx, by, radius in around)
 
     def _add_static(
         self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1

@@ -1,0 +1,39 @@
+"""What stands where, by squares of the ground: who is far from everything learns it at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Generic, TypeVar
+
+Thing = TypeVar("Thing")
+Cell = tuple[int, int]
+
+SQUARE = 10.0
+"""Side of a square [m]."""
+
+
+class Nearby(Generic[Thing]):
+    """Things that do not move, each in the squares that it may touch."""
+
+    def __init__(self) -> None:
+        self._in_cell: dict[Cell, list[Thing]] = {}
+
+    def add(self, thing: Thing, cells: Iterable[Cell]) -> None:
+        """One more, in these squares."""
+        for cell in dict.fromkeys(cells):
+            self._in_cell.setdefault(cell, []).append(thing)
+
+    def around(self, x: float, y: float, reach: float) -> Iterator[Thing]:
+        """Those in the squares within reach of a point [m]; one may come several times."""
+        if self._in_cell:
+            for cell in squares(x, y, reach):
+                yield from self._in_cell.get(cell, ())
+
+
+def squares(x: float, y: float, reach: float) -> Iterator[Cell]:
+    """The squares that touch the square around a point that reaches as far to each side [m]."""
+    lines = range(math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE) + 1)
+    for column in range(math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE) + 1):
+        for line in lines:
+            yield column, line
