@@ -13,11 +13,13 @@ from eidrive_scenario.errors import ConstraintError
 from eidrive_scenario.experiments.distribution_inspection import inspect_distribution
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
 pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with distribution files")
 
 LARGEST = "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc"
+TRIGGER = "CutInVehicle_HeadwayDistanceTrigger_dx0_m"
 
 
 def distributions() -> list[Path]:
@@ -49,6 +51,25 @@ def test_the_largest_is_counted_at_once_and_walked_in_constant_memory() -> None:
     tracemalloc.stop()
     assert len(seen) == 52_500, "no run comes twice"
     assert late - early < 8 * 2**20, "the hashes themselves take about 5 MB"
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_cut_in_at_a_gap_of_less_than_nothing_never_begins() -> None:
+    """Run 12,394: `dx0_m` is 0, and no free space is less than 0 m; without the cut-in nothing ends the run."""
+    path = next(path for path in distributions() if path.name == LARGEST)
+    runs = load_distribution(path)
+    assert sum(run.parameters[TRIGGER] == "0" for run in runs) == 7_500
+    run = runs[12_394]
+    assert run.parameters[TRIGGER] == "0"
+    simulation = Simulation(load_scenario(run.scenario, run.assignments), settings=RunSettings(dt=0.1, time_limit=20.0))
+    with simulation:
+        frames = [simulation.tick()]
+        while frames[-1][1] is None:
+            frames.append(simulation.tick())
+    assert frames[-1][1] == "time limit"
+    assert not any(
+        change.element == "CutInEvent" and change.transition for frame, _ in frames for change in frame.changes
+    )
 
 
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)

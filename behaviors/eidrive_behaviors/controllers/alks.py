@@ -25,9 +25,10 @@ class AlksDriver(StandIn):
 
     It plays esmini's ALKS_R157SM_Controller, by whose property `model` it is told which one: `Regulation`,
     `ReferenceDriver`, `RSS` or `FSM`. With `cruise` (the default) it returns to the set speed on a free road, and else
-    follows by 2 (v_lead - v) + gap - following distance [m/s²], within -4 and 3, which is esmini's law. Further
-    properties: `fullStop`, and for the ReferenceDriver `cutInPerceptionDelayMode` (`Dist`: 0.72 m, `Time`: 0.4 s),
-    `pedestrianRiskEvaluationTime` [s], `lateralTrigDistance` [m], `aebTTC` [s], `overlapTolerance` [m],
+    follows by 2 (v_lead - v) + gap - following distance [m/s²], within -4 and 3, which is esmini's law. With the
+    property `mode=override` it sees the others where they are a step later, as esmini then moves its car after them.
+    Further properties: `fullStop`, and for the ReferenceDriver `cutInPerceptionDelayMode` (`Dist`: 0.72 m, `Time`:
+    0.4 s), `pedestrianRiskEvaluationTime` [s], `lateralTrigDistance` [m], `aebTTC` [s], `overlapTolerance` [m],
     `alwaysTrigOnScenario`.
     """
 
@@ -37,7 +38,8 @@ class AlksDriver(StandIn):
         self.model = self._chosen()
         self._cruises = self._says("cruise", True)
         slack = self._number("overlapTolerance", 0.1) or 0.0
-        self._road = RoadAhead(stage, actor, self.model.reach, slack)
+        later = stage.step if self.properties.get("mode") == "override" else 0.0
+        self._road = RoadAhead(stage, actor, self.model.reach, tolerance=slack, later=later)
 
     def begin(self) -> None:
         """Drive on with the speed of now."""

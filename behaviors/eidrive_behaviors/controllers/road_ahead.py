@@ -57,10 +57,15 @@ class Ahead:
 
 
 class RoadAhead:
-    """Looks along the road of one actor, up to a range [m]."""
+    """Looks along the road of one actor, up to a range [m].
 
-    def __init__(self, stage: Stage, actor: Actor, reach: float, tolerance: float = 0.0) -> None:
-        self._stage, self._actor, self._reach, self._tolerance = stage, actor, reach, tolerance
+    tolerance  by which a full wrap may miss the edges of the front [m]
+    later      by how much the others are ahead of the actor in time [s]
+    """
+
+    def __init__(self, stage: Stage, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0) -> None:
+        self._stage, self._actor, self._reach = stage, actor, reach
+        self._tolerance, self._later = tolerance, later
 
     def look(self) -> list[Ahead]:
         """Those ahead in this lane or the next ones, and pedestrians wherever they are; the nearest first."""
@@ -82,10 +87,11 @@ class RoadAhead:
         if not walks and not own and abs(apart[1]) > 1.5 * width:
             return None
         side = math.copysign(1.0, apart[1])
-        mine, theirs = self._box(self._actor, here), self._box(other, there, *apart)
         way = roads.driving_direction(here.road, here.lane)
         along, across = self._velocity(self._actor, here)
         its_along, its_across = self._velocity(other, there)
+        moved = (apart[0] + its_along * self._later, apart[1] + its_across * self._later)
+        mine, theirs = self._box(self._actor, here), self._box(other, there, *moved)
         border = 0.5 * width - side * here.offset * way
         return Ahead(
             name=other.name,
@@ -98,9 +104,9 @@ class RoadAhead:
             sideways=abs(its_across),
             lanes=0 if own else int(side),
             towards=-side * (there.offset * way + 0.5 * sum(theirs[1]) - apart[1]),
-            intrusion=border - side * self._wheel(other, there, apart[1], side),
+            intrusion=border - side * self._wheel(other, there, moved[1], side),
             covers=self._covers(mine[1], theirs[1]),
-            across=apart[1],
+            across=moved[1],
             walks=walks,
         )
 
