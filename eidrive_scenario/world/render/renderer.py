@@ -206,9 +206,10 @@ def _paint(
         sky_left = open_sky.reshape(-1)[part]
         luminance = shade(points, lit, at.eye.place, at.light, at.weather, at.sky, shadows, shone, sky_left)
         canvas.planes[:, part] = _through_air(luminance, points.distance, at.weather) if fog else luminance
-        near = points.depth <= at.eye.pinhole.far
-        canvas.depth[part] = np.where(near, points.depth, np.float32(np.inf))
-        canvas.label[part] = np.where(near, lit.surfaces.label[points.triangle], np.int32(-1))
+        label = lit.surfaces.label.take(points.triangle)
+        beyond = np.flatnonzero(points.depth > at.eye.pinhole.far)
+        points.depth[beyond], label[beyond] = np.inf, -1
+        canvas.depth[part], canvas.label[part] = points.depth, label
 
 
 def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Floats:

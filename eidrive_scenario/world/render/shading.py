@@ -28,15 +28,13 @@ _GLINT = 350.0
 
 
 class Points(NamedTuple):
-    """What pixels (n,) show: their triangles, depth [m], places relative to the camera [m], directions (unit) from it
-    and distance [m]."""
+    """What pixels (n,) show: their triangles, depth [m], places relative to the camera [m] and distance from it [m]."""
 
     triangle: NDArray[np.int32]
     depth: Floats
     x: Floats
     y: Floats
     z: Floats
-    ray: tuple[Floats, Floats, Floats]
     distance: Floats
 
 
@@ -44,18 +42,18 @@ def points_at(pixels: Pixels, cover: Cover, eye: Eye) -> Points:
     """What pixels show that show something."""
     far = np.float32(1.0) / cover.nearness.reshape(-1)[pixels]
     rx, ry, rz = eye.rays(eye.x[pixels], eye.y[pixels])
-    length = eye.length[pixels]
-    ray = (rx / length, ry / length, rz / length)
-    return Points(cover.triangle.reshape(-1)[pixels], far, rx * far, ry * far, rz * far, ray, length * far)
+    triangle = cover.triangle.reshape(-1)[pixels]
+    return Points(triangle, far, rx * far, ry * far, rz * far, eye.length[pixels] * far)
 
 
 class Lit(NamedTuple):
     """N triangles in their light: luminance (3, N) under the sky and lamps overhead, what the sun adds where it shines
-    (None: nowhere), and whether they look up (N,)."""
+    (None: nowhere), both together; and whether they look up (N,)."""
 
     surfaces: Surfaces
     steady: Floats
     sunny: Floats | None
+    whole: Floats
     upright: NDArray[np.bool_]
 
 
@@ -74,7 +72,7 @@ def lit_surfaces(surfaces: Surfaces, light: Daylight, weather: Weather) -> Lit:
         sx, sy, sz = light.towards.astype(np.float32)
         facing = np.maximum(sx * nx + sy * ny + sz * nz, np.float32(0.0))
         sunny = reflected * facing * _column(light.sun)
-    return Lit(surfaces, steady, sunny, nz > 0.9)
+    return Lit(surfaces, steady, sunny, steady if sunny is None else steady + sunny, nz > 0.9)
 
 
 def together(first: Lit, second: Lit) -> Lit:
@@ -90,8 +88,10 @@ def together(first: Lit, second: Lit) -> Lit:
     sunny = None
     if first.sunny is not None and second.sunny is not None:
         sunny = np.concatenate([first.sunny, second.sunny], axis=1)
-    steady = np.concatenate([first.steady, second.steady], axis=1)
-    return Lit(surfaces, steady, sunny, np.concatenate([first.upright, second.upright]))
+    steady, whole = (
+        np.concatenate(pair, axis=1) for pair in ((first.steady, second.steady), (first.whole, second.whole))
+    )
+    return Lit(surfaces, steady, sunny, whole, np.concatenate([first.upright, second.upright]))
 
 
 def shade(
@@ -112,15 +112,18 @@ def shade(
     """
     triangle = points.triangle
     finish = among.surfaces.finish[triangle]
-    luminance: Floats = among.steady.take(triangle, axis=1)
-    luminance *= open_sky
-    lit = None
-    if among.sunny is not None:
-        sunny: Floats = among.sunny.take(triangle, axis=1)
-        if shadows is not None:
-            lit = shadows.lit(points.x, points.y, points.z)
-            sunny *= lit
-        luminance += sunny
+    lit = None if shadows is None or among.sunny is None else shadows.lit(points.x, points.y, points.z)
+    luminance: Floats
+    if lit is None and (open_sky == 1.0).all():
+        luminance = among.whole.take(triangle, axis=1)
+    else:
+        luminance = among.steady.take(triangle, axis=1)
+        luminance *= open_sky
+        if among.sunny is not None:
+            sunny: Floats = among.sunny.take(triangle, axis=1)
+            if lit is not None:
+                sunny *= lit
+            luminance += sunny
     if lamplight is not None:
         shone = lamplight.received * np.float32(1.0 / math.pi) + lamplight.across * RETURNS[finish]
         lamp_lit = np.flatnonzero(shone)
@@ -167,7 +170,8 @@ def _add_mirrors(
     if not len(rows):
         return
     nx, ny, nz = surfaces.normal.take(points.triangle[rows], axis=1)
-    dx, dy, dz = (part[rows] for part in points.ray)
+    distance = points.distance[rows]
+    dx, dy, dz = (part[rows] / distance for part in (points.x, points.y, points.z))
     inwards = np.minimum(dx * nx + dy * ny + dz * nz, np.float32(-1e-3))
     twice = np.float32(2.0) * inwards
     rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz

@@ -98,9 +98,9 @@ class ShadowMap:
         height, width = self.heights.shape
         return slice(self.top, self.top + height), slice(self.left, self.left + width)
 
-    def lit(self, x: Floats, y: Floats, z: Floats) -> Floats:
-        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid."""
-        found = np.ones(len(x), dtype=np.float32)
+    def lit(self, x: Floats, y: Floats, z: Floats) -> Floats | None:
+        """(n,) share of the sun that reaches points given relative to the camera [m]; 1 beyond the grid. None if all of
+        it reaches all of them."""
         height, width = self.heights.shape
         column, row = self.grid.cells(x, y, z)
         left, top = np.floor(column), np.floor(row)
@@ -109,7 +109,7 @@ class ShadowMap:
         )
         some = np.flatnonzero(within)
         if not len(some):
-            return found
+            return None
         sx, sy, sz = self.grid.towards.astype(np.float32)
         margin = np.float32(_SLACK + 0.35 / self.grid.scale - self.grid.base)
         at = (top[some].astype(np.int32) - np.int32(self.top)) * np.int32(width)
@@ -117,13 +117,14 @@ class ShadowMap:
         level = sx * x[some] + sy * y[some] + sz * z[some] + margin
         below = np.flatnonzero(self._highest.take(at) > level)
         if not len(below):
-            return found
+            return None
         some, at, level = some[below], at[below], level[below]
         right, down = column[some] - left[some], row[some] - top[some]
         heights = self.heights.ravel()
         upper = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
         at += np.int32(width)
         lower = (heights[at] > level) * (1 - right) + (heights[at + 1] > level) * right
+        found = np.ones(len(x), dtype=np.float32)
         found[some] = np.float32(1.0) - (upper + (lower - upper) * down)
         return found
 
