@@ -40,7 +40,7 @@ def parse_settings(
     except ValidationError as error:
         problems = []
         for finding in error.errors(include_url=False):
-            path = ".".join(str(part) for part in finding["loc"])
+            path = _typed_path(finding["loc"], data)
             place = _line_of(finding["loc"], lines or {}, line)
             if finding["type"] == "extra_forbidden":
                 known = _known_keys(model, finding["loc"][:-1])
@@ -61,12 +61,27 @@ def parse_settings(
             else:
                 own = finding["type"] == "value_error"
                 remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-                message = f"setting {path!r} is {finding['input']!r}"
+                message = f"setting {path!r} is {finding['input']!r}" if path else "settings do not fit together"
             problems.append(Problem(message, remedy, source, place))
         raise SettingError(problems) from error
 
 
 _NO_MAPPING = frozenset({"model_type", "model_attributes_type", "dict_type"})
+
+
+def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:
+    """The keys on the way to `loc`, with the kind of what has one: `delay.constant.seconds`. Left out is what pydantic
+    adds of its own: the types of a union, and a kind that has given its name to the thing."""
+    found: list[str] = []
+    for part in loc:
+        inside = (
+            part in data if isinstance(data, Mapping) else isinstance(data, (list, tuple)) and isinstance(part, int)
+        )
+        if inside or (isinstance(data, Mapping) and str(part) not in found[-1:]):
+            found.append(str(part))
+        if inside and (isinstance(data, Mapping) or int(part) < len(data)):
+            data = data[part]
+    return ".".join(found)
 
 
 def _line_of(loc: tuple[int | str, ...], lines: Mapping[str, int], line: int | None) -> int | None:

@@ -65,10 +65,10 @@ def _sensors(value: Any) -> Any:
         value = [part.strip() for part in value.split(",") if part.strip()]
     if isinstance(value, Mapping):
         entries = value.items()
-    elif isinstance(value, Sequence):
+    elif isinstance(value, Sequence) and all(isinstance(name, str) for name in value):
         entries = dict.fromkeys(value).items()
     else:
-        return value
+        raise ValueError(f"name kinds, {', '.join(KINDS)}, or write a mapping from names to settings")
     sensors: dict[str, Any] = {}
     for name, given in entries:
         entry = dict(given) if isinstance(given, Mapping) else {} if given is None else given

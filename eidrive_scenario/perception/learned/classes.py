@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import CLASSES
+from eidrive_scenario.roads.signal_states import OFF, lamps
 
 OBJECT_CLASSES = ("car", "truck", "bus", "motorbike", "bicycle", "pedestrian")
 LIGHT_STATES = ("red", "yellow", "green", "off")
@@ -16,6 +18,8 @@ STOP_SIGN = "stop sign"
 IMAGE_CLASSES = (*OBJECT_CLASSES, *(f"{LIGHT} {state}" for state in LIGHT_STATES), STOP_SIGN)
 """The classes of the shipped weights, in the order of the networks' outputs."""
 
+VERY_LIKE = 0.85
+"""Names that are so like to one of a class (ratio of Ratcliff and Obershelp) are slips."""
 _VEHICLES = ("car", "truck", "bus", "van")
 _SAME_AS = {"van": "car", "person": "pedestrian", "motorcycle": "motorbike"}
 
@@ -38,6 +42,20 @@ def light_state(name: str) -> str | None:
     if name == LIGHT:
         return "unknown"
     return name.removeprefix(f"{LIGHT} ") if name.startswith(f"{LIGHT} ") else None
+
+
+def misspelt(name: str) -> str | None:
+    """The class that a name of one which means nothing here is very like to; None for all other names, as networks tell
+    many more things apart than are of use here."""
+    state = light_state(name)
+    if object_category(name) or name == STOP_SIGN or (state and (state in ("off", "unknown") or _lights_a_lamp(state))):
+        return None
+    near = get_close_matches(name, (*CLASSES, *_SAME_AS, LIGHT, *IMAGE_CLASSES), n=1, cutoff=VERY_LIKE)
+    return near[0] if near else None
+
+
+def _lights_a_lamp(state: str) -> bool:
+    return any(mode != OFF for _, mode in lamps(state))
 
 
 def suppression_groups(names: Sequence[str]) -> NDArray[np.int64]:

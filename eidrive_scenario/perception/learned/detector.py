@@ -14,7 +14,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, Installation
-from eidrive_scenario.perception.learned.classes import object_category
+from eidrive_scenario.perception.learned.classes import misspelt, object_category
 from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork, Layout
 from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
@@ -59,6 +59,10 @@ class LearnedSettings(Settings):
         if suffix in FOREIGN_SUFFIXES:
             if not self.classes or self.input_size is None:
                 raise ValueError(f"weights {suffix} need `classes: [...]` and `input_size: [width, height]`")
+            for name in self.classes:
+                meant = misspelt(name)
+                if meant is not None:
+                    raise ValueError(f"class {name!r} means nothing here; did you mean {meant!r}?")
             if not any(object_category(name) for name in self.classes):
                 raise ValueError("none of `classes` is an object on the road such as car, truck, bus or pedestrian")
         elif self.weights is not None and suffix != OWN_SUFFIX:
@@ -171,7 +175,11 @@ def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
         )
     from eidrive_scenario.perception.learned.torch_network import TorchNetwork
 
-    return TorchNetwork(path, settings.confidence, settings.threads)
+    network = TorchNetwork(path, settings.confidence, settings.threads)
+    if network.name != name:
+        message = f"weights {str(path)!r} do not fit: they are of {network.name!r}, not of {name!r}"
+        raise SettingError(Problem(message, f"take the detector {network.name!r}"))
+    return network
 
 
 def distinct(parts: list[Detections], time: float) -> Detections:

@@ -14,7 +14,7 @@ from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.detector import Installation
 from eidrive_scenario.perception.learned import detector as module
-from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, object_category
+from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.detector import (
     SHIPPED,
     LearnedDetector,
@@ -162,6 +162,14 @@ def test_own_weights_come_through_the_same_door(readings: Readings) -> None:
         ({"weights": "own.tflite"}, "weights end in .npz, .onnx or .pt, not in '.tflite'"),
         ({"weights": str(ONNX)}, "need `classes: [...]` and `input_size: [width, height]`"),
         ({"weights": str(ONNX), "classes": ["cat"], "input_size": [96, 64]}, "none of `classes` is an object"),
+        (
+            {"weights": str(ONNX), "classes": ["car", "pedestrain"], "input_size": [96, 64]},
+            "did you mean 'pedestrian'?",
+        ),
+        ({"weights": str(ONNX), "classes": ["car", "trafic light"], "input_size": [96, 64]}, "mean 'traffic light'?"),
+        ({"weights": str(SHIPPED / "ssd.npz")}, "they are of 'ssd', not of 'yolov5'; take the detector 'ssd'"),
+        ({"weights": str(SHIPPED / "lamps.npz")}, "do not fit"),
+        ({"classes": ["car"]}, "settings do not fit together"),
         ({"classes": ["car"]}, "are for weights .onnx and .pt"),
         ({"letterbox": True}, "are for weights .onnx and .pt"),
         ({"weights": str(ONNX), "classes": ["car"], "input_size": [96, 64]}, "fits no layout for 1 classes"),
@@ -173,6 +181,17 @@ def test_settings_that_cannot_work_are_told_before_the_run(settings: dict[str, o
     with pytest.raises(SettingError) as error:
         build_network("yolov5", parse_settings(LearnedSettings, settings, source="a.xosc", line=7))
     assert expected in str(error.value)
+
+
+def test_only_slips_in_names_of_classes_are_told() -> None:
+    """Classes of COCO are all right, whatever is not used of them."""
+    coco = {"person", "bicycle", "motorcycle", "airplane", "bus", "train", "truck", "boat", "bench", "bird", "cat"}
+    coco |= {"dog", "cow", "bear", "zebra", "tv", "kite", "cup", "fork", "bowl", "cake", "chair", "bed", "mouse"}
+    coco |= {"traffic light", "stop sign", "fire hydrant", "parking meter", "car"}
+    assert {misspelt(name) for name in coco} == {None}
+    assert [misspelt(name) for name in IMAGE_CLASSES] == [None] * len(IMAGE_CLASSES)
+    assert misspelt("traffic light amber") is None
+    assert (misspelt("motorcicle"), misspelt("traffic light gren")) == ("motorcycle", "traffic light green")
 
 
 def test_a_file_that_holds_no_weights(tmp_path: Path) -> None:

@@ -6,7 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from eidrive_scenario.cli import app
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
@@ -61,6 +63,45 @@ def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: 
     (problem,) = told(path)
     assert problem.startswith(f"{path}:{line_of(path, name)}: ")
     assert words in problem
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("{camera: {width: 0}}", "'sensors.camera.width' is 0; input should be greater than or equal to 2"),
+        ("{camera: {rate: -1}}", "'sensors.camera.rate' is -1; input should be greater than 0"),
+        ("{camera: {rate: .inf}}", "finite number"),
+        ("{camera: {fov: 200}}", "less than 180"),
+        ("{camera: {mount: [1, 2]}}", "three to five numbers"),
+        ("{camera: {distortion: [-2]}}", "folds the picture"),
+        ("{lidar: {channels: -3}}", "greater than 0"),
+        ("{truth: {}, gnss: {position_noise: -2}}", "'sensors.gnss.position_noise' is -2"),
+        ("{truth: {}, imu: {gyroscope_walk: -1}}", "'sensors.imu.gyroscope_walk' is -1"),
+        ("{camra: {}}", "did you mean 'camera'?"),
+        ("[truth, imu: {}]", "write a mapping from names to settings"),
+        ("{lidar: {}}", "needs a sensor of kind truth"),
+    ],
+)
+def test_a_wrong_sensor_is_told_with_its_line(write: Write, value: str, words: str) -> None:
+    path = write(sensors=value)
+    (problem,) = told(path)
+    assert problem.startswith(f"{path}:{line_of(path, 'sensors')}: ")
+    assert words in problem
+
+
+def test_weights_that_do_not_fit_are_told_with_their_line_before_the_run(write: Write, tmp_path: Path) -> None:
+    """By the command: exit code 2, a line each, no traceback."""
+    junk = tmp_path / "junk.onnx"
+    junk.write_text("no model")
+    path = write(detector_settings=f"{{weights: {junk}, classes: [car], input_size: [320, 192]}}")
+    path.write_text(path.read_text().replace('name="detector" value="oracle"', 'name="detector" value="yolov5"', 1))
+    done = CliRunner().invoke(app, ["run", str(path), "--no-record"])
+    assert done.exit_code == 2
+    place = f"{path}:{line_of(path, 'detector_settings')}: "
+    assert f"{place}weights {str(junk)!r} are not an ONNX model" in " ".join(done.stderr.split())
+    done = CliRunner().invoke(app, ["run", str(path), "--no-record", "--detector", "yolo5"])
+    assert done.exit_code == 2
+    assert "--detector: unknown detector 'yolo5'; did you mean 'yolov5'?" in " ".join(done.stderr.split())
 
 
 def test_a_latency_as_long_as_reports_live_makes_no_sense(write: Write) -> None:
