@@ -15,6 +15,7 @@ from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import registry
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
+from eidrive_scenario.world.specs import actor_spec
 
 
 def declared_settings(
@@ -87,7 +88,8 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
             controller = list(filter(is_agent, scenario.controllers[name]))[-1]
             files = [folder / file for file in station.asn1_files]
             line = _line(controller, "asn1_files")
-            found[name] = Asn1Encoder(files, station.messages, source=controller.source, line=line)
+            category = actor_spec(name, scenario.entities[name]).category
+            found[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
     return found
 
 

@@ -30,16 +30,27 @@ _METRES_PER_DEGREE = 111_319.49
 """Along the equator, about which the plane of the world is put."""
 
 
+ROADSIDE = "misc"
+"""The class of stations that are no vehicles: roadside units."""
+
+
 class Asn1Encoder:
-    """Writes messages with the modules in these files.
+    """Writes messages of a station of this class (`car`, …, `misc` is a roadside unit) with the modules in these files.
 
     Raises SettingError, naming the file or the missing type, if asn1tools is not installed, a file cannot be read, or a
     module has no such type or one that takes other components than ours: each kind of message is tried at once.
     """
 
     def __init__(
-        self, files: Sequence[Path], kinds: Sequence[str], *, source: str = "", line: int | None = None
+        self,
+        files: Sequence[Path],
+        kinds: Sequence[str],
+        *,
+        station: str = "car",
+        source: str = "",
+        line: int | None = None,
     ) -> None:
+        self._station = station
         try:
             import asn1tools
         except ImportError as error:
@@ -67,7 +78,7 @@ class Asn1Encoder:
 
     def _try(self, kind: str) -> None:
         """Encode messages of this kind with and without what is optional."""
-        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), ("car",), *unknown(1))
+        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown(1))
         state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
             message = Message("station", 0, 0.0, state, seen, 0, "cam" if kind == "cam" else "cpm")
@@ -78,7 +89,9 @@ class Asn1Encoder:
 
         Raises SettingError if the module does not take it.
         """
-        value = cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors)
+        value = (
+            cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors, self._station)
+        )
         try:
             encoded: bytes = self._modules.encode(TYPES[message.kind], value)
         except self._error as error:
@@ -98,8 +111,11 @@ def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
-    """A cooperative awareness message after EN 302 637-2, annex A."""
+    """A cooperative awareness message after EN 302 637-2, annex A; of a roadside unit it says only where that is."""
     state = message.state
+    if message.detections.classes[0] == ROADSIDE:
+        place = {"stationType": _STATION_TYPES[ROADSIDE], "referencePosition": _position(state)}
+        return _cam(message, {"basicContainer": place, "highFrequencyContainer": ("rsuContainerHighFrequency", {})})
     *_, length, width, _, _ = message.detections.boxes[0].tolist()
     parameters: dict[str, Any] = {
         "basicContainer": {
@@ -132,27 +148,35 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
             "basicVehicleContainerLowFrequency",
             {"vehicleRole": "default", "exteriorLights": (b"\x00", 8), "pathHistory": []},
         )
+    return _cam(message, parameters)
+
+
+def _cam(message: Message, parameters: dict[str, Any]) -> dict[str, Any]:
     return {
         "header": _header(2, message.sender),
-        "cam": {"generationDeltaTime": _milliseconds(state.time), "camParameters": parameters},
+        "cam": {"generationDeltaTime": _milliseconds(message.state.time), "camParameters": parameters},
     }
 
 
-def cpm_value(message: Message, sensors: int) -> dict[str, Any]:
-    """A collective perception message after TR 103 562, annex A: objects in the frame of the sender."""
+def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
+    """A collective perception message of a station of this class after TR 103 562, annex A.
+
+    Objects are in the frame of the sender. A roadside unit leaves out the container of the originating station.
+    """
     state, detections = message.state, message.detections
     parameters: dict[str, Any] = {
-        "managementContainer": {"stationType": 5, "referencePosition": _position(state)},
-        "stationDataContainer": (
+        "managementContainer": {"stationType": _STATION_TYPES[station], "referencePosition": _position(state)},
+        "numberOfPerceivedObjects": min(len(detections), 255),
+    }
+    if station != ROADSIDE:
+        parameters["stationDataContainer"] = (
             "originatingVehicleContainer",
             {
                 "heading": _heading(state.yaw),
                 "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
                 "driveDirection": "forward" if state.speed >= 0.0 else "backward",
             },
-        ),
-        "numberOfPerceivedObjects": min(len(detections), 255),
-    }
+        )
     if sensors:
         parameters["sensorInformationContainer"] = [_sensor(number) for number in range(sensors)]
     if len(detections):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.v2x.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.asn1 import Asn1Encoder, cpm_value
 from eidrive_scenario.v2x.message import Message, StationState
 
 pytest.importorskip("asn1tools", reason="asn1tools is not installed (pip install 'eidrive-scenario[asn1]')")
@@ -52,6 +53,20 @@ def test_a_cam_says_where_its_sender_is() -> None:
     assert kind == "basicVehicleContainerHighFrequency"
     assert fast["heading"]["headingValue"] == 0, "north"
     assert fast["speed"]["speedValue"] == 800
+
+
+def test_a_roadside_unit_says_that_it_is_one_and_neither_speed_nor_heading() -> None:
+    encoder = Asn1Encoder([TINY], ["cam", "cpm"], station="misc")
+    said = message("cam", 1)
+    said = replace(said, detections=replace(said.detections, classes=("misc",)))
+    cam = encoder.decode("cam", encoder.encode(said, low_frequency=True))["cam"]["camParameters"]
+    assert cam["basicContainer"]["stationType"] == 15
+    assert cam["highFrequencyContainer"] == ("rsuContainerHighFrequency", {})
+    assert "lowFrequencyContainer" not in cam
+    cpm = encoder.decode("cpm", encoder.encode(message("cpm", 1)))["cpm"]["cpmParameters"]
+    assert cpm["managementContainer"]["stationType"] == 15
+    said_by = {name: cpm_value(message("cpm", 1), 0, name)["cpm"]["cpmParameters"] for name in ("misc", "truck")}
+    assert ["stationDataContainer" in parameters for parameters in said_by.values()] == [False, True]
 
 
 def test_each_object_takes_its_bits() -> None:
