@@ -65,10 +65,12 @@ def test_what_stands_around_is_found(street: Any, noise: float) -> None:
 @pytest.mark.parametrize("distance", [8.0, 16.0, 24.0, 32.0])
 @pytest.mark.parametrize("degrees", [0, 35, 90])
 def test_a_car_is_found_at_all_distances(street: Any, distance: float, degrees: float) -> None:
+    """The far side is not seen: the centre is off by half of what the car is longer than the usual 4.6 m, of which
+    three standard deviations are 0.5 m."""
     car = street.thing("Car", distance, 2.0, math.radians(degrees))
     found = detected(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))
     row = nearest(found, car.box)
-    assert math.dist(found.boxes[row, :2], car.box[:2]) < (0.5 if distance < 20 else 1.5)
+    assert math.dist(found.boxes[row, :2], car.box[:2]) < 0.5
 
 
 def test_an_empty_street_is_empty(street: Any) -> None:
@@ -125,7 +127,7 @@ def sorted_rows(boxes: np.ndarray) -> np.ndarray:
 
 
 def same_boxes(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    """Equal as rectangles; a heading may point either way."""
+    """Equal as rectangles, but for rounding; a heading may point either way."""
     assert found.shape == expected.shape
     found, expected = sorted_rows(found), sorted_rows(expected)
     np.testing.assert_allclose(found[:, :6], expected[:, :6], atol=tolerance)
@@ -147,7 +149,7 @@ def test_a_turned_scene_has_turned_detections(street: Any, detector: Any, degree
     expected[:, 0] = math.cos(angle) * before.boxes[:, 0] - math.sin(angle) * before.boxes[:, 1]
     expected[:, 1] = math.sin(angle) * before.boxes[:, 0] + math.cos(angle) * before.boxes[:, 1]
     expected[:, 6] += angle
-    same_boxes(after.boxes, expected, 0.02)
+    same_boxes(after.boxes, expected, 1e-9)
     assert sorted(after.classes) == sorted(before.classes)
 
 
@@ -158,7 +160,7 @@ def test_a_mirrored_scene_has_mirrored_detections(street: Any, detector: Any) ->
     before = detector().detect(street.readings(things, sensors))
     after = detector().detect(street.readings([thing.mirrored() for thing in things], sensors))
     assert len(before) == 4
-    same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 0.02)
+    same_boxes(after.boxes, before.boxes * (1, -1, 1, 1, 1, 1, -1), 1e-9)
     assert sorted(after.classes) == sorted(before.classes)
 
 

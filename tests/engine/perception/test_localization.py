@@ -149,11 +149,22 @@ def test_it_knows_how_wrong_it_is_where_its_model_holds() -> None:
     assert low < nees.mean() < high
 
 
+def independent(series: np.ndarray) -> float:
+    """How many independent draws the mean of (runs, ticks) is worth: by the integrated correlation over time, up to
+    where it vanishes (Sokal, Monte Carlo methods in statistical mechanics, 1997)."""
+    off = series - series.mean()
+    ticks = series.shape[1]
+    correlation = [float((off[:, lag:] * off[:, : ticks - lag]).mean()) for lag in range(ticks // 2)]
+    vanishes = next((lag for lag, value in enumerate(correlation) if value <= 0.0), ticks // 2)
+    return series.size / (1.0 + 2.0 * sum(correlation[1:vanishes]) / correlation[0])
+
+
 def test_it_knows_how_wrong_it_is_in_the_world() -> None:
     """Twelve drives of 20 s of the single-track model with its slipping tyres, through the simulated sensors.
 
-    NEES of x, y, yaw and speed, 4 degrees: the mean over runs and time, after 2 s, lies between 3 and 5.5 (the tyres'
-    slip is no white noise, so the bounds are wider than those of chi-square), and the position is better than a fix.
+    NEES of x, y, yaw and speed, 4 degrees, after 2 s. Neighbouring instants tell the same: the mean over runs and time
+    is worth as many draws as its correlation leaves, and has the 99 % bounds of chi-square for these. The position is
+    better than a fix.
     """
     nees, errors = [], []
     for seed in range(12):
@@ -175,7 +186,10 @@ def test_it_knows_how_wrong_it_is_in_the_world() -> None:
                     nees.append(off @ np.linalg.solve(covariance[:4, :4], off))
                     errors.append(float(np.hypot(off[0], off[1])))
                 world.step({}, {"Ego": Control(0.12, 0.0, sway * math.sin(0.03 * tick))})
-    assert 3.0 < np.mean(nees) < 5.5
+    draws = independent(np.array(nees).reshape(12, -1))
+    low, high = chi2.ppf([0.005, 0.995], 4 * draws) / draws
+    assert 20 < draws < 500, "a drive of 18 s holds some, not one for each tick"
+    assert low < np.mean(nees) < high
     assert np.sqrt(np.mean(np.square(errors))) < 0.6 * 0.3 * math.sqrt(2)
 
 
