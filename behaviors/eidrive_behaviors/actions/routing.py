@@ -34,6 +34,7 @@ class AssignRouteAction(ActionBehaviour):
     A closed route goes on from its last waypoint to its first, again and again.
     """
 
+    immediate = True
     action: model.AssignRouteAction
 
     def update(self) -> Status:
@@ -64,6 +65,7 @@ class AssignRouteAction(ActionBehaviour):
 class AcquirePositionAction(ActionBehaviour):
     """Routes the actor to a position, by the shortest way over the lanes; without roads straight to it."""
 
+    immediate = True
     action: model.AcquirePositionAction
 
     def update(self) -> Status:
@@ -88,6 +90,7 @@ class RandomRouteAction(ActionBehaviour):
     Who drives itself gets a way of that kind of some kilometres as its path. The run's seed decides.
     """
 
+    immediate = True
     action: model.RandomRouteAction
 
     def __init__(
