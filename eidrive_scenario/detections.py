@@ -53,13 +53,13 @@ class Detections:
 
     def subset(self, rows: Sequence[int]) -> Detections:
         """These rows only, in the order given."""
-        picked = list(rows)
+        picked = np.array(rows, dtype=np.intp)
         return Detections(
             self.time,
-            self.boxes[picked],
-            self.scores[picked],
-            tuple(self.classes[row] for row in picked),
-            self.velocity[picked],
-            self.covariance[picked],
-            tuple(self.tracks[row] for row in picked) if self.tracks else (),
+            self.boxes.take(picked, axis=0),
+            self.scores.take(picked),
+            tuple([self.classes[row] for row in rows]),
+            self.velocity.take(picked, axis=0),
+            self.covariance.take(picked, axis=0),
+            tuple([self.tracks[row] for row in rows]) if self.tracks else (),
         )

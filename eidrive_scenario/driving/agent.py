@@ -73,6 +73,7 @@ class Agent:
         self._partial: dict[str, ReceivedObjects] = {}
         self._detections = Detections(0.0)
         self._reports: dict[str, Report] = {}
+        self._usual_lifetime = settings.lifetime(complete=True)
         self._lifetimes: dict[str, float] = {}
         """How long the reports of each station count [s]."""
         self._own_places: deque[tuple[float, float, float, float]] = deque(
@@ -141,9 +142,8 @@ class Agent:
             report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
             self._lifetimes[station] = self.settings.lifetime(complete=report.complete and message.kind == "cpm")
             self._take(report, None if report.complete else self._all_said(message))
-        usual = self.settings.lifetime(complete=True)
         for station, held in list(self._reports.items()):
-            if held.detections.time < now - self._lifetimes.get(station, usual) - TIME_TOLERANCE:
+            if held.detections.time < now - self._lifetimes.get(station, self._usual_lifetime) - TIME_TOLERANCE:
                 del self._reports[station]
 
     def _all_said(self, message: Message) -> Detections:

@@ -85,8 +85,8 @@ def _reading(view: WorldView, seen: Sequence[tuple[int, float]]) -> TruthReading
     return TruthReading(
         names=tuple([view.names[row] for row, _ in seen]),
         categories=tuple([view.categories[row] for row, _ in seen]),
-        boxes=view.boxes[rows],
-        velocity=view.velocity[rows][:, :2],
+        boxes=view.boxes.take(rows, axis=0),
+        velocity=view.velocity.take(rows, axis=0)[:, :2],
         visibility=np.array([share for _, share in seen]),
     )
 

@@ -257,7 +257,7 @@ def _fiala(slip: float, stiffness: float, largest: float) -> float:
 
 
 def _left_by(grip: float, along: float) -> float:
-    return math.sqrt(grip * grip - along * along)
+    return math.sqrt(grip * grip - along * along) if along else grip
 
 
 def _limited(value: float, bound: float) -> float:
