@@ -213,18 +213,23 @@ def test_low_beam_has_its_cut_off() -> None:
 
 
 def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFactory) -> None:
-    """Two lamps of the car's intensity at 1.8 degrees down, 20 m before a white wall: I / d² on it."""
+    """Two lamps of the car before a white wall, 20 m away: each pixel shows 2 I cos / (pi d²) of its point on the wall.
+    It has a weave of 1 %."""
     spec = car("Ego")
     world.add(spec, Placement(0.0, 0.0))
-    lamp_x, lamp_z = 3.6, 0.675
-    world.add_building("wall", (lamp_x + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), colour=(1.0, 1.0, 1.0))
+    lamp = np.array([3.6, 0.0, 0.675])
+    world.add_building("wall", (lamp[0] + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), colour=(1.0, 1.0, 1.0))
     world.set_weather(Weather(sun_elevation=-30.0, cloud_cover=0.0, visual_range=1e9))
-    height = 0.55  # above the plinth of the building, which is 0.5 m high, and above the cut-off
-    seen = world.radiance(looking(0.0, height, x=8.0), PINHOLE)
-    spot = brightness(seen.luminance)[58:62, 78:82].mean()
-    above = (height - lamp_z) / 20.03
-    expected = 2.0 * float(intensity(np.zeros(1), np.array([above]), False)[0]) / 20.03**2 / math.pi
-    assert spot == pytest.approx(expected, rel=0.3)
+    height, eye = 0.55, 8.0
+    lines, columns = (part.astype(float) for part in np.mgrid[57:60, 70:90])  # the plinth of the wall is 0.5 m high
+    away = lamp[0] + 20.0 - eye
+    y = -(columns + 0.5 - PINHOLE.centre_x) / PINHOLE.focal * away
+    z = height - (lines + 0.5 - PINHOLE.centre_y) / PINHOLE.focal * away
+    distance = np.sqrt(20.0**2 + y**2 + (z - lamp[2]) ** 2)
+    candela = 2.0 * intensity(y / 20.0, (z - lamp[2]) / 20.0, False)
+    expected = candela * (20.0 / distance) / distance**2 / math.pi
+    seen = brightness(world.radiance(looking(0.0, height, x=eye), PINHOLE).luminance)[57:60, 70:90]
+    np.testing.assert_allclose(seen, expected, rtol=0.02)
 
 
 def test_a_wet_road_mirrors_a_bright_wall(world: World) -> None:
