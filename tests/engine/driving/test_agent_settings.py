@@ -111,7 +111,7 @@ WRONG = [
     ([("sensors", "{a: {kind: truth}, b: {kind: truth}}")], "a station has one truth sensor, found a, b"),
     (
         [("sensors", "{truth: {rnge: 5}}")],
-        "s.xosc:12: unknown setting 'sensors.truth.truth.rnge'; did you mean 'range'?",
+        "s.xosc:12: unknown setting 'sensors.truth.rnge'; did you mean 'range'?",
     ),
     ([("mount", "[1, 2]")], "a mount has three to five numbers"),
 ]
