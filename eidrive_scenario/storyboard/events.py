@@ -42,7 +42,8 @@ class EventElement(StoryElement):
     def begin(self, why: str = "") -> None:
         """Start by priority."""
         self._tried_at = self.stage.progress.tick
-        running = [rival for rival in self.rivals if rival.state is State.RUNNING]
+        alone = self.priority == "parallel"
+        running = [] if alone else [rival for rival in self.rivals if rival.state is State.RUNNING]
         if running and self.priority == "skip":
             self.executions += 1
             after = State.STANDBY if self.executions < self.limit else State.COMPLETE
