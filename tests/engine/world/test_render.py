@@ -213,8 +213,8 @@ def test_low_beam_has_its_cut_off() -> None:
 
 
 def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFactory) -> None:
-    """Two lamps of the car before a white wall, 20 m away: each pixel shows 2 I cos / (pi d²) of its point on the wall.
-    It has a weave of 1 %."""
+    """Two lamps of the car before a white wall, 20 m away: each pixel shows 2 I cos / (pi d²) of its point on
+    the wall."""
     spec = car("Ego")
     world.add(spec, Placement(0.0, 0.0))
     lamp = np.array([3.6, 0.0, 0.675])
