@@ -63,7 +63,9 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
                 states[ray] = NLOS
                 continue
             name = view.names[row]
-            if name not in pairs[ray] and name not in found[ray]:
+            if name == pairs[ray][1]:
+                continue  # the body of the other station, and nothing is between that and its antenna
+            if name != pairs[ray][0] and name not in found[ray]:
                 found[ray].append(name)
                 states[ray] = NLOSV
                 heights[ray] = max(heights[ray], tops[row])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from eidrive_scenario.v2x.radio.propagation import probability_of_los
 from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Surroundings
 
 Array = NDArray[np.float64]
-Number = TypeVar("Number", np.float64, np.int64)
 
 OUT_OF_REACH = 170.0
 """Where even an open path loses so much, nobody looks what stands on it [dB]."""
@@ -78,28 +76,17 @@ class LinkBudget:
         names, positions = surroundings.names, surroundings.positions
         if names != self._names:
             self._take_in(names)
-        count, first, second = len(names), self._first, self._second
+        first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
         between, blockers = self._between(surroundings, positions, distance)
         shadow = self._walk(positions, between.states)
         mean_loss = self._path_loss.loss(between, self._frequency, ndtr(shadow[1]))
         spread = self._path_loss.shadowing(between.states) if self._spread is None else self._spread
-        loss = mean_loss + spread * shadow[0]
-
-        def square(values: NDArray[Number]) -> NDArray[Number]:
-            matrix = np.zeros((count, count), dtype=values.dtype)
-            matrix[first, second] = matrix[second, first] = values
-            return matrix
-
-        return Budget(
-            names,
-            self._rows,
-            square(distance),
-            square(loss),
-            square(mean_loss),
-            square(between.states),
-            blockers,
-        )
+        links = np.zeros((3, len(first) + 1))  # the last one is that of a station with itself
+        links[0, :-1], links[1, :-1], links[2, :-1] = distance, mean_loss + spread * shadow[0], mean_loss
+        square = links.take(self._pair_at, axis=1)
+        states = np.append(between.states, LOS).take(self._pair_at)
+        return Budget(names, self._rows, square[0], square[1], square[2], states, blockers)
 
     def _take_in(self, names: tuple[str, ...]) -> None:
         """Other stations from now on; pairs that were there keep their shadowing."""
@@ -116,6 +103,9 @@ class LinkBudget:
         places[old >= 0] = self._places[old[old >= 0]]
         self._names, self._rows = names, {name: row for row, name in enumerate(names)}
         self._first, self._second = first, second
+        self._pair_at = np.full((count, count), len(first))
+        """Which pair two rows are; the number of pairs on the diagonal."""
+        self._pair_at[first, second] = self._pair_at[second, first] = np.arange(len(first))
         self._normals, self._updates, self._places = normals, updates, places
         self._pairs = [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True)]
 
@@ -123,7 +113,7 @@ class LinkBudget:
             own = np.array([key(self._seed, purpose, name) for name in names], dtype=np.uint64)
             return joined(own[first], own[second])
 
-        self._keys = (keys("shadowing"), keys("blockage"))
+        self._keys = np.stack([keys("shadowing"), keys("blockage")])
         self._sight_keys = keys("sight")
 
     def _between(
@@ -154,17 +144,17 @@ class LinkBudget:
 
     def _walk(self, positions: Array, states: Integers) -> Array:
         """(2, M) standard normal numbers behind shadowing and blockage, moved on by what the stations have moved."""
-        moved = np.linalg.norm(positions - self._places, axis=1)
-        way = np.nan_to_num(moved[self._first] + moved[self._second], nan=math.inf)
-        reach = self._path_loss.decorrelation(states) if self._decorrelation is None else self._decorrelation
+        step = positions - self._places
+        moved = np.sqrt(np.einsum("ni,ni->n", step, step))
+        way = moved[self._first] + moved[self._second]
+        way[np.isnan(way)] = math.inf
         moving = way > 0.0
-        self._updates[moving] += 1
-        kept = np.exp(-way / reach)
-        fresh = np.sqrt(1.0 - kept**2)
-        for which, keys in enumerate(self._keys):
-            innovation = ndtri(uniforms(keys, self._updates))
-            self._normals[which] = np.where(
-                moving, kept * self._normals[which] + fresh * innovation, self._normals[which]
-            )
         self._places = positions.copy()
+        if moving.any():
+            self._updates += moving
+            reach = self._path_loss.decorrelation(states) if self._decorrelation is None else self._decorrelation
+            kept = np.exp(-way / reach)
+            innovation = ndtri(uniforms(self._keys, self._updates))
+            walked = kept * self._normals + np.sqrt(1.0 - kept * kept) * innovation
+            self._normals = np.where(moving, walked, self._normals)
         return self._normals

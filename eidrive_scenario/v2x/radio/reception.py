@@ -112,8 +112,9 @@ class Receiver:
         return interference, busy, deaf
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
-        if len({id(curve) for curve in self.curves}) == 1:
-            return self.curves[0].at(ratio, sizes)
+        lowest, highest = int(states.min()), int(states.max())
+        if all(self.curves[state] is self.curves[lowest] for state in range(lowest, highest + 1)):
+            return self.curves[lowest].at(ratio, sizes)
         return np.choose(states, [curve.at(ratio, sizes) for curve in self.curves])
 
     def _add_background(self, causes: Codes, mean_loss: Array, keys: Keys, numbers: NDArray[np.int64]) -> None:
