@@ -121,10 +121,11 @@ class Receiver:
         """Losses by vehicles that are not simulated, at the distance at which their model has this path loss."""
         assert self.background is not None
         table, loss_at = self.background
+        given = [(salt, cause) for salt, cause in enumerate(BACKGROUND, start=1) if cause in table.given]
         distance = np.interp(mean_loss, loss_at, table.distance)
-        for salt, (cause, code) in enumerate(BACKGROUND.items(), start=1):
-            if cause in table.given:
-                probability = np.interp(distance, table.distance, table.given[cause])
-                draws = uniforms(keys + np.uint64(salt), numbers)
-                strikes = (draws < probability) & ((causes == DELIVERED) | (causes > code))
-                causes[strikes] = code
+        salts = np.array([salt for salt, _ in given], dtype=np.uint64)
+        draws = uniforms(keys + salts[:, None, None], numbers)
+        for (_, cause), own in zip(given, draws, strict=True):
+            code = BACKGROUND[cause]
+            probability = np.interp(distance, table.distance, table.given[cause])
+            causes[(own < probability) & ((causes == DELIVERED) | (causes > code))] = code
