@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval weather-sheet clean
 
 help:           ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -45,6 +45,9 @@ bench: install  ## simulated seconds per wall second, and where the time goes
 
 eval: install   ## what the learned detectors see: held-out pictures, library scenes, reports/detection.md
 	$(BIN)/python -m training.evaluate
+
+weather-sheet: install  ## one street in all weathers of the library: reports/weather.png
+	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet
 
 clean:          ## remove the virtual environment and everything generated
 	rm -rf $(VENV) dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
