@@ -30,7 +30,6 @@ CASES = (
     ("ssd", USUAL),
     ("lidar", USUAL),
     ("yolov5", AS_EI_DRIVE),
-    ("ssd", AS_EI_DRIVE),
 )
 PARTS: dict[str, tuple[tuple[type, str], ...]] = {
     "pictures": ((Camera, "read"),),
