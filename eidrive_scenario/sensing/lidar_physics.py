@@ -41,7 +41,7 @@ CONTRAST = math.log(20.0)
 OVERLAP = (0.9, 10.0)
 """Between these distances the beam comes into the view of a receiver beside it [m]. A sensor whose views coincide at
 once (Hahner et al., Fog simulation on real LiDAR point clouds, ICCV 2021, have 1 m) would see nothing but fog of 50 m;
-tested ones measure up to 25 m in it (Bijelic, Gruber, Ritter: A benchmark for lidar sensors in fog, IV 2018)."""
+tested ones do measure bodies in it (Bijelic, Gruber, Ritter: A benchmark for lidar sensors in fog, IV 2018)."""
 UNEVEN = {"rain": 0.15, "snow": 0.15, "none": 4.0}
 """Shape of the gamma distribution by which the air's return varies from ray to ray: about the number of drops in the
 volume of a pulse where these are few (0.2 litres with less than a thousand drops per m³)."""
