@@ -9,7 +9,7 @@ import math
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
-from eidrive_scenario.world.bodies import DRIVEN, SCRIPTED, STATIC, Body, quaternion
+from eidrive_scenario.world.bodies import DRIVEN, SCRIPTED, STATIC, STILL, Body, quaternion
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.dynamics import Demand, SingleTrack, VehicleParameters
 from eidrive_scenario.world.ground import GroundUnder
@@ -94,10 +94,12 @@ class DrivenBody(Body):
 
         As pybullet integrates: the velocity at the end of a step covers the step's distance.
         """
-        advance, step = self.track.advance, self._step
+        if self._stays(demand):
+            steps = 1
+        advance, step, before = self.track.advance, self._step, self._motion
         arm_x, arm_y, _ = self._arm(self.yaw)
         x, y, yaw = self.x + arm_x, self.y + arm_y, self.yaw
-        vx, vy, rate = self._motion
+        vx, vy, rate = before
         for _ in range(steps):
             cos, sin = math.cos(yaw), math.sin(yaw)
             forward, left, rate = advance(vx * cos + vy * sin, vy * cos - vx * sin, rate, demand)
@@ -106,7 +108,13 @@ class DrivenBody(Body):
             y += step * vy
             yaw += step * rate
         self._arrive(x, y, yaw if -math.pi < yaw <= math.pi else wrap_angle(yaw), (vx, vy, rate))
-        self.stale = True
+        self.stale = self.stale or self.moved or self._motion != before
+
+    def _stays(self, demand: Demand) -> bool:
+        """Whether it stands, and each step leaves it so."""
+        track = self.track
+        still = self._motion == STILL and track.steering == demand.steering
+        return still and track.advance(0.0, 0.0, 0.0, demand) == STILL
 
     def settle(self) -> None:
         """Put the rigid body where the actor is."""

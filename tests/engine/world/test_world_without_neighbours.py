@@ -98,3 +98,17 @@ def test_nobody_is_watched_but_near_others(car: CarFactory, monkeypatch: pytest.
     assert min(gaps) == pytest.approx(0.8)
     assert all(seen for gap, seen in zip(gaps, watched, strict=True) if gap <= 0.81)
     assert not any(seen for gap, seen in zip(gaps, watched, strict=True) if gap > 1.2)
+
+
+def test_a_parked_car_stays_and_sets_off_when_it_is_told(car: CarFactory) -> None:
+    with World(dt=0.05) as world:
+        world.add(car(), Placement(3.0, 1.0, yaw=0.7), driven=True)
+        for _ in range(20):
+            world.step({}, {"Ego": Control(brake=1.0, steering=0.2)})
+        parked = world.view()
+        assert (parked.speed[0], parked.yaw_rate[0]) == (0.0, 0.0)
+        assert parked.position[0].tolist() == [3.0, 1.0, 0.0]
+        hit = world.cast([[3.0, 1.0, 10.0]], [[3.0, 1.0, 0.0]])
+        assert hit.rows.tolist() == [0]
+        world.step({}, {"Ego": Control(throttle=1.0, steering=0.2)})
+        assert world.view().speed[0] == pytest.approx(0.05 * 4.0, rel=0.05)
