@@ -29,6 +29,8 @@ class ConditionMonitor:
         self.name = name
         self.edge = edge
         self.delay = delay
+        self.evaluations = 0
+        """How often the condition was asked."""
         self.reset()
 
     def reset(self) -> None:
@@ -52,6 +54,7 @@ class ConditionMonitor:
         if again and not self.condition.instant:
             return self.result
         self._asked_at = stage.progress.tick
+        self.evaluations += 1
         result = self._edge(self.condition.holds(stage))
         if again and self.edge != "none" and self._pulse:
             return self.result

@@ -65,9 +65,13 @@ class ConditionHistory:
     words: str = ""
     """The condition with its values at the last evaluation, where it compares no number."""
     _before: bool | None = None
+    _evaluations: int = 0
 
     def note(self, stage: Stage) -> None:
-        """The condition has just been asked."""
+        """The condition has just been asked, unless it was not asked anew."""
+        if self.monitor.evaluations == self._evaluations:
+            return
+        self._evaluations = self.monitor.evaluations
         time, value = stage.time, bool(self.monitor.value)
         if not self.asked:
             self.first_asked, self.true_at_first = time, value
