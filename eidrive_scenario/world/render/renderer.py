@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -96,9 +96,13 @@ class Renderer:
 
     MOST_KEPT = 24
     """Cameras of which the scenery is kept; a picture of 800 x 600 pixels takes 13 MB."""
+    MOST_SHOWN = 400
+    """Of so many pictures it is known what they showed, lest those of moving cameras hide that one stands still."""
 
     def __init__(self) -> None:
-        self._kept: dict[object, _Kept | None] = {}
+        self._shown: dict[object, None] = {}
+        """What earlier pictures showed, each from a place of its own."""
+        self._kept: dict[object, _Kept] = {}
 
     def render(
         self,
@@ -108,19 +112,17 @@ class Renderer:
         pose: Array,
         pinhole: Pinhole,
         ground: float,
-        *,
-        keep: bool = True,
     ) -> Radiance:
         """The light that reaches a camera at `pose`; `ground` is the height of the road below it, where it mirrors [m].
 
-        Scenery is kept from the second picture on that shows the same, unless not to `keep` it is asked.
+        Scenery is kept from the second picture on that shows the same.
         """
         light = daylight(weather)
         eye = Eye(pose, pinhole)
         grid = shadow_grid(light.towards, eye) if light.sun.any() else None
         at = _Circumstances(eye, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
-        known = self._known(subjects, at) if keep else None
+        known = self._known(subjects, at) if self.MOST_KEPT > 0 else None
         canvas = _whole(subjects, felt, at, ground) if known is None else _renewed(known, subjects, felt, at, ground)
         planes = [plane.reshape(eye.shape) for plane in canvas.planes]
         whole: Floats = np.asarray(cv2.merge(planes), dtype=np.float32)
@@ -134,14 +136,21 @@ class Renderer:
             (each.model, each.position.tobytes(), each.label, tuple(each.glow.items())) for each in subjects.scenery
         )
         key = (at.eye.pose.tobytes(), at.eye.pinhole, at.weather, looks)
-        seen_before = key in self._kept
         found = self._kept.pop(key, None)
-        if seen_before and found is None:
+        if found is None:
+            if key not in self._shown:
+                self._shown[key] = None
+                _forget_first(self._shown, self.MOST_SHOWN)
+                return None
             found = _scenery(subjects, at)
         self._kept[key] = found
-        while len(self._kept) > self.MOST_KEPT:
-            del self._kept[next(iter(self._kept))]
+        _forget_first(self._kept, self.MOST_KEPT)
         return found
+
+
+def _forget_first(memory: dict[object, Any], most: int) -> None:
+    while len(memory) > most:
+        del memory[next(iter(memory))]
 
 
 def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
