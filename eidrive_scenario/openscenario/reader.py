@@ -94,8 +94,10 @@ class Reader:
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
         self._attributes(node, known, scope, values)
         self._text(node, known, values)
+        repeated: dict[str, list[Element]] = {}
         for child in below:
-            self._child(node, child, known, scope, values)
+            self._child(node, child, known, scope, values, repeated)
+        values.update((name, tuple(found)) for name, found in repeated.items())
         if below or known.children:
             check_children(node, below, known, self.version, self._error)
         if known.choice and not any(child.tag in known.choice or child.tag not in known.children for child in below):
@@ -160,7 +162,13 @@ class Reader:
             )
 
     def _child(
-        self, node: etree._Element, child: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]
+        self,
+        node: etree._Element,
+        child: etree._Element,
+        known: Rules,
+        scope: Scope,
+        values: dict[str, Any],
+        repeated: dict[str, list[Element]],
     ) -> None:
         rule = known.children.get(child.tag)
         if rule is None:
@@ -171,7 +179,7 @@ class Reader:
             return
         element = self._element(child, rule.cls, scope, {})
         if rule.many:
-            values[rule.field] = (*values.get(rule.field, ()), element)
+            repeated.setdefault(rule.field, []).append(element)
         else:
             values.setdefault(rule.field, element)
 
