@@ -60,17 +60,22 @@ def evaluate(options: argparse.Namespace) -> None:
     fog = load_weather("foggy_morning").model_copy(update={"name": "fog"})
     scenes = list(library_scenes([clear, fog]))
     print(f"{len(dataset)} held-out pictures, {len(scenes)} of the library's scenes", flush=True)
-    tables = [_size_and_time(own, scenes[0])]
+    tables: list[Table] = []
+
+    def add(found: Sequence[Table]) -> None:
+        tables.extend(found)
+        print(as_markdown(found), flush=True)
+
+    add([_size_and_time(own, scenes[0])])
     judged = {name: judge_dataset(low[name], dataset, own[name].confidence) for name in names}
-    tables += tables_of(judged, "Held-out pictures")
-    tables.append(misses(judged, dataset))
+    add([*tables_of(judged, "Held-out pictures"), misses(judged, dataset)])
     in_library = {name: judge_scenes(low[name], scenes, own[name].confidence) for name in names}
-    tables += tables_of(in_library, "Library scenes")
+    add(tables_of(in_library, "Library scenes"))
     seen = light_scenes(options.seed, "lights held_out", options.light_worlds, options.processes)
-    tables.append(light_table(readings(own, list(seen))))
+    add([light_table(readings(own, seen))])
     others = list(random_scenes(options.seed, "held_out lidar", options.worlds, clear))
-    tables += _lifting("Library scenes, clear", [scene for scene in scenes if scene.weather == "clear"], names)
-    tables += _lifting("Random scenes, clear", others, names)
+    add(_lifting("Library scenes, clear", [scene for scene in scenes if scene.weather == "clear"], names))
+    add(_lifting("Random scenes, clear", others, names))
     curves = sweeps(own, options.seed, options.sweep_worlds)
     write_report(options.out, tables, curves)
     if options.cards:
@@ -101,7 +106,6 @@ def _lifting(of: str, scenes: Sequence[Seen], names: Sequence[str]) -> list[Tabl
 def write_report(out: Path, tables: Sequence[Table], curves: Mapping[str, Any]) -> None:
     """The report as text, as data, and its curves."""
     text = as_markdown(tables)
-    print(text)
     out.mkdir(parents=True, exist_ok=True)
     (out / "detection.md").write_text(f"{INTRODUCTION}\n{text}\n", encoding="utf-8")
     record: dict[str, Any] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from eidrive_scenario.perception.learned.classes import LIGHT_STATES
@@ -25,7 +25,7 @@ class Reading(NamedTuple):
     read: Mapping[str, str]
 
 
-def readings(networks: Mapping[str, ImageNetwork], scenes: Sequence[LightScene]) -> list[Reading]:
+def readings(networks: Mapping[str, ImageNetwork], scenes: Iterable[LightScene]) -> list[Reading]:
     """Every light in the pictures: by the class that each network gives, by class and lamps, and by lamps alone."""
     found = []
     for scene in scenes:
