@@ -40,6 +40,10 @@ def run(
     user_value: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable.")
     ] = None,
+    stand_in: Annotated[
+        list[str] | None,
+        typer.Option(metavar="K=V", help="Who plays the controller K of another tool, such as alks; repeatable."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness.")] = 1,
     repeat: Annotated[int, typer.Option(min=1, help="Number of runs, with seeds from --seed on.")] = 1,
     max_runs: Annotated[
@@ -78,6 +82,7 @@ def run(
         weather=weather,
         parameters=parameters,
         user_values=_assigned("--user-value", user_value or []),
+        controllers=_assigned("--stand-in", stand_in or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
     )

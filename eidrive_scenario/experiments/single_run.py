@@ -102,6 +102,7 @@ def _told(scenario: Scenario, seed: int, run: int | None, settings: RunSettings)
         told["run"] = run
     if settings.cooperate is not None:
         told["cooperate"] = ",".join(settings.cooperate) or "none"
+    told["controllers"] = json.dumps(settings.controllers) if settings.controllers else None
     told["user_values"] = json.dumps(settings.user_values) if settings.user_values else None
     texts = {name: str(value) for name, value in told.items() if value is not None}
     return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}

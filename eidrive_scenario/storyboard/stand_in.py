@@ -55,10 +55,11 @@ def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, st
     Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
     """
     found = []
+    kinds = {name: known.load(stand_in) for name, stand_in in wanted.items()}
     for actor in actors.values():
         for controller in actor.controllers:
-            if controller.name in wanted:
-                made = known.load(wanted[controller.name])(controller, stage, actor)
+            if controller.name in kinds:
+                made = kinds[controller.name](controller, stage, actor)
                 if not isinstance(made, StandIn):
                     raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
                 found.append(made)

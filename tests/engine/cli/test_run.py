@@ -88,6 +88,8 @@ def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
         (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
         (["{file}", "--user-value", "mood"], "--user-value 'mood' assigns nothing; write --user-value NAME=VALUE"),
+        (["{file}", "--stand-in", "ALKSController"], "--stand-in 'ALKSController' assigns nothing"),
+        (["{file}", "--stand-in", "ALKSController=alk"], "unknown controller 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
         (["{file}", "--dt", "0"], "--dt is 0"),
     ],
