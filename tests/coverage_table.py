@@ -11,7 +11,7 @@ import dataclasses
 import inspect
 import re
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -164,18 +164,32 @@ WITHOUT_EFFECT = {
     "AssignControllerAction.activateLighting": LIGHTS,
     "Axle.positionZ": "wheels stand on the road",
     "Axle.trackWidth": "the body's box says how wide a vehicle is; one track is driven",
+    "Axles.AdditionalAxle": "a gap: a vehicle that drives itself turns as on two axles",
     "Controller.controllerType": "its property `module` says whose it is",
     "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
     "OverrideSteeringWheelAction.maxTorque": "a wheel is held at an angle, without forces at the rim",
     "Pedestrian.pedestrianCategory": "wheelchairs and animals move and are seen as pedestrians",
+    "Properties.CustomContent": "nothing says what it means",
+    "RoadNetwork.SceneGraphFile": "pictures are drawn from the road file",
+    "RoadNetwork.UsedArea": "the whole map is there: the area says which part would do",
     "Sensor.horizontalFOV": "sensors are those of the station's controller",
     "Sensor.sensorCategory": "sensors are those of the station's controller",
     "Sensor.verticalFOV": "sensors are those of the station's controller",
+    "SensorAttachment.MountingPosition": "sensors are those of the station's controller",
     "SensorAttachment.sensorRef": "sensors are those of the station's controller",
+    "SensorAttachments.SensorAttachment": "sensors are those of the station's controller",
     "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
+    "Vehicle.SensorAttachments": "sensors are those of the station's controller",
     "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
 }
-"""Attributes of the standard that are read and checked, and that nothing else in the engine looks at."""
+"""Attributes and children of the standard that are read and checked, and that nothing else in the engine looks at."""
+
+ABOUT_THE_FILE = {"FileHeader", "License"}
+TAKEN_BY_CLASS = {
+    *("AppearanceAction", "CatalogLocations", "ControllerAction", "PrivateAction", "Position"),
+    *("DeterministicSingleParameterDistribution", "StochasticDistribution"),
+}
+"""Elements whose children the engine takes whichever is there, by what it is, not by the name of the field."""
 
 
 def marked_tests() -> dict[str, list[str]]:
@@ -227,24 +241,37 @@ def _elements() -> Iterator[type[Element]]:
             yield value
 
 
-def unread_attributes() -> set[str]:
-    """The attributes in the model whose names stand nowhere else in the engine, less what is about the file itself."""
+def unread() -> set[str]:
+    """The attributes and children in the model whose names stand nowhere else in the engine.
+
+    Not counted: what is about the file itself, and children that are known by their class, where it has one place only.
+    """
     code = (path for room in ("eidrive_scenario", "behaviors", "criteria") for path in (ROOT / room).rglob("*.py"))
     texts = (path.read_text(encoding="utf-8") for path in code if path.parent.name != "model")
     words = {word for text in texts for word in re.findall(r"\w+", text)} | {"line", "source"}
     elements = {element.__name__ for element in _elements()}
-    return {
-        f"{element.__name__}.{field.metadata.get(USAGE, Usage()).name or _spelling(field.name)}"
+    places = Counter(
+        name
         for element in _elements()
-        if element.__name__ not in ("FileHeader", "License")
         for field in dataclasses.fields(element)
-        if field.name not in words and not elements & set(re.findall(r"\w+", str(field.type)))
-    }
+        for name in elements & set(re.findall(r"\w+", str(field.type)))
+    )
+    found = set()
+    for element in _elements():
+        for field in dataclasses.fields(element):
+            held = elements & set(re.findall(r"\w+", str(field.type)))
+            by_class = any(name in words and places[name] == 1 for name in held) or (
+                bool(held) and element.__name__ in TAKEN_BY_CLASS
+            )
+            if field.name not in words and not by_class and element.__name__ not in ABOUT_THE_FILE:
+                usage: Usage = field.metadata.get(USAGE, Usage())
+                found.add(f"{element.__name__}.{usage.name or _spelling(field.name, capital=bool(held))}")
+    return found
 
 
-def _spelling(name: str) -> str:
+def _spelling(name: str, *, capital: bool) -> str:
     first, *rest = name.split("_")
-    return first + "".join(word.capitalize() for word in rest)
+    return (first.capitalize() if capital else first) + "".join(word.capitalize() for word in rest)
 
 
 def table() -> str:
@@ -265,7 +292,7 @@ def table() -> str:
             shown = "<br>".join(f"`{place}`" for place in tests.get(row.name, [])[:2]) or "**no test**"
             lines.append(f"| {row.name} | {since(row)} | {status} | {shown} |")
         lines.append("")
-    lines += ["### Attributes without effect", "", "| attribute | why |", "|---|---|"]
+    lines += ["### Attributes and children without effect", "", "| which | why |", "|---|---|"]
     lines += [f"| {name} | {why} |" for name, why in WITHOUT_EFFECT.items()]
     return "\n".join(lines)
 

@@ -9,7 +9,7 @@ from eidrive_scenario.registry import registry
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread_attributes
+from coverage_table import PAGE, SECTIONS, WITHOUT_EFFECT, marked_tests, page, unread
 
 
 def test_the_page_is_what_the_generator_writes() -> None:
@@ -31,6 +31,6 @@ def test_every_action_and_condition_has_a_row() -> None:
     assert wanted <= {*registry("actions"), *registry("conditions")}
 
 
-def test_an_attribute_without_effect_is_one_that_nothing_reads() -> None:
-    assert unread_attributes() == set(WITHOUT_EFFECT)
+def test_what_has_no_effect_is_what_nothing_reads() -> None:
+    assert unread() == set(WITHOUT_EFFECT)
     assert list(WITHOUT_EFFECT) == sorted(WITHOUT_EFFECT)

@@ -124,7 +124,7 @@ def _scenario_file(given: File, folder: Path, findings: Findings) -> Path:
         beside = path.parent.glob("*.xosc") if path.parent.is_dir() else ()
         findings.error(
             f"no scenario {given.filepath!r}",
-            suggestion(path.name, {file.name for file in beside}),
+            suggestion(path.stem, {file.stem for file in beside}),
             source=given.source,
             line=given.line,
         )

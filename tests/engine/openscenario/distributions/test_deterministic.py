@@ -177,7 +177,7 @@ def test_a_set_that_assigns_twice(distribution_file: Write) -> None:
 def test_a_scenario_that_is_not_there(distribution_file: Write) -> None:
     path = distribution_file(deterministic())
     path.write_text(path.read_text(encoding="utf-8").replace("scenario.xosc", "scenaro.xosc"), encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r":4: no scenario 'scenaro\.xosc'; did you mean 'scenario\.xosc'\?"):
+    with pytest.raises(ScenarioError, match=r":4: no scenario 'scenaro\.xosc'; did you mean 'scenario'\?"):
         load_distribution(path)
 
 
