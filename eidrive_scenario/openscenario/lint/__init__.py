@@ -37,6 +37,7 @@ RULES: tuple[Rule[Survey], ...] = (
     Rule("no-actors", Level.WARNING, "private actions of nobody", entities.groups_without_actors),
     Rule("never-placed", Level.WARNING, "an entity that is nowhere", entities.never_placed),
     Rule("unused-entity", Level.WARNING, "an entity that is never spoken of", entities.unused_entities),
+    Rule("axles-not-apart", Level.WARNING, "a vehicle without a wheelbase", entities.axles_not_apart),
     Rule("refers-to-itself", Level.WARNING, "an action that relates someone to oneself", entities.relations_to_oneself),
     Rule("conflicting-actions", Level.WARNING, "actions of one event that end each other", actions.conflicting_actions),
     Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.too_fast),

@@ -18,6 +18,7 @@ from eidrive_scenario.openscenario.model import (
     ManeuverGroup,
     ScenarioObject,
     SynchronizeAction,
+    Vehicle,
 )
 from eidrive_scenario.openscenario.participants import scenario_objects
 
@@ -91,6 +92,19 @@ def _about_entities(node: Node) -> bool:
     trigger = node.start
     groups = trigger.condition_group if trigger is not None else ()
     return any(condition.by_entity_condition is not None for group in groups for condition in group.condition)
+
+
+def axles_not_apart(survey: Survey) -> Iterator[Problem]:
+    """A vehicle whose front axle is not ahead of the rear axle: it has no wheelbase to drive on."""
+    for name, body in survey.scenario.entities.items():
+        front = body.axles.front_axle if isinstance(body, Vehicle) else None
+        if isinstance(body, Vehicle) and front is not None and front.position_x <= body.axles.rear_axle.position_x:
+            yield at(
+                front,
+                f"the front axle of {name!r} is at {front.position_x:g} m, the rear axle at "
+                f"{body.axles.rear_axle.position_x:g} m: it cannot drive by itself",
+                "positionX counts forwards; the front axle has the greater one",
+            )
 
 
 def relations_to_oneself(survey: Survey) -> Iterator[Problem]:
