@@ -92,6 +92,31 @@ def test_a_ring_of_cars_settles_at_the_equilibrium_of_the_model(loop: RoadNetwor
     assert driver.equilibrium_gap(float(speeds.mean()), 15.0) == pytest.approx(mean_gap, rel=0.02)
 
 
+def test_shorter_steps_are_the_same_drive_in_finer_grain(loop: RoadNetwork) -> None:
+    """Drivers decide each 0.05 s, and a circle's stretch is the same everywhere: so are the places, step by step."""
+    places = {}
+    for dt in (0.05, 0.01):
+        fleet = Fleet(loop)
+        for k, speed in enumerate((3.0, 12.0, 8.0)):
+            fleet.add(spec(f"car{k}"), loop.location("a", -1, 20.0 + 25.0 * k), speed=speed, desired_speed=13.0)
+        path = [fleet.step(None, dt) for _ in range(round(20.0 / dt))]
+        places[dt] = path[round(0.05 / dt) - 1 :: round(0.05 / dt)]
+    for coarse, fine in zip(places[0.05], places[0.01], strict=True):
+        for name, there in coarse.items():
+            assert (fine[name].x, fine[name].y, fine[name].speed) == pytest.approx((there.x, there.y, there.speed))
+
+
+def test_who_comes_in_between_two_decisions_looks_at_once(loop: RoadNetwork) -> None:
+    """A car that stands 8 m ahead of another's bumper, which drives 10 m/s: that one brakes in the next step."""
+    fleet = Fleet(loop)
+    fleet.add(spec("first"), loop.location("a", -1, 20.0), speed=10.0, desired_speed=13.0)
+    fleet.step(None, 0.01)
+    fleet.add(spec("second"), loop.location("a", -1, 20.0 + LENGTH + 8.0), speed=0.0)
+    before = fleet.speeds["first"]
+    fleet.step(None, 0.01)
+    assert fleet.speeds["first"] < before - 0.05
+
+
 def test_a_string_of_cars_stops_behind_an_obstacle_and_goes_on_when_it_leaves(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     for k in range(5):
