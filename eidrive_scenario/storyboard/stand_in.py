@@ -68,10 +68,15 @@ def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, st
 
 def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Problem]:
     """Warnings of controllers that name no module of ours and for which nothing stands in."""
+    names = {controller.name for actor in actors.values() for controller in actor.controllers}
+    astray = sorted(name for name in wanted if name not in names)
+    remedy = "give it the property module=eidrive, or let something stand in for it"
+    if astray:
+        remedy += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
     return [
         Problem(
             f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
-            "give it the property module=eidrive, or let something stand in for it",
+            remedy,
             controller.source,
             controller.line,
         )

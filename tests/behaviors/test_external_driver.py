@@ -72,3 +72,12 @@ def test_while_its_controller_is_off_it_keeps_lane_and_speed(simulation: Simulat
 def test_poses_for_somebody_else_are_an_error(simulation: Simulation) -> None:
     with simulation, pytest.raises(SettingError, match="nobody waits for poses of 'Other'"):
         simulation.set_pose("Other", Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def test_a_stand_in_for_a_controller_that_no_entity_has_is_told(simulation: Simulation) -> None:
+    scenario = simulation.scenario
+    simulation.close()
+    with Simulation(scenario, settings=RunSettings(controllers={"joystik": "external"})) as other:
+        (warning,) = map(str, other.storyboard.stage.warnings)
+    assert "'joystick' of Ego is not known" in warning
+    assert "the stand-in for 'joystik' found no controller of that name" in warning
