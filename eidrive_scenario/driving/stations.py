@@ -22,6 +22,7 @@ from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.link_events import LinkEvents
 from eidrive_scenario.v2x.message import LinkEvent, Received
 from eidrive_scenario.v2x.profile import NO_COOPERATION, build_channel, load_profile
 from eidrive_scenario.v2x.surroundings import Surroundings
@@ -61,7 +62,7 @@ class Stations:
         self.goals: Mapping[str, Goal] = {}
         self.signals: Mapping[str, str] = {}
         """What the traffic lights show, by their ids."""
-        self.links: tuple[LinkEvent, ...] = ()
+        self.links: Sequence[LinkEvent] = ()
         """What became of the messages that were said in the last tick."""
         self.readings: Mapping[str, Readings] = {}
         """What the sensors of each station gave in the last tick."""
@@ -161,7 +162,8 @@ class Stations:
         for sender, step in steps.items():
             receivers = self._listeners(sender)
             outbox += [(message, receivers) for message in step.outbox]
-        self.links = tuple(self._channel.transmit(outbox, now))
+        told = self._channel.transmit(outbox, now)
+        self.links = told if isinstance(told, LinkEvents) else tuple(told)
 
     def metrics(self, now: float) -> dict[str, float]:
         """Counts of messages over all links."""

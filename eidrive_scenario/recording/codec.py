@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -52,6 +52,8 @@ def codec(kind: Any) -> Codec:
         return _optional(codec(next(argument for argument in arguments if argument is not type(None))))
     if origin in (tuple, frozenset):
         return _sequence(origin, arguments)
+    if origin is Sequence:
+        return _sequence(tuple, (*arguments, ...))
     if isinstance(origin, type) and issubclass(origin, Mapping) and arguments[0] is str:
         return _mapping(codec(arguments[1]))
     if is_dataclass(kind) and isinstance(kind, type):

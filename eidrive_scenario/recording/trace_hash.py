@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import struct
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.v2x.link_events import FateBlock, LinkEvents
+from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 
@@ -19,6 +24,12 @@ _AROUND: Mapping[str, Codec] = {
     "monitors": codec(Mapping[str, bool]),
 }
 """What a frame says beside the actors; it enters where it changes, and so not at all where nobody says anything."""
+
+_FATE = struct.Struct("<3Q4d")
+"""How the fate of a message enters: sender, receiver and outcome with reason as words of 64 bits; number, sent, arrives
+[s], infinity where lost, and size [bytes]."""
+_FEW = 16
+"""So many fates are faster one by one."""
 
 
 class TraceHash:
@@ -37,6 +48,7 @@ class TraceHash:
         self._named = _packed(())
         """The names of the last view, and how they enter."""
         self._around: dict[str, object] = dict.fromkeys(_AROUND)
+        self._words: dict[tuple[str, ...], int] = {}
 
     def observe(self, frame: Frame) -> None:
         """Take one frame in."""
@@ -54,10 +66,10 @@ class TraceHash:
             transition = change.transition.value if change.transition is not None else ""
             self._texts("change", change.path, change.kind, change.before.value, transition, change.after.value)
             self._floats(change.time)
-        for link in frame.links:
-            self._texts("link", link.sender, link.receiver, link.outcome, link.reason)
-            arrives = float("inf") if link.arrives is None else link.arrives
-            self._floats(link.number, link.sent, arrives, link.size)
+        if frame.links:
+            self._texts("links")
+            self._floats(len(frame.links))
+            self._fates(frame.links)
         for name, how in _AROUND.items():
             before, now = self._around[name], getattr(frame, name)
             if now is not before and now != before and (now or before):
@@ -70,6 +82,46 @@ class TraceHash:
 
     def close(self) -> None:
         """Nothing to finish; observers have it."""
+
+    def _fates(self, links: Sequence[LinkEvent]) -> None:
+        """The same bytes for the same events, be they objects or columns."""
+        if not isinstance(links, LinkEvents) or len(links) <= _FEW:
+            self._sha.update(b"".join([self._fate(link) for link in links]))
+            return
+        for part in links.parts:
+            self._sha.update(
+                self._columns(part) if isinstance(part, FateBlock) else b"".join([self._fate(link) for link in part])
+            )
+
+    def _fate(self, link: LinkEvent) -> bytes:
+        return _FATE.pack(
+            self._word(link.sender),
+            self._word(link.receiver),
+            self._word(link.outcome, link.reason),
+            link.number,
+            link.sent,
+            math.inf if link.arrives is None else link.arrives,
+            link.size,
+        )
+
+    def _columns(self, block: FateBlock) -> bytes:
+        fates = block.columns()
+        names = np.array([self._word(name) for name in fates.names], dtype="<u8")
+        outcomes = np.array([self._word(*outcome) for outcome in fates.outcomes], dtype="<u8")
+        words = np.empty((len(block), 7), dtype="<u8")
+        numbers = words.view("<f8")
+        words[:, 0], words[:, 1] = names[fates.senders], names[fates.receivers]
+        words[:, 2] = outcomes[fates.fates]
+        numbers[:, 3], numbers[:, 4], numbers[:, 5], numbers[:, 6] = fates.number, fates.sent, fates.arrives, fates.size
+        return words.tobytes()
+
+    def _word(self, *texts: str) -> int:
+        """Texts in 64 bits, the same in every process."""
+        word = self._words.get(texts)
+        if word is None:
+            digest = hashlib.sha256(_packed(texts)).digest()
+            word = self._words[texts] = int.from_bytes(digest[:8], "little")
+        return word
 
     def _texts(self, *texts: str) -> None:
         self._sha.update(_packed(texts))

@@ -38,7 +38,11 @@ class Channel(ABC):
         """
 
     def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
-        """All that the stations say in one tick; it may be nothing."""
+        """All that the stations say in one tick; it may be nothing.
+
+        Any sequence of events will do as the answer. A channel that decides about very many messages may keep their
+        fates in arrays instead, and answer with LinkEvents.
+        """
         return [event for message, receivers in outbox for event in self.send(message, receivers, now)]
 
     @abstractmethod

@@ -37,6 +37,12 @@ class Budget:
     states: Integers
     blockers: Mapping[tuple[int, int], tuple[str, ...]]
 
+    def bodies_between(self, sender: int, receiver: int) -> tuple[str, ...]:
+        """Names of the bodies between two stations (rows), from the sender on."""
+        if sender < receiver:
+            return self.blockers.get((sender, receiver), ())
+        return self.blockers.get((receiver, sender), ())[::-1]
+
 
 class LinkBudget:
     """Follows the shadowing of each pair of stations as they move, the same in both directions.

@@ -14,7 +14,9 @@ from eidrive_scenario.v2x.composed import delay_of
 from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniforms
 from eidrive_scenario.v2x.delay import ConstantDelay
 from eidrive_scenario.v2x.draws import LinkDraws
+from eidrive_scenario.v2x.hearings import Entry
 from eidrive_scenario.v2x.link_channel import LinkChannel
+from eidrive_scenario.v2x.link_events import FateBlock, LinkEvents
 from eidrive_scenario.v2x.links import LinkStatistics
 from eidrive_scenario.v2x.loss import NoLoss
 from eidrive_scenario.v2x.loss_draws import LossDraws
@@ -24,7 +26,7 @@ from eidrive_scenario.v2x.radio.access import Access, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import Gate
 from eidrive_scenario.v2x.radio.csma import Csma
-from eidrive_scenario.v2x.radio.events import Batch, Dropped, LinkEvents
+from eidrive_scenario.v2x.radio.events import Batch, Dropped
 from eidrive_scenario.v2x.radio.ledger import Ledger
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.profile import RadioProfile
@@ -82,7 +84,7 @@ class RadioChannel(LinkChannel):
         self._jitter_keys: Keys = np.zeros(0, dtype=np.uint64)
         self._budget: Budget | None = None
         self._open: list[Transmission] = []
-        self._told: list[Batch | Dropped] = []
+        self._told: list[FateBlock] = []
         self._dropped: list[LinkEvent] = []
         self._since: float | None = None
         self._until = 0.0
@@ -149,7 +151,7 @@ class RadioChannel(LinkChannel):
         self._ledger.write_into(self._links)
 
     def untold(self) -> Sequence[LinkEvent]:
-        told = LinkEvents([*super().untold(), *self._dropped], self._told)
+        told = LinkEvents([super().untold(), self._dropped, *self._told])
         self._told, self._dropped = [], []
         return told
 
@@ -213,45 +215,45 @@ class RadioChannel(LinkChannel):
     def _drop(self, entry: Transmission) -> None:
         """A queue has thrown a message out."""
         message = entry.message
-        rows = self._rows_of(message.sender, entry.receivers)
-        self._ledger.drop(self._rows[message.sender], rows)
-        self._told.append(Dropped(entry, [self._access.names[row] for row in rows.tolist()]))
+        sender, rows = self._rows[message.sender], self._rows_of(message.sender, entry.receivers)
+        self._ledger.drop(sender, rows)
+        self._told.append(Dropped(entry, self._access.names, sender, rows))
         self._lose_absent(entry, rows)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
         """Decide who hears the messages that have left the air, and put them on their way."""
         receptions = self._receiver.receive(ended, self._access.on_air, power, budget, self._keys)
-        batch = Batch(ended, receptions, budget)
         plain = isinstance(self.profile.loss, NoLoss)
+        receivers = []
         for place, entry in enumerate(ended):
             present = self._rows_of(entry.message.sender, entry.receivers)
             self._lose_absent(entry, present)
-            batch.receivers.append(present if plain else self._spared(entry, present, receptions.causes[place], budget))
-        for place in sorted(range(len(ended)), key=lambda place: ended[place].end):
-            self._carry(ended[place], place, batch, budget)
-        counts = [len(rows) for rows in batch.receivers]
-        places, receivers = np.repeat(np.arange(len(ended)), counts), np.concatenate(batch.receivers)
-        senders = receptions.senders[places]
-        causes = receptions.causes[places, receivers].astype(np.int64)
-        self._ledger.decide(senders, receivers, causes, budget.distance[senders, receivers])
+            receivers.append(present if plain else self._spared(entry, present, receptions.causes[place], budget))
+        batch = Batch(ended, receptions, budget, receivers)
+        self._carry(batch)
+        self._ledger.decide(batch.senders, batch.heard_by, batch.causes, budget.distance[batch.senders, batch.heard_by])
         self._told.append(batch)
 
-    def _carry(self, entry: Transmission, place: int, batch: Batch, budget: Budget) -> None:
-        """Put a message on its way to those who hear it."""
-        rows = batch.receivers[place]
-        heard = rows[batch.receptions.causes[place, rows] == DELIVERED].tolist()
-        message, delay = entry.message, self.profile.delay
+    def _carry(self, batch: Batch) -> None:
+        """Put the messages on their way to those who hear them."""
+        heard = np.flatnonzero(batch.causes == DELIVERED)
+        receivers: list[list[str]] = [[] for _ in batch.ended]
+        names, delay = batch.budget.names, self.profile.delay
+        places = batch.places[heard]
+        for place, row in zip(places.tolist(), batch.heard_by[heard].tolist(), strict=True):
+            receivers[place].append(names[row])
         if isinstance(delay, ConstantDelay):
-            arrives = entry.end + delay.seconds
-            batch.arrivals[place] = arrives
-            parcel = (arrives, message.sender, message.number, entry.sent, Received(message, arrives))
-            self._links.carry(parcel, *[budget.names[row] for row in heard])
+            ends = np.array([entry.end + delay.seconds for entry in batch.ended])
+            batch.arrives[heard] = ends[places]
+            for entry, arrives, hearing in zip(batch.ended, ends.tolist(), receivers, strict=True):
+                self._links.carry(_parcel(entry, arrives), *hearing)
             return
-        for row in heard:
-            name = budget.names[row]
-            arrives = entry.end + delay_of(delay, self._draws, message, name)
-            batch.arrivals[place, row] = arrives
-            self._links.carry((arrives, message.sender, message.number, entry.sent, Received(message, arrives)), name)
+        arrivals = []
+        for entry, hearing in zip(batch.ended, receivers, strict=True):
+            for name in hearing:
+                arrivals.append(entry.end + delay_of(delay, self._draws, entry.message, name))
+                self._links.carry(_parcel(entry, arrivals[-1]), name)
+        batch.arrives[heard] = arrivals
 
     def _spared(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
         """Those among the receivers for whom the loss that comes on top of the radio does not strike."""
@@ -284,3 +286,9 @@ class RadioChannel(LinkChannel):
         self._dropped.append(
             LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
         )
+
+
+def _parcel(entry: Transmission, arrives: float) -> Entry:
+    """A message on its way to whoever hears it at this instant [s]."""
+    message = entry.message
+    return arrives, message.sender, message.number, entry.sent, Received(message, arrives)

@@ -1,78 +1,104 @@
-"""The fates of many messages, made into events when somebody looks at them."""
+"""The fates of messages on a radio, in columns."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.v2x.link_events import FateBlock, Fates
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Receptions
 from eidrive_scenario.v2x.surroundings import STATES
 
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
-class Batch:
-    """T messages that have left the air: their receptions, who listens, and when they arrive."""
+OUTCOMES = tuple(("delivered", "") if code == DELIVERED else ("lost", cause) for code, cause in enumerate(CAUSES))
+"""By code of the cause."""
 
-    def __init__(self, ended: Sequence[Transmission], receptions: Receptions, budget: Budget) -> None:
+
+class Batch(FateBlock):
+    """T messages that have left the air, and E fates: of the first at each of its receivers, then of the second.
+
+    receivers  for each message the rows of those who listen
+    places     (E,) of the messages in `ended`;  senders, heard_by  (E,) rows;  causes  (E,) codes
+    arrives    (E,) [s], infinity where lost
+    """
+
+    def __init__(
+        self, ended: Sequence[Transmission], receptions: Receptions, budget: Budget, receivers: Sequence[Rows]
+    ) -> None:
         self.ended = ended
         self.receptions = receptions
         self.budget = budget
-        self.receivers: list[NDArray[np.int64]] = []
-        """For each message the rows of those who listen."""
-        self.arrivals = np.full(receptions.causes.shape, np.nan)
-        """(T, N) [s]"""
+        self.receivers = receivers
+        self.places = np.repeat(np.arange(len(ended)), [len(rows) for rows in receivers])
+        self.heard_by = np.concatenate(receivers)
+        self.senders = receptions.senders[self.places]
+        self.causes = receptions.causes[self.places, self.heard_by].astype(np.int64)
+        self.arrives = np.full(len(self.places), np.inf)
 
     def __len__(self) -> int:
-        return sum(len(rows) for rows in self.receivers)
+        return len(self.places)
 
     def __iter__(self) -> Iterator[LinkEvent]:
-        budget, receptions = self.budget, self.receptions
-        for place, (entry, receivers) in enumerate(zip(self.ended, self.receivers, strict=True)):
-            message, sender = entry.message, int(receptions.senders[place])
-            for row, cause, arrives, loss, snr, state in zip(
-                receivers.tolist(),
-                receptions.causes[place, receivers].tolist(),
-                self.arrivals[place, receivers].tolist(),
-                budget.loss[sender, receivers].tolist(),
-                receptions.snr[place, receivers].tolist(),
-                budget.states[sender, receivers].tolist(),
-                strict=True,
-            ):
-                delivered = cause == DELIVERED
-                event = LinkEvent.__new__(LinkEvent)
-                event.__dict__.update(  # a third of the time that a frozen dataclass takes to set as many fields
-                    sender=message.sender,
-                    receiver=budget.names[row],
-                    number=message.number,
-                    sent=entry.sent,
-                    outcome="delivered" if delivered else "lost",
-                    arrives=arrives if delivered else None,
-                    reason="" if delivered else CAUSES[cause],
-                    size=message.size,
-                    path_loss_db=loss,
-                    snr_db=snr,
-                    los=STATES[state],
-                    blockers=self._in_order(sender, row) if state else (),
-                )
-                yield event
+        budget, senders, heard_by = self.budget, self.senders, self.heard_by
+        for place, sender, row, cause, arrives, loss, snr, state in zip(
+            self.places.tolist(),
+            senders.tolist(),
+            heard_by.tolist(),
+            self.causes.tolist(),
+            self.arrives.tolist(),
+            budget.loss[senders, heard_by].tolist(),
+            self.receptions.snr[self.places, heard_by].tolist(),
+            budget.states[senders, heard_by].tolist(),
+            strict=True,
+        ):
+            entry = self.ended[place]
+            message, (outcome, reason) = entry.message, OUTCOMES[cause]
+            event = LinkEvent.__new__(LinkEvent)
+            event.__dict__.update(  # a third of the time that a frozen dataclass takes to set as many fields
+                sender=message.sender,
+                receiver=budget.names[row],
+                number=message.number,
+                sent=entry.sent,
+                outcome=outcome,
+                arrives=arrives if cause == DELIVERED else None,
+                reason=reason,
+                size=message.size,
+                path_loss_db=loss,
+                snr_db=snr,
+                los=STATES[state],
+                blockers=budget.bodies_between(sender, row) if state else (),
+            )
+            yield event
 
-    def _in_order(self, sender: int, receiver: int) -> tuple[str, ...]:
-        """The bodies in between, from the sender on."""
-        if sender < receiver:
-            return self.budget.blockers.get((sender, receiver), ())
-        return self.budget.blockers.get((receiver, sender), ())[::-1]
+    def columns(self) -> Fates:
+        number, sent, size = _of_messages(self.ended)
+        return Fates(
+            self.budget.names,
+            self.senders,
+            self.heard_by,
+            OUTCOMES,
+            self.causes,
+            number[self.places],
+            sent[self.places],
+            self.arrives,
+            size[self.places],
+        )
 
 
-class Dropped:
-    """A message that its queue threw out."""
+class Dropped(FateBlock):
+    """A message that its queue threw out: rows of its sender and of those who listen, among `names`."""
 
-    def __init__(self, entry: Transmission, receivers: Sequence[str]) -> None:
+    def __init__(self, entry: Transmission, names: tuple[str, ...], sender: int, receivers: Rows) -> None:
         self._entry = entry
+        self._names = names
+        self._sender = sender
         self._receivers = receivers
 
     def __len__(self) -> int:
@@ -80,32 +106,31 @@ class Dropped:
 
     def __iter__(self) -> Iterator[LinkEvent]:
         message, sent = self._entry.message, self._entry.sent
-        for name in self._receivers:
-            yield LinkEvent(message.sender, name, message.number, sent, "lost", None, CAUSES[QUEUE], message.size)
+        for row in self._receivers.tolist():
+            yield LinkEvent(
+                message.sender, self._names[row], message.number, sent, "lost", None, CAUSES[QUEUE], message.size
+            )
+
+    def columns(self) -> Fates:
+        number, sent, size = _of_messages([self._entry])
+        all_of_one = np.zeros(len(self._receivers), dtype=np.int64)
+        return Fates(
+            self._names,
+            all_of_one + self._sender,
+            self._receivers,
+            OUTCOMES,
+            all_of_one + QUEUE,
+            number[all_of_one],
+            sent[all_of_one],
+            np.full(len(all_of_one), np.inf),
+            size[all_of_one],
+        )
 
 
-class LinkEvents(Sequence[LinkEvent]):
-    """A sequence of events that are made at the first look; a run of hundreds of stations need not look."""
-
-    def __init__(self, made: Sequence[LinkEvent], batches: Sequence[Batch | Dropped]) -> None:
-        self._made = list(made)
-        self._batches = list(batches)
-
-    def __len__(self) -> int:
-        return len(self._made) + sum(map(len, self._batches))
-
-    def __iter__(self) -> Iterator[LinkEvent]:
-        return iter(self._all())
-
-    @overload
-    def __getitem__(self, place: int) -> LinkEvent: ...
-    @overload
-    def __getitem__(self, place: slice) -> Sequence[LinkEvent]: ...
-    def __getitem__(self, place: int | slice) -> LinkEvent | Sequence[LinkEvent]:
-        return self._all()[place]
-
-    def _all(self) -> list[LinkEvent]:
-        for batch in self._batches:
-            self._made.extend(batch)
-        self._batches.clear()
-        return self._made
+def _of_messages(entries: Sequence[Transmission]) -> tuple[Rows, Array, Rows]:
+    """Numbers, instants of sending [s] and sizes [bytes], (T,) each."""
+    return (
+        np.array([entry.message.number for entry in entries], dtype=np.int64),
+        np.array([entry.sent for entry in entries], dtype=float),
+        np.array([entry.message.size for entry in entries], dtype=np.int64),
+    )
