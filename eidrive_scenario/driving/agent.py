@@ -54,6 +54,7 @@ class Agent:
         controller: Controller | None,
         speaker: Speaker,
         dt: float,
+        listens: bool = True,
         own_perception: bool = False,
         points: SharedPoints | None = None,
     ) -> None:
@@ -64,6 +65,8 @@ class Agent:
         self.fusion = fusion
         self.planner = planner
         self.controller = controller
+        self.listens = listens
+        """Whether the messages of others are for this station; one that does not drive may only speak."""
         self.own_perception = own_perception
         self.points = points
         self.message_interval = 0.0

@@ -77,7 +77,8 @@ def build_agent(
     `FusionMethod()` or `FusionMethod(fusion_settings)`, and `Planner(settings, spec, roads, dt=dt, seed=seed)`;
     `detector` gives one that is built already.
 
-    A body with wheels follows a route if the settings name no planner; one without drives never.
+    A body with wheels follows a route if the settings name no planner; one without drives never. A station that does
+    not drive hears others where its settings name them.
     Raises SettingError if a planner is asked of a body without wheels.
     """
     wheels = spec.wheelbase > 0.0
@@ -90,8 +91,9 @@ def build_agent(
     detector.install(installation)
     fusion = build_fusion(settings, detector)
     points = None
+    listens = planner != NO_PLANNER or settings.names_senders
     if isinstance(fusion, EarlyFusion):
-        points = SharedPoints(fusion, _joint(settings, installation) if planner != NO_PLANNER else None)
+        points = SharedPoints(fusion, _joint(settings, installation) if listens else None)
     return Agent(
         spec,
         settings,
@@ -108,7 +110,8 @@ def build_agent(
         controller=Controller(spec, dt) if wheels else None,
         speaker=Speaker(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
-        own_perception=own_perception,
+        listens=listens,
+        own_perception=own_perception and listens,
         points=points,
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.driving.building import build_detector, build_fusion
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
+from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings, agent_settings, is_agent
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
@@ -42,14 +42,24 @@ def declared_settings(
             problems.append(Problem(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
     if problems:
         raise SettingError(problems)
-    options = {"detector": detector, "cooperates_with": cooperate}
-    update = {key: value for key, value in options.items() if value is not None}
-    return {name: settings.model_copy(update=update | _own(settings, detector)) for name, settings in found.items()}
+    updated = {}
+    for name, settings in found.items():
+        update = _by_detector(settings, detector)
+        if cooperate is not None and (settings.names_senders or _drives(scenario, name, settings)):
+            update["cooperates_with"] = cooperate
+        updated[name] = settings.model_copy(update=update)
+    return updated
 
 
-def _own(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
+def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
     """What a detector by option changes: the settings in the file are those of the detector in the file."""
-    return {"detector_settings": {}} if detector is not None and detector != settings.detector else {}
+    if detector is None:
+        return {}
+    return {"detector": detector} | ({} if detector == settings.detector else {"detector_settings": {}})
+
+
+def _drives(scenario: Scenario, name: str, settings: AgentSettings) -> bool:
+    return settings.planner != NO_PLANNER and actor_spec(name, scenario.entities[name]).wheelbase > 0.0
 
 
 def declared_detectors(

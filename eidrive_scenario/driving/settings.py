@@ -124,7 +124,8 @@ class AgentSettings(Settings):
     sensors         kinds (`truth, camera`), or a mapping from names to settings; None is what the
                     detector usually has
     range, field_of_view, mount, visibility   of the truth sensor, where `sensors` does not say them
-    cooperates_with senders whose messages count; None is all
+    cooperates_with senders whose messages count; None is all. A station that does not drive hears those whom it names
+                    here, and without this property nobody
     message_rate    how often the station sends what it sees, None is each tick
     report_timeout  a report older than this is forgotten. Where it is not given: 1 s for a list of all that its sender
                     sees; 1.5 s for CAMs and for CPMs by the rules of ETSI, which repeat what stands still once a second
@@ -196,6 +197,11 @@ class AgentSettings(Settings):
                 f"report_timeout is {self.report_timeout:g} s"
             )
         return self
+
+    @property
+    def names_senders(self) -> bool:
+        """Whether it was said whom to hear, be it all; a station that drives hears all without a word."""
+        return "cooperates_with" in self.model_fields_set and self.cooperates_with != ()
 
     def lifetime(self, *, complete: bool) -> float:
         """How long a report counts [s]; `complete` where it tells all that its sender sees at that time."""

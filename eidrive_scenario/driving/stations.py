@@ -36,7 +36,7 @@ class Stations:
 
     channel    profile that wins over what the file says; None leaves it to the file
     detector   for all stations; None leaves it to their controllers
-    cooperate  the senders whom driving stations hear; None leaves it to their controllers
+    cooperate  the senders whom listening stations hear; None leaves it to their controllers
 
     Raises SettingError if a controller's properties, the channel or one of these options is wrong.
     """
@@ -191,10 +191,10 @@ class Stations:
         return self._channel.deliver(receiver, now) if self._channel is not None else ()
 
     def _listeners(self, sender: str) -> list[str]:
-        """Who hears `sender`: stations that drive and count it; itself too where the channel carries own perception."""
+        """Who hears `sender`: listening stations that count it; itself too where the channel carries own perception."""
         found = []
         for name, agent in self._agents.items():
-            if agent.planner is None:
+            if not agent.listens:
                 continue
             heard = agent.settings.cooperates_with
             if self._own_perception if name == sender else heard is None or sender in heard:
@@ -210,4 +210,4 @@ class Stations:
         self._channel = build_channel(profile, self._seed, previous=self._channel)
         self.channel_name = profile.name if profile is not None else NO_COOPERATION
         for agent in self._agents.values():
-            agent.own_perception = self._own_perception
+            agent.own_perception = self._own_perception and agent.listens
