@@ -12,7 +12,7 @@ from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.stage import Absent, Stage
 
 
 class ActionBehaviour(py_trees.behaviour.Behaviour):
@@ -67,6 +67,14 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def describe(self) -> str:
         """The action in words."""
         return type(self.action).__name__
+
+    def give_up(self, who: Absent) -> str:
+        """Stop, as somebody whom the action is about is not in the world; why, in words. The run warns of it."""
+        self.stop(Status.INVALID)
+        self.stage.release(self)
+        why = f"{who} is not in the world"
+        self.stage.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").problems
+        return why
 
     def problem(self, message: str, remedy: str = "") -> ScenarioError:
         """An error at the place of this action in the file."""

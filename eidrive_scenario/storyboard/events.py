@@ -9,7 +9,7 @@ from py_trees.common import Status
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.elements import StoryElement
-from eidrive_scenario.storyboard.stage import Holder, Stage
+from eidrive_scenario.storyboard.stage import Absent, Holder, Stage
 from eidrive_scenario.storyboard.states import State, Transition
 from eidrive_scenario.storyboard.trigger import WaitFor
 
@@ -106,7 +106,8 @@ class ActionElement(StoryElement):
             behaviour.stop(Status.INVALID)
             self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
-                behaviour.tick_once()
+                for _ in self._decide(behaviour):
+                    pass
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
             self.stage.release(behaviour)
@@ -146,14 +147,20 @@ class ActionElement(StoryElement):
             self._decided_at = now
             done: list[ActionBehaviour] = []
             for behaviour in tuple(self.running):
-                yield from behaviour.tick()
-                if behaviour.status is not Status.RUNNING:
+                yield from self._decide(behaviour)
+                if behaviour.status in (Status.SUCCESS, Status.FAILURE):
                     (done if behaviour.immediate else self._there).append(behaviour)
             self.stage.arriving = self.stage.arriving or bool(self._there)
             self._let_go(done)
         if self.state is State.COMPLETE:
             self.status = Status.SUCCESS
         yield self
+
+    def _decide(self, behaviour: ActionBehaviour) -> Iterator[Behaviour]:
+        try:
+            yield from behaviour.tick()
+        except Absent as who:
+            self.displace(behaviour, behaviour.give_up(who))
 
     def _let_go(self, done: Sequence[ActionBehaviour]) -> None:
         for behaviour in done:

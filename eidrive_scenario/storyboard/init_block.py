@@ -53,7 +53,10 @@ class InitBlock(Composite):
     def tick(self) -> Iterator[Behaviour]:
         """The running ones decide on the next step."""
         for behaviour in tuple(self.running):
-            yield from behaviour.tick()
+            try:
+                yield from behaviour.tick()
+            except Absent as who:
+                behaviour.give_up(who)
             if behaviour.status is not Status.RUNNING:
                 self.running.remove(behaviour)
                 self.stage.release(behaviour)

@@ -136,19 +136,19 @@ class Stage:
 
     def pose(self, name: str) -> Pose:
         """Where an actor is now. Raises Absent if it is not in the world."""
-        actor = self.actors[name]
-        if not actor.present:
-            raise Absent(name)
-        return actor.motion.pose
+        return self._there(name).motion.pose
 
     def location(self, name: str) -> LaneLocation | None:
         """Its place on the road: the lane below it, None where no road is near. Raises Absent."""
+        actor = self._there(name)
+        return None if self.roads is None else actor.location(self.roads, self.view.tick)
+
+    def _there(self, name: str) -> Actor:
+        """An actor in the world; whom an action deletes is there until the end of the step."""
         actor = self.actors[name]
-        if not actor.present:
+        if not actor.present and name not in self.view:
             raise Absent(name)
-        if self.roads is None:
-            return None
-        return actor.location(self.roads, self.view.tick)
+        return actor
 
     def speed(self, name: str) -> float:
         """Speed along the heading in this view [m/s]; of what was just placed, the speed that it was given."""
@@ -174,7 +174,6 @@ class Stage:
         actor.forget_location()
         if not actor.present:
             actor.present = True
-            self.commands.removals.discard(name)
             self.commands.additions[name] = actor.motion.placement()
 
     def leave(self, name: str) -> None:
@@ -182,8 +181,8 @@ class Stage:
         actor = self.actors[name]
         if actor.present:
             actor.present = False
-            self.commands.additions.pop(name, None)
-            self.commands.removals.add(name)
+            if self.commands.additions.pop(name, None) is None:
+                self.commands.removals.add(name)
         for held, _, occupant, holder in list(self._holders):
             if held == name:
                 occupant.displace(holder, f"{name} left the world")

@@ -100,8 +100,8 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
             commands = storyboard.tick(world.view())
             played.changes += storyboard.changes
             played.commands.append(commands)
-            world.add(commands.additions)
             world.remove(commands.removals)
+            world.add(commands.additions)
             world.move(commands.placements)
         return played
 
