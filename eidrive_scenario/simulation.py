@@ -179,7 +179,7 @@ class Simulation:
 
     def _apply(self, commands: Commands) -> None:
         """Carry out what the storyboard decided, except the placements, which are the world's step."""
-        for name in commands.removals:
+        for name in sorted(commands.removals):
             self.world.remove(name)
             self.stations.leave(name)
         for name, placement in commands.additions.items():
