@@ -163,8 +163,6 @@ WITHOUT_EFFECT = {
     "AssignControllerAction.activateAnimation": LIGHTS,
     "AssignControllerAction.activateLighting": LIGHTS,
     "Axle.positionZ": "wheels stand on the road",
-    "Axle.trackWidth": "the body's box says how wide a vehicle is; one track is driven",
-    "Axles.AdditionalAxle": "a gap: a vehicle that drives itself turns as on two axles",
     "Controller.controllerType": "its property `module` says whose it is",
     "DomeImage.azimuthOffset": "the sky is computed from sun, clouds and fog",
     "OverrideSteeringWheelAction.maxTorque": "a wheel is held at an angle, without forces at the rim",

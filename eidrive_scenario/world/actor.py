@@ -9,6 +9,19 @@ Vector3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
+class ExtraAxle:
+    """An axle beside the front and the rear one; of a trailer without a front axle, any of its axles."""
+
+    x: float
+    """Ahead of the rear axle [m]; of a trailer, ahead of its reference point."""
+    track: float
+    """Between the middles of its wheels [m]; 0 for as wide as the body."""
+    wheel_radius: float
+    max_steering: float = 0.0
+    """Largest angle of its wheels [rad]; 0 where they do not steer."""
+
+
+@dataclass(frozen=True)
 class ActorSpec:
     """The body of an actor, as its Vehicle, Pedestrian or MiscObject says.
 
@@ -27,6 +40,8 @@ class ActorSpec:
     max_steering: float = 0.0
     """Largest angle of the front wheels [rad]."""
     wheel_radius: float = 0.3
+    extra_axles: tuple[ExtraAxle, ...] = ()
+    """The axles beside those two, in the order of the file."""
     mass: float = 1500.0
     max_speed: float = 70.0
     max_acceleration: float = 10.0

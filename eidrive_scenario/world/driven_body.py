@@ -11,8 +11,9 @@ from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.bodies import DRIVEN, SCRIPTED, STATIC, STILL, Body, quaternion
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.dynamics import Demand, SingleTrack, VehicleParameters
+from eidrive_scenario.world.dynamics import Demand, VehicleParameters
 from eidrive_scenario.world.ground import GroundUnder
+from eidrive_scenario.world.multi_axle import track_of
 
 
 class DrivenBody(Body):
@@ -27,10 +28,10 @@ class DrivenBody(Body):
     ) -> None:
         super().__init__(client, spec, placement, dt)
         parameters = VehicleParameters.of(spec)
-        self.track = SingleTrack(parameters, step)
+        self.track = track_of(parameters, step)
         self._step = step
         self._ground = ground
-        self._lever = self.track.to_rear
+        self._lever = self.track.to_reference
         self._motion = (0.0, 0.0, 0.0)
         """Velocity x y of the centre of gravity [m/s] and yaw rate [rad/s], as of the rigid body."""
         self._create(

@@ -3,7 +3,8 @@
 Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3, with the axle
 loads at standstill. Tyre: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller
 framework for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014), whose largest side force is what the
-friction circle leaves beside the longitudinal force. Drive, brakes, rolling resistance and air drag: Rajamani, ch. 4.
+friction circle leaves beside the longitudinal force. Drive, brakes, rolling resistance and air drag:
+Rajamani, ch. 4. Vehicles with more than two axles: `multi_axle`.
 """
 
 from __future__ import annotations
@@ -37,16 +38,31 @@ PROPERTIES = (
 """The Properties of a Vehicle which `VehicleParameters.of` reads; each is a number, each may be missing."""
 
 
+class TrackAxle(NamedTuple):
+    """One axle of a vehicle with more than two."""
+
+    x: float
+    """Ahead of the rear axle [m]."""
+    front: bool
+    """Whether it is of the front group: nearer to the front axle than to the rear one."""
+    max_steering: float
+    """[rad]; 0 where its wheels do not steer."""
+
+
 @dataclass(frozen=True)
 class VehicleParameters:
-    """What the single-track model knows of a vehicle. The defaults in brackets hold where the catalog is silent."""
+    """What the single-track model knows of a vehicle. The defaults in brackets hold where the catalog is silent.
+
+    Where there are more than two axles, front and rear are groups of axles, and lie in the middle of theirs: the axles
+    of a group carry the same load, as on levelling suspensions, and are alike.
+    """
 
     mass: float
     """[kg]"""
     wheelbase: float
     """[m]"""
     weight_front: float
-    """Share of the weight on the front axle at standstill [0.55]."""
+    """Share of the weight on the front axle at standstill [0.55; of n front and m rear axles 0.55 n to 0.45 m]."""
     yaw_inertia: float
     """About the centre of gravity [kg m²; mass times the product of its distances from the axles]."""
     max_steering: float
@@ -74,6 +90,10 @@ class VehicleParameters:
     """Of the whole axle [N/rad; 14 per rad times its load]."""
     cornering_stiffness_rear: float
     """Of the whole axle [N/rad; 18 per rad times its load]."""
+    rear: float = 0.0
+    """Where the rear group lies ahead of the rear axle [m]."""
+    axles: tuple[TrackAxle, ...] = ()
+    """All axles where there are more than two, the front and the rear one first; else none."""
 
     @classmethod
     def of(cls, spec: ActorSpec) -> VehicleParameters:
@@ -81,12 +101,19 @@ class VehicleParameters:
         if spec.wheelbase <= 0.0:
             what = f"{spec.name!r} cannot be driven: its axles are not apart"
             raise SettingError(Problem(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))
-        weight_front = _number(spec, "weight_front", 0.55, below=1.0)
+        axles = _axles(spec)
+        front_group, rear_group = [axle.x for axle in axles if axle.front], [axle.x for axle in axles if not axle.front]
+        wheelbase, rear, usual = spec.wheelbase, 0.0, 0.55
+        if axles:
+            rear = sum(rear_group) / len(rear_group)
+            wheelbase = sum(front_group) / len(front_group) - rear
+            usual = 0.55 * len(front_group) / (0.55 * len(front_group) + 0.45 * len(rear_group))
+        weight_front = _number(spec, "weight_front", usual, below=1.0)
         weight = spec.mass * GRAVITY
-        lever = weight_front * (1.0 - weight_front) * spec.wheelbase**2
+        lever = weight_front * (1.0 - weight_front) * wheelbase**2
         return cls(
             mass=spec.mass,
-            wheelbase=spec.wheelbase,
+            wheelbase=wheelbase,
             weight_front=weight_front,
             yaw_inertia=_number(spec, "yaw_inertia", spec.mass * lever),
             max_steering=spec.max_steering,
@@ -102,7 +129,17 @@ class VehicleParameters:
             tyre_friction=_number(spec, "tyre_friction", 1.0),
             cornering_stiffness_front=_number(spec, "cornering_stiffness_front", 14.0 * weight * weight_front),
             cornering_stiffness_rear=_number(spec, "cornering_stiffness_rear", 18.0 * weight * (1.0 - weight_front)),
+            rear=rear,
+            axles=axles,
         )
+
+
+def _axles(spec: ActorSpec) -> tuple[TrackAxle, ...]:
+    if not spec.extra_axles:
+        return ()
+    middle = spec.wheelbase / 2.0
+    extra = (TrackAxle(axle.x, axle.x > middle, axle.max_steering) for axle in spec.extra_axles)
+    return TrackAxle(spec.wheelbase, True, spec.max_steering), TrackAxle(0.0, False, 0.0), *extra
 
 
 def _number(spec: ActorSpec, name: str, default: float, *, zero: bool = False, below: float = math.inf) -> float:
@@ -151,6 +188,8 @@ class SingleTrack:
         """Present angle of the front wheels [rad]."""
         self.to_front = (1.0 - p.weight_front) * p.wheelbase
         self.to_rear = p.weight_front * p.wheelbase
+        self.to_reference = p.rear + self.to_rear
+        """From the reference point, on the rear axle, ahead to the centre of gravity [m]."""
         self._cos, self._sin = 1.0, 0.0
         self._turn = p.steering_rate * step
         self._load_front = p.mass * GRAVITY * p.weight_front
@@ -199,10 +238,10 @@ class SingleTrack:
         side = left + to_front * yaw_rate
         rolling, slipping = abs(forward * cos + side * sin), side * cos - forward * sin
         slip = slipping / (rolling if rolling > self._slowest_front else self._slowest_front)
-        side_front = _fiala(slip, p.cornering_stiffness_front, _left_by(demand.grip_front, along_front))
+        side_front = fiala(slip, p.cornering_stiffness_front, left_by(demand.grip_front, along_front))
         rolling, slipping = abs(forward), left - to_rear * yaw_rate
         slip = slipping / (rolling if rolling > self._slowest_rear else self._slowest_rear)
-        side_rear = _fiala(slip, p.cornering_stiffness_rear, _left_by(demand.grip_rear, along_rear))
+        side_rear = fiala(slip, p.cornering_stiffness_rear, left_by(demand.grip_rear, along_rear))
 
         across_front = along_front * sin - side_front * cos
         force = along_front * cos + side_front * sin + along_rear + free
@@ -247,7 +286,7 @@ class SingleTrack:
         return front, rear, free - rolling
 
 
-def _fiala(slip: float, stiffness: float, largest: float) -> float:
+def fiala(slip: float, stiffness: float, largest: float) -> float:
     """Side force of an axle [N] at a tangent of its slip angle, saturating at `largest`, in the slip's direction."""
     used = stiffness * slip / (3.0 * largest)
     size = abs(used)
@@ -256,7 +295,8 @@ def _fiala(slip: float, stiffness: float, largest: float) -> float:
     return largest * used * (3.0 - size * (3.0 - size))
 
 
-def _left_by(grip: float, along: float) -> float:
+def left_by(grip: float, along: float) -> float:
+    """Side force that tyres of this grip have left beside a force along them [N]."""
     return math.sqrt(grip * grip - along * along) if along else grip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads import surface_meshes
-from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.actor import ActorSpec, ExtraAxle
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body
 from eidrive_scenario.world.camera import Pinhole, Radiance
@@ -137,7 +137,8 @@ def _beam(body: Body, brightness: float, high: bool) -> Beam:
 def _actor_instance(row: int, body: Body, emitted: Mapping[str, Light], motion: str) -> Instance:
     spec = body.spec
     rotation, foot = _stance(body)
-    shape = _actor_model(spec.shape, spec.size, spec.offset, spec.wheelbase, spec.wheel_radius, _paint(spec), motion)
+    axles = spec.wheelbase, spec.wheel_radius, spec.extra_axles
+    shape = _actor_model(spec.shape, spec.size, spec.offset, axles, _paint(spec), motion)
     return Instance(shape, rotation, foot, row, emitted)
 
 
@@ -150,12 +151,12 @@ def _actor_model(
     shape: str,
     size: tuple[float, float, float],
     offset: tuple[float, float, float],
-    wheelbase: float,
-    wheel_radius: float,
+    axles: tuple[float, float, tuple[ExtraAxle, ...]],
     colour: Colour,
     motion: str,
 ) -> Model:
-    spec = ActorSpec("", shape, "", size, offset, wheelbase=wheelbase, wheel_radius=wheel_radius)
+    wheelbase, radius, extra = axles
+    spec = ActorSpec("", shape, "", size, offset, wheelbase=wheelbase, wheel_radius=radius, extra_axles=extra)
     return model(actor_mesh(spec, motion), {"paint": colour})
 
 

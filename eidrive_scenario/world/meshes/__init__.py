@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 
 from eidrive_scenario.world.actor import ActorSpec
@@ -10,7 +11,7 @@ from eidrive_scenario.world.meshes.cars import car
 from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
 from eidrive_scenario.world.meshes.figures import crate, roadside_unit
 from eidrive_scenario.world.meshes.frame import Frame
-from eidrive_scenario.world.meshes.heavy import bus, firetruck, truck
+from eidrive_scenario.world.meshes.heavy import bus, firetruck, trailer, truck
 from eidrive_scenario.world.meshes.people import in_motion, pedestrian
 from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
 from eidrive_scenario.world.meshes.vans import ambulance, van
@@ -33,14 +34,18 @@ BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
 def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
     """Material to triangles (K, 3, 3) of an actor: origin at the centre of its box on the ground, x forward [m].
 
-    A pedestrian stands, walks or lies as its motion says, in the standard's words.
+    A truck without a front axle is a trailer. A pedestrian stands, walks or lies as its motion says, in the standard's
+    words.
     """
     length, width, height = spec.size
     if spec.wheelbase > 0.0:
         rear, front, radius = -spec.offset[0], spec.wheelbase - spec.offset[0], spec.wheel_radius
     else:
         rear, front, radius = -0.3 * length, 0.3 * length, min(0.35, 0.3 * height)
-    return _mesh(spec.shape, Frame(length, width, height, front, rear, radius), motion)
+    shape, extra = spec.shape, tuple(replace(axle, x=axle.x - spec.offset[0]) for axle in spec.extra_axles)
+    if spec.wheelbase <= 0.0 and extra:
+        shape, extra = ("trailer", extra) if shape == "truck" else (shape, ())
+    return _mesh(shape, Frame(length, width, height, front, rear, radius, extra), motion)
 
 
 def shadow(spec: ActorSpec) -> Array:
@@ -63,4 +68,4 @@ _ABOVE_GROUND = 0.035
 def _mesh(shape: str, frame: Frame, motion: str) -> Mapping[str, Array]:
     if shape == "pedestrian" and motion:
         return in_motion(frame, motion)
-    return BUILDERS[shape](frame).materials()
+    return (trailer if shape == "trailer" else BUILDERS[shape])(frame).materials()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.world.meshes.frame import Frame
+from eidrive_scenario.world.meshes.frame import Frame, add_extra_wheels
 from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, box, cylinder, tapered_box
 
 
@@ -13,6 +13,7 @@ def motorbike(frame: Frame) -> Mesh:
     base = x1 - x0
     for axle, wide in ((x0, 0.17), (x1, 0.12)):
         _wheel(mesh, axle, radius, wide, 0.62)
+    add_extra_wheels(mesh, frame, frame.side, 0.12)
     middle, seat = x0 + 0.45 * base, 2 * radius + 0.16
     mesh.add("plastic", bevelled_box((middle, 0, radius + 0.08), (0.44 * base, 0.26, 0.34), 0.05))
     mesh.add("steel", cylinder((middle - 0.2, -0.15, radius), (x0 - 0.15, -0.17, radius + 0.06), 0.055, sides=8))
@@ -39,6 +40,7 @@ def bicycle(frame: Frame) -> Mesh:
     base = x1 - x0
     for axle in (x0, x1):
         _wheel(mesh, axle, radius, 0.045, 0.88)
+    add_extra_wheels(mesh, frame, frame.side, 0.05)
     crank, head, saddle = x0 + 0.42 * base, x1 - 0.16 * base, x0 + 0.26 * base
     high = min(0.56 * frame.height, 0.98)
     for start, end in (

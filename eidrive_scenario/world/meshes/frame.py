@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eidrive_scenario.world.actor import ExtraAxle
 from eidrive_scenario.world.meshes.solids import Mesh, cylinder
 
 
@@ -22,6 +23,8 @@ class Frame:
     front: float
     rear: float
     wheel_radius: float
+    extra_axles: tuple[ExtraAxle, ...] = ()
+    """The others; their x as those of front and rear."""
 
     def x(self, share: float) -> float:
         """x at a share of the length, 0 at the rear end and 1 at the front."""
@@ -38,12 +41,31 @@ class Frame:
 
 
 def add_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, *, axles: tuple[float, ...] = ()) -> None:
-    """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side."""
-    radius = frame.wheel_radius
+    """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side.
+
+    Without `axles`, those of all axles.
+    """
     for x in axles or (frame.front, frame.rear):
-        arch = cylinder((x, side - tyre, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
-        arch[..., 2] = np.maximum(arch[..., 2], 0.5 * radius)
-        mesh.add_mirrored("trim", arch)
-        mesh.add_mirrored("tyre", cylinder((x, side - tyre, radius), (x, side, radius), radius, sides=18))
-        mesh.add_mirrored("rim", cylinder((x, side - 0.05, radius), (x, side + 0.006, radius), 0.64 * radius, sides=12))
-        mesh.add_mirrored("trim", cylinder((x, side, radius), (x, side + 0.01, radius), 0.18 * radius, sides=8))
+        _add_pair(mesh, x, frame.wheel_radius, side, tyre)
+    if not axles:
+        add_extra_wheels(mesh, frame, side, tyre)
+
+
+def add_extra_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, steered: float | None = None) -> None:
+    """The wheels of the further axles, on their own track, as far as that lies within y = ±side.
+
+    tyre  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
+    """
+    for axle in frame.extra_axles:
+        wide = steered if steered is not None and axle.max_steering > 0.0 else tyre
+        outer = min((axle.track + wide) / 2, side) if axle.track > 0.0 else side
+        _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, max(outer, wide), wide)
+
+
+def _add_pair(mesh: Mesh, x: float, radius: float, side: float, tyre: float) -> None:
+    arch = cylinder((x, side - tyre, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
+    arch[..., 2] = np.maximum(arch[..., 2], 0.5 * radius)
+    mesh.add_mirrored("trim", arch)
+    mesh.add_mirrored("tyre", cylinder((x, side - tyre, radius), (x, side, radius), radius, sides=18))
+    mesh.add_mirrored("rim", cylinder((x, side - 0.05, radius), (x, side + 0.006, radius), 0.64 * radius, sides=12))
+    mesh.add_mirrored("trim", cylinder((x, side, radius), (x, side + 0.01, radius), 0.18 * radius, sides=8))

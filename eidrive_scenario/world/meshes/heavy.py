@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.world.meshes.frame import Frame, add_wheels
+from eidrive_scenario.world.meshes.frame import Frame, add_extra_wheels, add_wheels
 from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylinder, tapered_box
 
 
@@ -18,9 +18,31 @@ def truck(frame: Frame) -> Mesh:
             (x(1.0) - 0.55 * cab, 0, z(0.93)), (0.75 * cab, 1.7 * side, z(0.10)), (0.35 * cab, 1.5 * side), -0.12
         ),
     )
-    cargo = frame.length - cab - 0.12
-    middle = x(0.0) + cargo / 2
     floor = 2 * frame.wheel_radius + 0.12
+    _cargo(mesh, frame, frame.length - cab - 0.12, floor)
+    _tail(mesh, frame, floor)
+    _chassis(mesh, frame)
+    return mesh
+
+
+def trailer(frame: Frame) -> Mesh:
+    """A closed cargo body on its own axles, with legs to stand on."""
+    mesh = Mesh()
+    radius = max((axle.wheel_radius for axle in frame.extra_axles), default=0.0) or frame.wheel_radius
+    floor = min(2 * radius + 0.12, 0.5 * frame.height)
+    _cargo(mesh, frame, frame.length, floor)
+    _tail(mesh, frame, floor)
+    mesh.add("trim", box((0.0, 0, floor - 0.15), (0.96 * frame.length, 0.9 * frame.side, 0.28)))
+    leg = (frame.x(0.8), 0.6 * frame.side, floor / 2 + 0.1)
+    mesh.add_mirrored("grey", box(leg, (0.14, 0.14, floor - 0.2)))
+    add_extra_wheels(mesh, frame, 0.985 * frame.side, 0.55, steered=0.32)
+    return mesh
+
+
+def _cargo(mesh: Mesh, frame: Frame, cargo: float, floor: float) -> None:
+    """A closed body over `cargo` metres from the rear end on, with seams and a stripe."""
+    x, side = frame.x, frame.side
+    middle = x(0.0) + cargo / 2
     mesh.add(
         "cargo", bevelled_box((middle, 0, (floor + frame.height) / 2), (cargo, 2 * side, frame.height - floor), 0.03)
     )
@@ -30,9 +52,6 @@ def truck(frame: Frame) -> Mesh:
             "grey", box((seam, side, (floor + frame.height) / 2), (0.03, 0.012, 0.96 * (frame.height - floor)))
         )
     mesh.add_mirrored("paint", box((middle, side, floor + 0.35 * (frame.height - floor)), (cargo, 0.016, 0.22)))
-    _tail(mesh, frame, floor)
-    _chassis(mesh, frame)
-    return mesh
 
 
 def firetruck(frame: Frame) -> Mesh:
@@ -47,9 +66,11 @@ def firetruck(frame: Frame) -> Mesh:
     mesh.add("paint", bevelled_box((middle, 0, (floor + roof) / 2), (body, 1.98 * side, roof - floor), 0.04))
     count = 4
     wide = body / count
+    axles = (frame.rear, *(axle.x for axle in frame.extra_axles))
     for index in range(count):
         centre = x(0.0) + (index + 0.5) * wide
-        low = floor + 0.12 if abs(centre - frame.rear) > 0.8 * wide else floor + 0.42
+        above_wheel = any(abs(centre - axle) <= 0.8 * wide for axle in axles)
+        low = floor + 0.42 if above_wheel else floor + 0.12
         high = roof - 0.22
         mesh.add_mirrored("steel", box((centre, 0.99 * side, (low + high) / 2), (0.84 * wide, 0.02, high - low)))
         for line in range(1, 7):
@@ -201,4 +222,5 @@ def _chassis(mesh: Mesh, frame: Frame) -> None:
     )
     add_wheels(mesh, frame, 0.985 * side, 0.32, axles=(frame.front,))
     add_wheels(mesh, frame, 0.985 * side, 0.55, axles=(frame.rear,))
+    add_extra_wheels(mesh, frame, 0.985 * side, 0.55, steered=0.32)
     mesh.add_mirrored("plastic", box((frame.rear, 0.80 * side, 2.12 * radius), (2.5 * radius, 0.38 * side, 0.06)))
