@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import numpy as np
-
 from eidrive_scenario.v2x.hearings import Heard
 
 DISTANCE_BIN = 25.0
@@ -76,7 +74,6 @@ class Book:
     def statistics(self, now: float, heard: Heard | None, busy_ratio: float | None = None) -> LinkStatistics:
         """The books as they stand; `heard` is None where nothing was yet."""
         received = 0 if heard is None else heard.received
-        mean_age, p95_age = (None, None) if heard is None else ages(heard, now)
         return LinkStatistics(
             sent=self.sent,
             received=received,
@@ -86,28 +83,10 @@ class Book:
             mean_delay=None if heard is None else heard.delay_sum / received,
             max_delay=None if heard is None else heard.delay_max,
             age=None if heard is None else now - heard.newest,
-            mean_age=mean_age,
-            peak_age=sum(heard.peaks.tolist()) / len(heard.peaks) if heard is not None and len(heard.peaks) else None,
-            p95_age=p95_age,
+            mean_age=None if heard is None else heard.mean_age,
+            peak_age=None if heard is None else heard.peak_age,
+            p95_age=None if heard is None else heard.p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple((DISTANCE_BIN * place, known, kept) for place, (known, kept) in sorted(self.fates.items())),
             busy_ratio=busy_ratio,
         )
-
-
-def ages(heard: Heard, now: float) -> tuple[float | None, float | None]:
-    """Mean and 95th percentile of the age over the time since the first arrival [s], exactly; None before that.
-
-    The time spent below an age x is piecewise linear in x, and bends at floors and peaks.
-    """
-    floors = heard.floors
-    peaks = np.maximum(np.append(heard.peaks, now - heard.newest), floors)
-    span = float(np.sum(peaks - floors))
-    if span <= 0.0:
-        return None, None
-    levels = np.concatenate([floors, peaks])
-    order = np.argsort(levels, kind="stable")
-    at_once = np.cumsum(np.repeat([1.0, -1.0], len(floors))[order])
-    spent = np.concatenate([[0.0], np.cumsum(at_once[:-1] * np.diff(levels[order]))])
-    mean = float(np.sum(peaks**2 - floors**2)) / (2.0 * span)
-    return mean, float(np.interp(0.95 * spent[-1], spent, levels[order]))

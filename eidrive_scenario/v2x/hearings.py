@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.v2x.ages import Ages
 from eidrive_scenario.v2x.message import Received
 
 Array = NDArray[np.float64]
@@ -20,20 +22,19 @@ MOST_WAITING = 1 << 17
 """So many messages are held at most before they are written down, as each holds what it says."""
 
 
-@dataclass(frozen=True)
-class Heard:
-    """Of one link: messages heard, their delays [s], when the newest information there was said [s], and its age.
+class Heard(NamedTuple):
+    """Of one link: messages heard, their delays [s], and when the newest information there was said [s].
 
-    floors  (U,) ages just after each update [s];  peaks  (U - 1,) just before each, from the second on. Age rises at
-            slope 1 in between, so these say all of it
+    mean_age, p95_age, peak_age  see LinkStatistics; None where nothing can be said yet
     """
 
     received: int
     delay_sum: float
     delay_max: float
     newest: float
-    floors: Array
-    peaks: Array
+    mean_age: float | None
+    p95_age: float | None
+    peak_age: float | None
 
 
 class Hearings:
@@ -47,8 +48,7 @@ class Hearings:
         self._number = 0
         self._received: Codes = np.zeros(0, dtype=np.int64)
         self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
-        self._updates: list[tuple[Codes, Array, Array]] = []
-        """Link, age after and age before of what was newer than all before it; before the first, infinity."""
+        self._ages = Ages()
 
     def take(self, receiver: str, entries: Sequence[Entry]) -> None:
         """A receiver has heard these, in this order."""
@@ -57,29 +57,16 @@ class Hearings:
         if self._number > MOST_WAITING:
             self._work_off()
 
-    def by_link(self) -> dict[tuple[str, str], Heard]:
-        """What was heard on each link, by (sender, receiver)."""
+    def by_link(self, now: float) -> dict[tuple[str, str], Heard]:
+        """What was heard on each link up to `now` [s], by (sender, receiver) in alphabetical order."""
         self._work_off()
-        codes, floors, peaks = (
-            (np.concatenate(column) for column in zip(*self._updates, strict=True))
-            if self._updates
-            else (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-        )
-        order = np.argsort(codes, kind="stable")
-        ends = np.cumsum(np.bincount(codes, minlength=self._count))[:-1]
-        floors_of, peaks_of = np.split(floors[order], ends), np.split(peaks[order], ends)
-        return {
-            (sender, receiver): Heard(
-                int(self._received[code]),
-                float(self._delay_sum[code]),
-                float(self._delay_max[code]),
-                float(self._newest[code]),
-                floors_of[code],
-                peaks_of[code][1:],
-            )
-            for receiver, senders in self._codes.items()
-            for sender, code in senders.items()
-        }
+        code_of = {(sender, name): code for name, senders in self._codes.items() for sender, code in senders.items()}
+        links = sorted(code_of)
+        codes = np.array([code_of[link] for link in links], dtype=np.int64)
+        columns = (self._received, self._delay_sum, self._delay_max, self._newest)
+        ages = [_known(age) for age in self._ages.at(now, self._newest, codes)]
+        rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
+        return {link: Heard(*row) for link, row in zip(links, rows, strict=True)}
 
     def _work_off(self) -> None:
         if not self._waiting:
@@ -110,6 +97,7 @@ class Hearings:
             np.concatenate([a, np.zeros(more)]) for a in (self._delay_sum, self._delay_max)
         )
         self._newest = np.concatenate([self._newest, np.full(more, -np.inf)])
+        self._ages.make_room(self._count)
 
     def _note_ages(self, codes: Codes, said: Array, arrived: Array) -> None:
         """Which messages told something newer than all before on their link, and how the age went then."""
@@ -117,8 +105,12 @@ class Hearings:
         codes, said, arrived = codes[order], said[order], arrived[order]
         before = np.maximum(_largest_before(codes, said), self._newest[codes])
         fresh = said > before
-        self._updates.append((codes[fresh], (arrived - said)[fresh], (arrived - before)[fresh]))
+        self._ages.note(codes[fresh], (arrived - said)[fresh], (arrived - before)[fresh])
         np.maximum.at(self._newest, codes, said)
+
+
+def _known(ages: Array) -> list[float | None]:
+    return [None if math.isnan(age) else age for age in ages.tolist()]
 
 
 def _largest_before(groups: Codes, values: Array) -> Array:

@@ -102,7 +102,7 @@ class Links:
 
         `busy_ratio` says how busy a station found the channel.
         """
-        heard = self._hearings.by_link()
+        heard = self._hearings.by_link(now)
         links = sorted((sender, receiver) for receiver, books in self._books.items() for sender in books)
         busy = {receiver: busy_ratio(receiver) for receiver in self._books}
         return {

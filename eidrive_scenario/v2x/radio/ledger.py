@@ -45,18 +45,25 @@ class Ledger:
 
     def write_into(self, links: Links) -> None:
         """Carry everything over into the books, and begin anew."""
-        used = np.argwhere(self._sent + self._causes.sum(axis=2))
-        for sender, receiver in used.tolist():
-            book = links.book(self.names[sender], self.names[receiver])
-            book.sent += int(self._sent[sender, receiver])
-            book.bytes_sent += int(self._bytes[sender, receiver])
-            for code, number in enumerate(self._causes[sender, receiver].tolist()):
-                if code != DELIVERED and number:
-                    book.lose(CAUSES[code], number)
-            for place, (lost, kept) in enumerate(self._fates[sender, receiver].tolist()):
-                if lost or kept:
-                    known = book.fates.setdefault(place, [0, 0])
-                    known[0] += lost + kept
-                    known[1] += kept
+        senders, receivers = np.nonzero((self._sent > 0) | self._causes.any(axis=2))
+        books = [
+            links.book(self.names[sender], self.names[receiver])
+            for sender, receiver in zip(senders.tolist(), receivers.tolist(), strict=True)
+        ]
+        sent, size = (counts[senders, receivers].tolist() for counts in (self._sent, self._bytes))
+        for book, messages, length in zip(books, sent, size, strict=True):
+            book.sent += messages
+            book.bytes_sent += length
+        causes = self._causes[senders, receivers]
+        causes[:, DELIVERED] = 0
+        found = np.nonzero(causes)
+        for place, code, number in zip(*(column.tolist() for column in (*found, causes[found])), strict=True):
+            books[place].lose(CAUSES[code], number)
+        fates = self._fates[senders, receivers]
+        where = np.nonzero(fates.any(axis=2))
+        for place, nearest, (lost, kept) in zip(*(column.tolist() for column in (*where, fates[where])), strict=True):
+            known = books[place].fates.setdefault(nearest, [0, 0])
+            known[0] += lost + kept
+            known[1] += kept
         for counts in (self._sent, self._bytes, self._causes, self._fates):
             counts[...] = 0

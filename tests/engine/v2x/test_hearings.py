@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x import hearings
+from eidrive_scenario.v2x import ages, hearings
 from eidrive_scenario.v2x.hearings import Entry, Hearings
 from eidrive_scenario.v2x.message import Message, Received, StationState
 
 NAMES = ("A", "B", "C")
+NOW = 45.0
+"""After the last arrival [s]."""
+SHORTEST, LONGEST = 0.02, 12.0
+"""Of all ages [s]."""
 
 
 def entries(count: int) -> list[tuple[str, Entry]]:
@@ -20,7 +26,7 @@ def entries(count: int) -> list[tuple[str, Entry]]:
     found = []
     for number in range(count):
         said = 0.1 * number
-        arrives = said + float(rng.uniform(0.02, 1.5))
+        arrives = said + float(rng.uniform(SHORTEST, 1.5))
         sender, receiver = rng.choice(NAMES, 2, replace=False).tolist()
         message = Message(sender, number, said, StationState(said, 0, 0, 0, 0, 0), Detections(said), 100)
         found.append((receiver, (arrives, sender, number, said, Received(message, arrives))))
@@ -34,8 +40,8 @@ def test_it_does_not_matter_how_many_wait(monkeypatch: pytest.MonkeyPatch, waiti
     for receiver, entry in entries(400):
         kept.take(receiver, [entry])
         if entry[2] % 50 == 0:
-            kept.by_link()
-    found = kept.by_link()
+            kept.by_link(entry[0])
+    found = kept.by_link(NOW)
     assert set(found) == {(a, b) for a in NAMES for b in NAMES if a != b}
     for (sender, receiver), heard in found.items():
         own = [entry for name, entry in entries(400) if (name, entry[1]) == (receiver, sender)]
@@ -48,10 +54,35 @@ def test_it_does_not_matter_how_many_wait(monkeypatch: pytest.MonkeyPatch, waiti
                 newest = said
         assert heard.received == len(own) > 30
         assert (heard.delay_sum, heard.delay_max, heard.newest) == (sum(delays), max(delays), newest)
-        assert heard.floors.tolist() == floors
-        assert heard.peaks.tolist() == peaks[1:]
         assert len(floors) < len(own), "some came too late to be news"
+        low, high = np.array(floors), np.array([*peaks[1:], NOW - newest])
+        assert heard.mean_age == pytest.approx(np.sum(high**2 - low**2) / 2.0 / np.sum(high - low))
+        below = np.sum(np.clip(heard.p95_age - low, 0.0, high - low))
+        assert below == pytest.approx(0.95 * np.sum(high - low))
+        assert heard.peak_age == pytest.approx(sum(peaks[1:]) / len(peaks[1:]))
+
+
+def test_a_long_run_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Old ages are sorted into classes: the percentile is off by half of one, averages not at all."""
+    exact, bounded = Hearings(), Hearings()
+    for receiver, entry in entries(3000):
+        exact.take(receiver, [entry])
+    at_end = exact.by_link(1000.0)
+    monkeypatch.setattr(ages, "MOST_STEPS", 500)
+    monkeypatch.setattr(ages, "GRID", 0.04)
+    monkeypatch.setattr(hearings, "MOST_WAITING", 50)
+    bounded = Hearings()
+    kept = []
+    for receiver, entry in entries(3000):
+        bounded.take(receiver, [entry])
+        kept.append(bounded._ages._number)
+    classes = len(at_end) * math.log(LONGEST / SHORTEST) / ages.GRID
+    assert max(kept) < 2.0 * classes + 100 < 0.5 * exact._ages._number
+    for link, heard in bounded.by_link(1000.0).items():
+        assert heard[:4] == pytest.approx(at_end[link][:4])
+        assert (heard.mean_age, heard.peak_age) == pytest.approx((at_end[link].mean_age, at_end[link].peak_age))
+        assert heard.p95_age == pytest.approx(at_end[link].p95_age, rel=0.02)
 
 
 def test_nothing_heard_is_nothing_known() -> None:
-    assert Hearings().by_link() == {}
+    assert Hearings().by_link(1.0) == {}
