@@ -58,6 +58,8 @@ class Stations:
         self._dt = dt
         self._fixed_channel = channel is not None
         self._channel: Channel | None = None
+        self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
+        """When the books of the channel were last read, and what they said: to read those of many links takes a while."""
         self.channel_name = NO_COOPERATION
         self.goals: Mapping[str, Goal] = {}
         self.signals: Mapping[str, str] = {}
@@ -126,6 +128,7 @@ class Stations:
         if not self._agents:
             return {}
         if self._channel is not None:
+            self._books = None
             self._channel.around(self._surroundings(world, view))
         readings = read_all(list(self._rigs.values()), world, view)
         for name, lookout in self._lookouts.items():
@@ -163,13 +166,14 @@ class Stations:
             receivers = self._listeners(sender)
             outbox += [(message, receivers) for message in step.outbox]
         told = self._channel.transmit(outbox, now)
+        self._books = None
         self.links = told if isinstance(told, LinkEvents) else tuple(told)
 
     def metrics(self, now: float) -> dict[str, float]:
         """Counts of messages over all links."""
         if self._channel is None:
             return {}
-        books = self._channel.statistics(now).values()
+        books = self.link_statistics(now).values()
         return {
             "messages.sent": sum(book.sent for book in books),
             "messages.received": sum(book.received for book in books),
@@ -179,7 +183,11 @@ class Stations:
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         """The books of every link, by (sender, receiver); empty without a channel."""
-        return self._channel.statistics(now) if self._channel is not None else {}
+        if self._channel is None:
+            return {}
+        if self._books is None or self._books[0] != now:
+            self._books = now, self._channel.statistics(now)
+        return self._books[1]
 
     def _surroundings(self, world: World, view: WorldView) -> Surroundings:
         places = {
