@@ -1,9 +1,9 @@
 """How fast the radio is: 200 stations at 10 Hz on one channel, sending, contending, receiving and being heard.
 
 Cars stand every 20 m on each of two lanes of a 2 km road and drive at 25 m/s; every tenth line of sight is blocked by a
-truck. All stations listen to all others, so each simulated second decides 398,000 fates. A tick does all that a run does for
-the radio: messages are given out, said and sent, and what became of them enters the hash of the trace. Times are
-those of the processor, summed over threads, and the least of some repetitions.
+truck. All stations listen to all others, so each simulated second decides 398,000 fates. A tick does all that a run
+does for the radio: messages are given out, said and sent, and what became of them enters the hash of the trace. Times
+are those of the processor, summed over threads, and the least of some repetitions.
 
     python benchmarks/bench_radio.py [--stations 200] [--seconds 3] [--technology 80211p] [--repetitions 3]
 """

@@ -59,7 +59,7 @@ class Stations:
         self._fixed_channel = channel is not None
         self._channel: Channel | None = None
         self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
-        """When the books of the channel were last read, and what they said: to read those of many links takes a while."""
+        """When the books of the channel were last read, and what they said: those of many links take a while."""
         self.channel_name = NO_COOPERATION
         self.goals: Mapping[str, Goal] = {}
         self.signals: Mapping[str, str] = {}

@@ -14,6 +14,8 @@ MOST_STEPS = 1 << 20
 """So many bends are kept exactly, over all links [24 bytes each]: six hours of one link at 20 Hz."""
 GRID = 0.01
 """Relative width of the classes into which older ages are sorted then."""
+RESOLUTION = 2.0**-30
+"""To which the time spent below an age is counted [s]."""
 LEAST = 1e-6
 """Ages below this are 0 there [s]."""
 
@@ -95,15 +97,19 @@ class Ages:
         places, levels, weights = places[wanted], levels[wanted], weights[wanted]
         rising = np.lexsort((levels, places))
         places, levels, above = places[rising], levels[rising], np.cumsum(weights[rising])
-        # Nothing is above the last level of a link, so the time spent goes on from link to link without a gap.
-        spent = np.concatenate([[0.0], np.cumsum(above[:-1] * np.diff(levels))])[: len(levels)]
-        first = np.searchsorted(places, np.arange(len(asked)))
-        last = np.append(first[1:], len(places))[: len(first)] - 1
-        target = spent[first] + share * (spent[last] - spent[first])
-        after = np.clip(np.searchsorted(spent, target), first + 1, last)
-        before = after - 1
-        within = (target - spent[before]) / np.maximum(spent[after] - spent[before], np.finfo(float).tiny)
         found = np.full(len(order), np.nan)
+        if not len(asked):
+            return found
+        # In whole numbers, so that a link's result depends on no other link; nothing is above the last level of each.
+        exact = np.round(levels / RESOLUTION).astype(np.int64)
+        spent = np.cumsum(np.concatenate([[0], above[:-1] * np.diff(exact)]))
+        first = np.searchsorted(places, np.arange(len(asked)))
+        last = np.append(first[1:], len(places)) - 1
+        spent -= spent[first][places]
+        target = share * spent[last]
+        after = np.clip(first + np.add.reduceat(spent < target[places], first, dtype=np.int64), first + 1, last)
+        before = after - 1
+        within = (target - spent[before]) / np.maximum(spent[after] - spent[before], 1)
         found[some[order]] = levels[before] + within * (levels[after] - levels[before])
         return found
 

@@ -86,3 +86,15 @@ def test_a_long_run_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_nothing_heard_is_nothing_known() -> None:
     assert Hearings().by_link(1.0) == {}
+
+
+def test_what_is_known_of_a_link_depends_on_no_other() -> None:
+    """To the last bit: who else listens changes no book."""
+    everybody, one = Hearings(), Hearings()
+    for receiver, entry in entries(400):
+        everybody.take(receiver, [entry])
+        if receiver == "B":
+            one.take(receiver, [entry])
+    alone, among_others = one.by_link(NOW), everybody.by_link(NOW)
+    assert set(alone) == {("A", "B"), ("C", "B")}
+    assert all(among_others[link] == heard for link, heard in alone.items())
