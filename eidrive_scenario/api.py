@@ -17,7 +17,7 @@ from eidrive_scenario.errors import (
     suggestion,
 )
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.geometry import box_distance, footprint_distance, overlap, wrap_angle
+from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.lifting import lift
@@ -32,7 +32,7 @@ from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.condition import Condition, EntityCondition, Measure, compares, in_words
-from eidrive_scenario.storyboard.distances import box_of, distance, frame_of, kind_of
+from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.environments import changed as changed_environment
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
@@ -131,10 +131,12 @@ __all__ = [
     "box_distance",
     "box_of",
     "changed_environment",
+    "closing_speed",
     "compares",
     "count_lanes",
     "distance",
     "facing",
+    "footprint",
     "footprint_distance",
     "frame_of",
     "generator",

@@ -14,6 +14,9 @@ from eidrive_scenario.storyboard.trajectory import Layout
 Box = tuple[float, float, float, float, float, float, float]
 """x y z of the centre, length, width, height [m], yaw [rad]"""
 
+INSTANT = 1e-3
+"""A time in which nobody's motion along a road changes [s]."""
+
 CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
     model.RoutingAlgorithm.FASTEST: "fastest",
     model.RoutingAlgorithm.LEAST_INTERSECTIONS: "leastIntersections",
@@ -68,11 +71,55 @@ def distance(
     """
     if kind == "euclidianDistance":
         return _straight(stage, a, b, freespace)
-    along, across = _offsets(stage, a, b, frame, algorithm)
+    here = Place(stage.pose(a), stage.location(a) if frame in ("lane", "road") else None)
+    along, across = _offsets(stage, a, here, b, frame, algorithm)
     value = along if kind == "longitudinal" else across
     if not freespace or math.isnan(value):
         return value
     return _between(stage, a, b, frame, kind, value)
+
+
+def closing_speed(
+    stage: Stage,
+    a: str,
+    b: str | Place,
+    *,
+    frame: str,
+    kind: str,
+    algorithm: model.RoutingAlgorithm | None = None,
+) -> float:
+    """How fast actor `a` and `b` come nearer [m/s], by the frame and kind in which their distance is measured.
+
+    NaN where the frame gives no distance. Both keep their velocities of this view, along roads and trajectories too; a
+    place does not move.
+    """
+    mine, theirs = _velocity(stage, a), _velocity(stage, b) if isinstance(b, str) else (0.0, 0.0)
+    here, there = Place(stage.pose(a), stage.location(a)), _place(stage, b)
+    if kind == "euclidianDistance":
+        dx, dy = there.pose.x - here.pose.x, there.pose.y - here.pose.y
+        length = math.hypot(dx, dy)
+        return ((mine[0] - theirs[0]) * dx + (mine[1] - theirs[1]) * dy) / length if length > 0.0 else 0.0
+    axis = 0 if kind == "longitudinal" else 1
+    now = _offsets(stage, a, here, there, frame, algorithm)[axis]
+    moved = _moved(stage, here, mine), _moved(stage, there, theirs)
+    then = _offsets(stage, a, *moved, frame, algorithm)[axis]
+    return math.copysign(1.0, now) * (now - then) / INSTANT
+
+
+def _velocity(stage: Stage, name: str) -> tuple[float, float]:
+    x, y = stage.view.velocity[stage.view.row(name), :2].tolist()
+    return x, y
+
+
+def _moved(stage: Stage, place: Place, velocity: tuple[float, float]) -> Place:
+    """Where somebody is an instant later."""
+    x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
+    location = stage.roads.locate_at(x, y, place.location) if stage.roads is not None else None
+    return Place(place.pose._replace(x=x, y=y), location)
+
+
+def _place(stage: Stage, target: str | Place) -> Place:
+    return Place(_pose(stage, target), _location(stage, target))
 
 
 def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
@@ -86,11 +133,12 @@ def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
 
 
 def _offsets(
-    stage: Stage, a: str, b: str | Place, frame: str, algorithm: model.RoutingAlgorithm | None
+    stage: Stage, a: str, mine: Place, b: str | Place, frame: str, algorithm: model.RoutingAlgorithm | None
 ) -> tuple[float, float]:
-    here, there = stage.pose(a), _pose(stage, b)
+    """How far `b` is ahead and to the left of actor `a`, where that stands at `mine` [m]."""
+    here, there = mine.pose, _pose(stage, b)
     if frame in ("lane", "road") and stage.roads is not None:
-        start, end = stage.location(a), _location(stage, b)
+        start, end = mine.location, _location(stage, b)
         if start is None or end is None:
             return math.nan, math.nan
         if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:

@@ -135,6 +135,24 @@ def test_who_is_not_in_the_world_fulfils_nothing(scene: Any) -> None:
     assert played.when("event 2", "runningState") is None
 
 
+@pytest.mark.element("TimeToCollisionCondition")
+@pytest.mark.parametrize(
+    ("frame", "kind"),
+    [("world", "longitudinal"), ("world", "lateral"), ("entity", "longitudinal"), ("entity", "lateral")],
+)
+def test_the_speed_of_approach_is_along_the_axis_of_the_distance(scene: Any, frame: str, kind: str) -> None:
+    """Ego has 100 m towards +y at 20 m/s, Other 50 m towards +x at 10 m/s: 5 s, of which 4 are left after 1."""
+    condition = of(
+        f'<TimeToCollisionCondition freespace="false" rule="lessOrEqual" value="4" coordinateSystem="{frame}" '
+        f'relativeDistanceType="{kind}"><TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
+        "</TimeToCollisionConditionTarget></TimeToCollisionCondition>"
+    )
+    across = """<PrivateAction><TeleportAction><Position><WorldPosition x="300" y="-102" h="1.5707963267948966"/>
+      </Position></TeleportAction></PrivateAction>"""
+    played = scene(3, ("Ego", NOTHING, condition), ("Ego", across), ego=(-1, 900, 20), other=(-1, 249, 10))
+    assert first(played) == pytest.approx(1.1)
+
+
 def test_a_standing_entity_has_a_headway_without_end(scene: Any) -> None:
     condition = '<TimeHeadwayCondition entityRef="Other" freespace="false" rule="greaterThan" value="1000"/>'
     assert first(scene(0.5, ("Ego", NOTHING, of(condition)), ego=(-1, 100, 0))) == 0.0
@@ -195,6 +213,36 @@ def test_clearance_in_the_lane_to_the_right(scene: Any, other: Any, opposite: st
     assert first(scene(0.2, ("Ego", NOTHING, condition), other=other)) == (0.0 if clear else None)
 
 
+@pytest.mark.element("RelativeClearanceCondition")
+@pytest.mark.parametrize(
+    ("s", "free_space", "clear"),
+    [(130.5, "false", True), (130.5, "true", False), (131.5, "true", True), (77, "true", False), (75, "true", True)],
+)
+def test_with_free_space_whoever_reaches_in_is_in_the_way(scene: Any, s: float, free_space: str, clear: bool) -> None:
+    """Other's box reaches from 1 m behind its reference point to 4 m ahead of it."""
+    condition = of(
+        f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
+        f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    assert first(scene(0.2, ("Ego", NOTHING, condition), other=(-2, s, 20))) == (0.0 if clear else None)
+
+
+@pytest.mark.parametrize(("free_space", "time"), [("true", 0.1), ("false", None)])
+def test_a_flank_in_the_next_lane_is_in_the_way_with_free_space(
+    scene: Any, free_space: str, time: float | None
+) -> None:
+    """From 0.1 s on 1.5 m beside the middle of a lane of 4 m, Other's flank is 0.5 m in the lane to the right."""
+    condition = of(
+        f'<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="{free_space}" '
+        f'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
+    )
+    aside = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
+      <LaneOffsetActionDynamics dynamicsShape="step"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="-1.5"/>
+      </LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+    played = scene(0.3, ("Ego", NOTHING, condition), ("Other", aside), other=(-1, 110, 20), edge="falling")
+    assert first(played) == (None if time is None else pytest.approx(time))
+
+
 def test_where_there_is_no_such_lane_there_is_no_clearance(scene: Any) -> None:
     condition = of(
         '<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '
@@ -205,7 +253,7 @@ def test_where_there_is_no_such_lane_there_is_no_clearance(scene: Any) -> None:
 
 @pytest.mark.element("StoryboardElementStateCondition")
 def test_a_state_lasts_and_a_transition_passes(scene: Any) -> None:
-    """The braking ends in the tick at 0.9 s; conditions see that at 1.0 s."""
+    """The braking ends at 1.0 s, where conditions see that."""
     state = (
         '<ByValueCondition><StoryboardElementStateCondition storyboardElementType="{}" storyboardElementRef="{}" '
         'state="{}"/></ByValueCondition>'

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
-from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, distance, facing, model
+from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, box_of, facing, footprint, model
 
 
 class RelativeClearanceCondition(EntityCondition):
     """No (named) entity is within a stretch ahead and behind, in a range of lanes counted from the own one to the left.
 
     The range must exist: an entity beside which there is no such lane has no clearance there. Lanes of oncoming traffic
-    count only with `oppositeLanes`.
+    count only with `oppositeLanes`. The stretch is measured from the reference point of the entity along the road; with
+    `freeSpace` whoever reaches into it with any part of its box is in it, else whose reference point lies there.
     """
 
     element: model.RelativeClearanceCondition
@@ -41,14 +42,27 @@ class RelativeClearanceCondition(EntityCondition):
         ]
 
     def _blocks(self, stage: Stage, entity: str, here: LaneLocation, name: str) -> bool:
+        places = self._places(stage, name)
+        if not places or not any(self._in_range(stage, entity, here, there) for there in lanes_of(places)):
+            return False
+        assert stage.roads is not None
+        found = [stage.roads.distance(here, there) for there in places]
+        turn = facing(stage, entity, here)
+        along = [offset[0] * turn for offset in found if offset is not None]
+        ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
+        return bool(along) and min(along) <= ahead and max(along) >= -behind
+
+    def _places(self, stage: Stage, name: str) -> list[LaneLocation]:
+        """Where somebody is: the reference point, with `freeSpace` the corners of the box too."""
         there = stage.location(name)
         if there is None:
-            return False
-        gap = distance(stage, entity, name, frame="road", kind="longitudinal", freespace=self.element.free_space)
-        ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
-        if math.isnan(gap) or not -behind <= gap <= ahead:
-            return False
-        return self._in_range(stage, entity, here, there)
+            return []
+        if not self.element.free_space:
+            return [there]
+        assert stage.roads is not None
+        outline = footprint(np.array(box_of(stage, name))).tolist()
+        corners = (stage.roads.locate_at(x, y, there) for x, y in outline)
+        return [there, *(corner for corner in corners if corner is not None)]
 
     def _exists(self, stage: Stage, entity: str, here: LaneLocation) -> bool:
         assert stage.roads is not None
@@ -71,3 +85,14 @@ class RelativeClearanceCondition(EntityCondition):
             (bounds.from_ is None or left >= bounds.from_) and (bounds.to is None or left <= bounds.to)
             for bounds in ranges
         )
+
+
+def lanes_of(places: list[LaneLocation]) -> list[LaneLocation]:
+    """A place in each of the lanes that a box covers between its corners, lane 0 left out."""
+    found = {(place.road, place.lane): place for place in places}
+    for road in {place.road for place in places}:
+        lanes = [lane for name, lane in found if name == road]
+        for lane in range(min(lanes) + 1, max(lanes)):
+            if lane != 0:
+                found.setdefault((road, lane), found[road, lanes[0]]._replace(lane=lane))
+    return list(found.values())

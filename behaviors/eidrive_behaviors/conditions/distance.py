@@ -18,33 +18,31 @@ from eidrive_scenario.api import (
     resolve,
 )
 
-
-def measured(
-    stage: Stage,
-    entity: str,
-    target: str | Place,
-    element: model.DistanceCondition
+Measured = (
+    model.DistanceCondition
     | model.RelativeDistanceCondition
     | model.TimeHeadwayCondition
-    | model.TimeToCollisionCondition,
-) -> float:
-    """The distance as an element of the standard asks for it [m], signed; NaN where there is none.
+    | model.TimeToCollisionCondition
+)
+"""Conditions that measure a distance."""
+
+
+def frame_and_kind(element: Measured) -> tuple[str, str]:
+    """How an element of the standard asks for a distance.
 
     The `alongRoute` of 1.0 asks for the distance along the road; without it and without a word a distance is straight.
     """
-    frame, kind = frame_of(element.coordinate_system), kind_of(element.relative_distance_type)
     if getattr(element, "along_route", None):
-        frame, kind = "road", "longitudinal"
+        return "road", "longitudinal"
+    return frame_of(element.coordinate_system), kind_of(element.relative_distance_type)
+
+
+def measured(stage: Stage, entity: str, target: str | Place, element: Measured) -> float:
+    """The distance as an element of the standard asks for it [m], signed; NaN where there is none."""
+    frame, kind = frame_and_kind(element)
+    how = element.routing_algorithm
     try:
-        return distance(
-            stage,
-            entity,
-            target,
-            frame=frame,
-            kind=kind,
-            freespace=element.freespace,
-            algorithm=element.routing_algorithm,
-        )
+        return distance(stage, entity, target, frame=frame, kind=kind, freespace=element.freespace, algorithm=how)
     except Absent:
         return math.nan
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from eidrive_behaviors.conditions.distance import measured, place_of
-from eidrive_scenario.api import EntityCondition, Stage, compares, in_words, kind_of, model
+from eidrive_behaviors.conditions.distance import frame_and_kind, measured, place_of
+from eidrive_scenario.api import EntityCondition, Place, Stage, closing_speed, compares, in_words, model
 
 STANDING = 1e-6
 
@@ -37,7 +37,10 @@ class TimeHeadwayCondition(EntityCondition):
 
 
 class TimeToCollisionCondition(EntityCondition):
-    """Distance to an entity or a position over the speed of approach [s]; where they do not approach there is none."""
+    """Distance to an entity or a position over the speed of approach [s]; where they do not approach there is none.
+
+    The speed is that in which the distance shrinks, by the same coordinate system and along the same axis.
+    """
 
     element: model.TimeToCollisionCondition
     unit = "s"
@@ -61,33 +64,18 @@ class TimeToCollisionCondition(EntityCondition):
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The time to collision."""
-        target = self.element.time_to_collision_condition_target
-        kind = "longitudinal" if self.element.along_route else kind_of(self.element.relative_distance_type)
-        row = stage.view.row(entity)
-        vx, vy = stage.view.velocity[row, :2].tolist()
-        if target.entity_ref is not None:
-            name = target.entity_ref.entity_ref
-            if name not in stage.view:
-                return math.nan
-            other = stage.view.row(name)
-            vx -= float(stage.view.velocity[other, 0])
-            vy -= float(stage.view.velocity[other, 1])
-            there = stage.pose(name)
-            gap = measured(stage, entity, name, self.element)
-        else:
-            assert target.position is not None
-            place = place_of(stage, target.position, entity)
-            if place is None:
-                return math.nan
-            there = place.pose
-            gap = measured(stage, entity, place, self.element)
-        here = stage.pose(entity)
-        dx, dy = there.x - here.x, there.y - here.y
-        if kind == "euclidianDistance":
-            length = math.hypot(dx, dy)
-            closing = (vx * dx + vy * dy) / length if length > 0.0 else 0.0
-        else:
-            cos, sin = math.cos(here.h), math.sin(here.h)
-            closing = vx * cos + vy * sin if kind == "longitudinal" else vy * cos - vx * sin
-            closing = math.copysign(1.0, gap) * closing
+        to = self._towards(stage, entity)
+        if to is None:
+            return math.nan
+        gap = measured(stage, entity, to, self.element)
+        frame, kind = frame_and_kind(self.element)
+        closing = closing_speed(stage, entity, to, frame=frame, kind=kind, algorithm=self.element.routing_algorithm)
         return abs(gap) / closing if closing > STANDING else math.nan
+
+    def _towards(self, stage: Stage, entity: str) -> str | Place | None:
+        """The other entity, or the place; None while it is not in the world."""
+        target = self.element.time_to_collision_condition_target
+        if target.entity_ref is not None:
+            return target.entity_ref.entity_ref if target.entity_ref.entity_ref in stage.view else None
+        assert target.position is not None
+        return place_of(stage, target.position, entity)

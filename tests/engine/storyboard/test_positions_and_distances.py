@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.distances import distance
+from eidrive_scenario.storyboard.distances import closing_speed, distance
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.positions import count_lanes, resolve
 from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.world.view import WorldView
 
 
 @pytest.fixture
@@ -195,3 +197,41 @@ def test_in_a_bend_the_road_is_longer_than_the_sight(stage: Any, bend: Any) -> N
     assert along == pytest.approx(25 * math.pi, abs=1e-6)
     sight = distance(made, "A", "B", frame="entity", kind="longitudinal", freespace=False)
     assert sight == pytest.approx(52.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("frame", "kind", "expected"),
+    [
+        ("road", "longitudinal", (20.0 - 8.0) * 50.0 / 52.0),
+        ("entity", "longitudinal", 20.0 - 8.0 * math.cos(1.2)),
+        ("entity", "lateral", -8.0 * math.sin(1.2)),
+        ("world", "lateral", -8.0 * math.sin(1.2)),
+        ("entity", "euclidianDistance", (20.0 - 8.0) * math.cos(0.6)),
+    ],
+)
+def test_in_a_bend_two_come_nearer_as_their_distance_is_measured(
+    stage: Any, bend: Any, frame: str, kind: str, expected: float
+) -> None:
+    """A drives 20 m/s at the start of the bend, B 8 m/s after 60 m of road (1.2 rad); 52 m of lane are 50 m of road."""
+    made = Stage(stage.scenario, bend, dt=0.1, seed=0, nobody=stage.view)
+    for name, s in (("A", 0.0), ("B", 60.0)):
+        here = bend.location("1", -1, s)
+        made.enter(name, Place(bend.pose(here), here))
+    zero, points = np.zeros(2), np.zeros((2, 3))
+    made.view = WorldView(
+        time=0.0,
+        tick=0,
+        names=("A", "B"),
+        categories=("car", "car"),
+        position=points,
+        yaw=zero,
+        pitch=zero,
+        roll=zero,
+        velocity=np.array([[20.0, 0.0, 0.0], [8.0 * math.cos(1.2), 8.0 * math.sin(1.2), 0.0]]),
+        acceleration=points,
+        yaw_rate=zero,
+        speed=np.array([20.0, 8.0]),
+        size=points,
+        offset=points,
+    )
+    assert closing_speed(made, "A", "B", frame=frame, kind=kind) == pytest.approx(expected, abs=0.01)
