@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.failures import WRONG_INPUT
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import definition, resolve_scenario
 
 _SUFFIX = ".xosc"
@@ -29,8 +29,11 @@ def check(
     from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
     from eidrive_scenario.experiments.inspection import inspect_scenario
 
-    files, ignored = list(_files(paths)), tuple(ignore or ())
-    told: dict[str, dict[Problem, None]] = {"problem": {}, "warning": {}, "note": {}}
+    missing: list[Problem] = []
+    files, ignored = list(_files(paths, missing)), tuple(ignore or ())
+    told: dict[str, dict[Problem, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
+    for problem in missing:
+        typer.echo(str(problem))
     for path in files:
         kind = definition(path)
         if kind == "catalog":
@@ -58,14 +61,18 @@ def _mark(level: str, rule: str) -> str:
     return "" if level == "problem" else f" ({word})"
 
 
-def _files(paths: list[str]) -> Iterator[Path]:
+def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
+    """The files that are meant; what is not there goes to `missing` and keeps no other from being checked."""
     for given in paths:
         if not Path(given).is_dir():
-            yield resolve_scenario(given)
+            try:
+                yield resolve_scenario(given)
+            except InputError as error:
+                missing += error.problems
             continue
         inside = sorted(Path(given).rglob(f"*{_SUFFIX}"))
         if not inside:
-            raise SettingError(Problem(f"no {_SUFFIX} file in {given!r}", "give another folder"))
+            missing.append(Problem(f"no {_SUFFIX} file in {given!r}", "give another folder"))
         yield from inside
 
 

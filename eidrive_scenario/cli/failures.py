@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from typing import Any
 
 import typer
@@ -10,8 +12,8 @@ from typer.core import TyperGroup
 from eidrive_scenario.errors import EidriveError, InputError
 
 WRONG_INPUT, BROKEN = 2, 3
-_INTERRUPTED = 130
-"""As a shell reports it: 128 + SIGINT."""
+_INTERRUPTED, _NOBODY_READS = 130, 141
+"""As a shell reports them: 128 + SIGINT, 128 + SIGPIPE."""
 
 
 class Guarded(TyperGroup):
@@ -28,6 +30,10 @@ class Guarded(TyperGroup):
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)
             raise typer.Exit(_INTERRUPTED) from error
+        except BrokenPipeError as error:
+            # The reader, say `head`, has enough. Python would complain once more when it flushes at the end.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(_NOBODY_READS) from error
         except EidriveError as error:
             if ctx.params.get("traceback"):
                 raise

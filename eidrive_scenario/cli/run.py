@@ -128,7 +128,10 @@ def _marked(path: Path, mark: list[str]) -> Path:
 def _senders(text: str | None) -> tuple[str, ...] | None:
     if text is None:
         return None
-    return () if text == "none" else tuple(name.strip() for name in text.split(",") if name.strip())
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise SettingError(Problem(f"--cooperate {text!r} names nobody", "write none for no cooperation"))
+    return () if names == ("none",) else names
 
 
 def _assigned(option: str, assignments: list[str]) -> dict[str, str]:

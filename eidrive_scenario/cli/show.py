@@ -76,13 +76,16 @@ def view(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """Write a recorded run as an HTML replay."""
-    from eidrive_scenario.experiments.single_run import RECORDING
+    from eidrive_scenario.experiments.single_run import recording_in
     from eidrive_scenario.recording import read_recording
+    from eidrive_scenario.recording.output import PARTIAL
     from eidrive_scenario.reporting.replay import write_replay
 
-    path = recording / RECORDING if recording.is_dir() else recording
+    path = recording_in(recording)
     page = out or path.with_suffix(".html")
     write_replay(read_recording(path), page)
+    if path.stem.endswith(PARTIAL):
+        typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)
     typer.echo(str(page))
     if browser:
         typer.launch(page.resolve().as_uri())

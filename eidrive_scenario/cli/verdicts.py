@@ -10,21 +10,29 @@ from rich.table import Table
 from rich.text import Text
 
 from eidrive_scenario.recording import Verdict
-from eidrive_scenario.simulation import RunResult
+from eidrive_scenario.simulation import BROKEN, FAILED, PASSED, RunResult
+
+_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), BROKEN: ("ran out of time", "bold red")}
+
+
+class _Output(Console):
+    def on_broken_pipe(self) -> None:
+        """Leave it to the command line, as rich would end with the exit code of a criterion that failed."""
+        raise BrokenPipeError
 
 
 def console() -> Console:
     """A terminal's own width; wide enough for a reason on one line where the output goes to a file."""
-    plain = Console(highlight=False)
+    plain = _Output(highlight=False)
     if plain.is_terminal or "COLUMNS" in os.environ:
         return plain
-    return Console(highlight=False, width=180)
+    return _Output(highlight=False, width=180)
 
 
 def show(result: RunResult, varied: str = "") -> None:
     """Print verdicts, end, fingerprint and speed; for a run of a distribution, with the parameters that it varies."""
     out = console()
-    word, style = ("passed", "bold green") if result.passed else ("failed", "bold red")
+    word, style = _OUTCOMES[result.exit_code]
     run = "" if result.run is None else f"  run {result.run} ({varied})"
     title = Text.assemble(
         (result.scenario, "bold"), f"{run}  seed {result.seed}  channel {result.channel}  ", (word, style)

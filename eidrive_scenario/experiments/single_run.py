@@ -14,7 +14,7 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.output import create
+from eidrive_scenario.recording.output import create, partial, whole
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
 
 RECORDING, RESULT, TABLE, PICTURES = "recording.mcap", "result.json", "motion.csv", "pictures"
@@ -39,6 +39,8 @@ def play(
     log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
     explanations  what shall be explained afterwards; they look on
 
+    A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
+
     Parameters in `settings` win over those of the distribution. Raises InputError for a wrong scenario, setting or
     place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
@@ -60,13 +62,12 @@ def play(
             observers.append(RunLog(log))
             stack.callback(observers[-1].close)
         if csv is not None:
-            observers.append(CsvWriter(csv))
+            observers.append(CsvWriter(stack.enter_context(whole(csv))))
             stack.callback(observers[-1].close)
         if out is not None and record:
-            attachments = _attachments(path, scenario)
-            observers.append(
-                Recorder(out / RECORDING, metadata=_told(scenario, seed, number, settings), attachments=attachments)
-            )
+            told, attachments = _told(scenario, seed, number, settings), _attachments(path, scenario)
+            recording = stack.enter_context(whole(out / RECORDING))
+            observers.append(Recorder(recording, metadata=told, attachments=attachments))
             stack.callback(observers[-1].close)
         simulation = Simulation(scenario, seed=seed, settings=settings, observers=observers)
         with simulation:
@@ -114,6 +115,14 @@ def _attachments(path: Path, scenario: Scenario) -> dict[str, bytes]:
     if scenario.road_file is not None:
         files["road.xodr"] = Path(scenario.road_file)
     return {name: file.read_bytes() for name, file in files.items()}
+
+
+def recording_in(place: Path) -> Path:
+    """The recording in a run's folder, or what there is of one whose run did not end; a file as it is."""
+    if not place.is_dir():
+        return place
+    path = place / RECORDING
+    return partial(path) if partial(path).exists() and not path.exists() else path
 
 
 def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Protocol
 
 import pytest
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import InputError, suggestion
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.options import Arm, arms
 from eidrive_scenario.pytest_plugin.outcome import play_arm, properties
 
 if TYPE_CHECKING:
     from eidrive_scenario.simulation import RunResult
+
+_KEYWORDS = ("channel", "seeds")
 
 
 @dataclass(frozen=True)
@@ -44,23 +46,39 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     marker = metafunc.definition.get_closest_marker("scenario")
     if marker is None or "run_scenario" not in metafunc.fixturenames:
         return
-    patterns, channels, seeds = _read_marker(*marker.args, **marker.kwargs)
-    paths = [path for pattern in patterns for path in _matches(pattern, metafunc)]
+    try:
+        channels, seeds = _read_marker(marker)
+        paths = [path for pattern in marker.args for path in _matches(pattern, metafunc)]
+    except ValueError as error:
+        raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
     cases = [Case(path, arm) for path in paths for arm in arms(metafunc.config, channels, seeds)]
     metafunc.parametrize("run_scenario", cases, indirect=True, ids=[f"{case.source.stem}-{case.arm}" for case in cases])
 
 
-def _read_marker(
-    *patterns: str, channel: str | Sequence[str] | None = None, seeds: int | None = None
-) -> tuple[tuple[str, ...], Sequence[str] | None, int | None]:
-    if not patterns:
-        raise pytest.UsageError('the marker scenario needs a pattern, such as scenario("coop/*.xosc")')
-    return patterns, [channel] if isinstance(channel, str) else channel, seeds
+def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]:
+    """Channels and number of seeds. Raises ValueError for what the marker does not take."""
+    if not marker.args or not all(isinstance(pattern, str | Path) for pattern in marker.args):
+        raise ValueError('the marker scenario needs a pattern, such as scenario("coop/*.xosc")')
+    for keyword in marker.kwargs:
+        if keyword not in _KEYWORDS:
+            raise ValueError(f"the marker scenario takes no {keyword!r}; {suggestion(keyword, _KEYWORDS)}")
+    channel, seeds = marker.kwargs.get("channel"), marker.kwargs.get("seeds")
+    channels = [channel] if isinstance(channel, str) else channel
+    if channels is not None and not (
+        isinstance(channels, list | tuple) and channels and all(isinstance(name, str) for name in channels)
+    ):
+        raise ValueError(f'channel is {channel!r}; give a name or a list of names: channel=["ideal", "none"]')
+    if seeds is not None and (not isinstance(seeds, int) or isinstance(seeds, bool) or seeds < 1):
+        raise ValueError(f"seeds is {seeds!r}; say how many, to run with the seeds from 1 on: seeds=3")
+    return channels, seeds
 
 
-def _matches(pattern: str, metafunc: pytest.Metafunc) -> list[Path]:
-    """Scenarios beside the test file, else below the root, else in the library; a pattern without suffix is a name."""
-    glob = pattern if pattern.endswith(".xosc") else f"{pattern}.xosc"
+def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
+    """Scenarios beside the test file, else below the root, else in the library; a pattern without suffix is a name.
+
+    Raises ValueError if there is none.
+    """
+    glob = str(pattern) if str(pattern).endswith(".xosc") else f"{pattern}.xosc"
     if not Path(glob).is_absolute():
         for folder in (metafunc.definition.path.parent, metafunc.config.rootpath, library_path()):
             found = sorted(path for path in folder.glob(glob) if definition(path) in ("scenario", "unreadable"))
@@ -68,7 +86,7 @@ def _matches(pattern: str, metafunc: pytest.Metafunc) -> list[Path]:
                 return found
     elif Path(glob).is_file():
         return [Path(glob)]
-    raise pytest.UsageError(f"{metafunc.definition.nodeid}: no scenario matches {pattern!r}")
+    raise ValueError(f"no scenario matches {str(pattern)!r}, beside the test file, below the root or in the library")
 
 
 @pytest.fixture
@@ -85,14 +103,14 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         source: str | Path | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
     ) -> RunResult:
         if source is None and case is None:
-            raise pytest.UsageError('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario')
+            pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
         arm = case.arm if case is not None else Arm(None, 1)
         arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed)
         try:
             path = case.source if source is None and case is not None else resolve_scenario(source or "")
             result = play_arm(request.config, path, arm, **settings)
         except InputError as error:
-            pytest.fail(str(error), pytrace=False)
+            raise pytest.fail.Exception(str(error), pytrace=False) from None
         request.node.user_properties.extend(properties(result))
         return result
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import InputError, Problem, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.options import Arm
 
 if TYPE_CHECKING:
@@ -55,6 +56,10 @@ def _play(
     from eidrive_scenario.experiments.single_run import play
     from eidrive_scenario.simulation import RunSettings
 
+    known = [field.name for field in fields(RunSettings)]
+    for keyword in overrides:
+        if keyword not in known:
+            raise SettingError(Problem(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
     place = [*_place(config, file), *([] if isinstance(source, Path) else [f"run-{source.number}"]), str(arm)]

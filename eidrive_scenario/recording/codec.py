@@ -76,7 +76,7 @@ def _array(dtype: np.dtype[Any]) -> Codec:
         if array.size == 0:
             return {"shape": list(array.shape)}
         nested = array.tolist()
-        return nested if dtype.kind != "f" or np.isfinite(array).all() else _spell(nested)
+        return nested if dtype.kind != "f" or math.isfinite(np.vdot(array, array)) else _spell(nested)
 
     def decode(data: Json) -> Any:
         return np.empty(data["shape"], dtype) if isinstance(data, dict) else np.array(data, dtype)

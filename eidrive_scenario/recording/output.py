@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import InputError, Problem, SettingError
+
+PARTIAL = ".partial"
+"""In the name of a file, before its suffix, while its run goes on; and afterwards, if that did not end."""
 
 
 def create(path: str | Path) -> BinaryIO:
@@ -15,3 +20,26 @@ def create(path: str | Path) -> BinaryIO:
         return Path(path).open("wb")
     except OSError as error:
         raise SettingError(Problem(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
+
+
+def partial(path: Path) -> Path:
+    """Where a file lies whose run has not ended: `out.partial.csv` for `out.csv`."""
+    return path.with_stem(path.stem + PARTIAL)
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Where to write a file that shall have its own name only once all of it is there.
+
+    What was written before an error or an interruption is kept under the other name, so that nobody takes it for a
+    whole run; of wrong input nothing is kept. Raises SettingError if the place is a folder.
+    """
+    if path.is_dir():
+        raise SettingError(Problem("cannot write: Is a directory", "choose another place", str(path)))
+    unfinished = partial(path)
+    try:
+        yield unfinished
+    except InputError:
+        unfinished.unlink(missing_ok=True)
+        raise
+    unfinished.replace(path)

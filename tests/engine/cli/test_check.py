@@ -57,10 +57,19 @@ def test_what_is_not_judged_is_a_warning(eidrive: Eidrive, folder: Callable[...,
     assert result.stdout.splitlines()[-1] == "1 file, 0 problems, 1 warning"
 
 
+def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    result = eidrive("check", tmp_path / "missing.xosc", tmp_path, passing_by)
+    assert result.exit_code == 2
+    first, second, count = result.stdout.splitlines()
+    assert "missing.xosc': neither a file nor in the library" in first
+    assert second.startswith("no .xosc file in")
+    assert count == "1 file, 2 problems, 0 warnings"
+
+
 def test_a_folder_without_scenarios(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
-    assert "no .xosc file in" in result.stderr
+    assert "no .xosc file in" in result.stdout
 
 
 UNUSED = (

@@ -78,6 +78,7 @@ def test_csv(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
 def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by, "--time-limit", "1")
     assert result.exit_code == 3
+    assert "ran out of time" in result.stdout.splitlines()[0]
     assert "end: time limit at 1.00 s" in result.stdout
 
 
@@ -85,6 +86,7 @@ def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
     ("arguments", "message"),
     [
         (["no/such"], "no scenario 'no/such'"),
+        (["{file}", "--cooperate", " ,"], "--cooperate ' ,' names nobody; write none for no cooperation"),
         (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
         (["{file}", "--user-value", "mood"], "--user-value 'mood' assigns nothing; write --user-value NAME=VALUE"),

@@ -85,6 +85,33 @@ def test_a_marker_that_matches_nothing_is_an_error(project: pytest.Pytester, mar
     assert message in str(result.stdout) + str(result.stderr)
 
 
+def test_no_traceback_of_the_plugin(project: pytest.Pytester) -> None:
+    text = """
+@pytest.mark.scenario("drives/first", chanel="ideal")
+def test_far(run_scenario):
+    run_scenario()
+"""
+    result = run(project, text)
+    result.assert_outcomes(errors=1)
+    result.stdout.no_fnmatch_line("*fixture.py*")
+    result.stdout.no_fnmatch_line("*During handling*")
+
+
+def test_a_wrong_keyword_of_the_call(project: pytest.Pytester) -> None:
+    text = """
+def test_far(run_scenario):
+    run_scenario("drives/first.xosc", time_limmit=3.0)
+def test_channel(run_scenario):
+    run_scenario("drives/first.xosc", channel="idael")
+"""
+    result = run(project, text)
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(["run_scenario takes no 'time_limmit'; did you mean 'time_limit'?"])
+    result.stdout.fnmatch_lines(["*no channel profile 'idael'; did you mean 'ideal'?"])
+    result.stdout.no_fnmatch_line("*Error*")
+    result.stdout.no_fnmatch_line("*During handling*")
+
+
 def test_without_marker_a_name_is_needed(project: pytest.Pytester) -> None:
     result = run(project, "def test_none(run_scenario):\n    run_scenario()")
     result.assert_outcomes(failed=1)

@@ -1,0 +1,92 @@
+"""Runs that do not end, and readers that do not read on."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import Simulation
+
+Eidrive = Callable[..., Result]
+
+
+def break_at(monkeypatch: pytest.MonkeyPatch, instant: float, error: BaseException) -> None:
+    usual = Simulation._end
+
+    def end(simulation: Simulation, frame: Frame) -> str | None:
+        if frame.view.time >= instant - 1e-9:
+            raise error
+        return usual(simulation, frame)
+
+    monkeypatch.setattr(Simulation, "_end", end)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (ZeroDivisionError("physics"), 3)])
+def test_what_is_left_of_a_run_does_not_look_whole(
+    eidrive: Eidrive,
+    passing_by: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    code: int,
+) -> None:
+    with monkeypatch.context() as patch:
+        break_at(patch, 1.0, error)
+        arguments = ("run", passing_by, "--out", tmp_path, "--csv", tmp_path / "motion.csv")
+        assert eidrive(*arguments).exit_code == code
+    assert names(tmp_path) == ["motion.partial.csv", "recording.partial.mcap"]
+    assert read_recording(tmp_path / "recording.partial.mcap").frame_count == 21
+    shown = eidrive("view", tmp_path)
+    assert shown.exit_code == 0
+    assert shown.stdout.strip() == str(tmp_path / "recording.partial.html")
+    assert "the run did not end" in shown.stderr
+    assert eidrive("report", tmp_path, "-o", tmp_path / "report").exit_code == 2, "it has no result"
+
+    assert eidrive(*arguments).exit_code == 0
+    assert names(tmp_path) == ["motion.csv", "recording.mcap", "recording.partial.html", "result.json"]
+    assert "did not end" not in eidrive("view", tmp_path).stderr
+
+
+def test_an_interrupted_run_leaves_the_files_of_an_earlier_one(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    before = (tmp_path / "recording.mcap").read_bytes()
+    break_at(monkeypatch, 1.0, KeyboardInterrupt())
+    eidrive("run", passing_by, "--out", tmp_path, "--seed", "2")
+    assert (tmp_path / "recording.mcap").read_bytes() == before
+    assert "recording.partial.mcap" in names(tmp_path)
+
+
+def test_wrong_input_leaves_nothing(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    result = eidrive("run", passing_by, "--out", tmp_path, "--csv", tmp_path / "motion.csv", "--channel", "idael")
+    assert result.exit_code == 2
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("arguments", [["list", "conditions"], ["run", "{file}"], ["tree", "{file}"]])
+def test_a_reader_that_has_enough_hears_no_complaint(passing_by: Path, arguments: list[str]) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "eidrive_scenario", *(part.format(file=passing_by) for part in arguments)],
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (141, "")
