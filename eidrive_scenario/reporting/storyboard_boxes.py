@@ -140,8 +140,8 @@ def _waits(trigger: Trigger, elements: list[StoryElement]) -> Iterator[Path]:
 def _group_lines(group: ManeuverGroupElement) -> list[Line]:
     actions = [one for one in _walk(group) if isinstance(one, ActionElement)]
     actors = dict.fromkeys(name for one in actions for name in one.actors if name is not None)
-    if any(one.by_trigger for one in actions):
-        actors["whoever fulfils the trigger"] = None
+    if any(one.triggering is not None for one in actions):
+        actors["whoever fulfils the act's trigger"] = None
     return [Line(Role.WHO, "", ", ".join(actors))] if actors else []
 
 

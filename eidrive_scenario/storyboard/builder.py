@@ -15,6 +15,7 @@ from eidrive_scenario.storyboard.elements import (
     ManeuverGroupElement,
     StoryboardElement,
     StoryNode,
+    TriggeringEntities,
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.init_block import InitBlock
@@ -93,15 +94,17 @@ class Builder:
 
     def _act(self, act: model.Act, above: Place) -> ActElement:
         path = (*above, act.name)
+        triggering = TriggeringEntities()
         return ActElement(
             self._stage,
             path,
-            [self._group(group, path) for group in act.maneuver_group],
+            [self._group(group, path, triggering) for group in act.maneuver_group],
             start=self._wait("start", act.start_trigger),
             stop=self._wait("stop", act.stop_trigger),
+            triggering=triggering,
         )
 
-    def _group(self, group: model.ManeuverGroup, above: Place) -> ManeuverGroupElement:
+    def _group(self, group: model.ManeuverGroup, above: Place, triggering: TriggeringEntities) -> ManeuverGroupElement:
         path = (*above, group.name)
         actors = [name for ref in group.actors.entity_ref for name in self._entities(ref.entity_ref)]
         maneuvers = list(group.maneuver)
@@ -110,40 +113,43 @@ class Builder:
                 maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver))
             except ScenarioError as error:
                 self._problems += error.problems
-        children = [
-            self._maneuver(maneuver, path, actors, group.actors.select_triggering_entities) for maneuver in maneuvers
-        ]
+        selected = triggering if group.actors.select_triggering_entities else None
+        children = [self._maneuver(maneuver, path, actors, selected) for maneuver in maneuvers]
         return ManeuverGroupElement(self._stage, path, children, limit=group.maximum_execution_count)
 
     def _maneuver(
-        self, maneuver: model.Maneuver, above: Place, actors: Sequence[str], by_trigger: bool
+        self, maneuver: model.Maneuver, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
     ) -> ManeuverElement:
         path = (*above, maneuver.name)
-        events = tuple(self._event(event, path, actors, by_trigger) for event in maneuver.event)
+        events = tuple(self._event(event, path, actors, selected) for event in maneuver.event)
         for event in events:
             event.rivals = events
         return ManeuverElement(self._stage, path, events)
 
-    def _event(self, event: model.Event, above: Place, actors: Sequence[str], by_trigger: bool) -> EventElement:
+    def _event(
+        self, event: model.Event, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
+    ) -> EventElement:
         path = (*above, event.name)
         limit = 1 if event.maximum_execution_count is None else event.maximum_execution_count
         return EventElement(
             self._stage,
             path,
-            [self._action(action, path, actors, by_trigger) for action in event.action],
+            [self._action(action, path, actors, selected) for action in event.action],
             priority=event.priority.value,
             start=self._wait("start", event.start_trigger),
             limit=limit,
         )
 
-    def _action(self, action: model.Action, above: Place, actors: Sequence[str], by_trigger: bool) -> ActionElement:
+    def _action(
+        self, action: model.Action, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
+    ) -> ActionElement:
         private = action.private_action is not None
         return ActionElement(
             self._stage,
             (*above, action.name),
             lambda actor: self._behaviours(action, actor),
             actors if private else (None,),
-            by_trigger=by_trigger and private,
+            triggering=selected if private else None,
         )
 
     def _behaviours(self, wrapper: model.Element, actor: str | None) -> list[ActionBehaviour]:

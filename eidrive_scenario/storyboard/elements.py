@@ -11,6 +11,7 @@ An element starts at most once in a tick, which bounds the turns.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -186,10 +187,36 @@ class StoryNode(StoryElement):
     kind = "story"
 
 
+@dataclass
+class TriggeringEntities:
+    """Those who fulfilled the start trigger of an act: actors in its groups that select them (1.3.1, 7.3.1)."""
+
+    names: tuple[str, ...] = ()
+
+
 class ActElement(StoryElement):
     """An Act."""
 
     kind = "act"
+
+    def __init__(
+        self,
+        stage: Stage,
+        path: tuple[str, ...],
+        groups: Sequence[ManeuverGroupElement],
+        *,
+        start: WaitFor | None = None,
+        stop: WaitFor | None = None,
+        triggering: TriggeringEntities | None = None,
+    ) -> None:
+        super().__init__(stage, path, groups, start=start, stop=stop)
+        self._triggering = triggering or TriggeringEntities()
+
+    def begin(self, why: str = "") -> None:
+        """standby -> running; whoever triggered it acts in it."""
+        if self.start_leaf is not None:
+            self._triggering.names = self.start_leaf.trigger.triggering
+        super().begin(why)
 
 
 class ManeuverGroupElement(StoryElement):

@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.elements import StoryElement
+from eidrive_scenario.storyboard.elements import StoryElement, TriggeringEntities
 from eidrive_scenario.storyboard.stage import Absent, Holder, Stage
 from eidrive_scenario.storyboard.states import State, Transition
 from eidrive_scenario.storyboard.trigger import WaitFor
@@ -55,8 +55,7 @@ class EventElement(StoryElement):
         self.executions += 1
         self._change(Transition.START, State.RUNNING, why)
         for action in self.elements:
-            if isinstance(action, ActionElement):
-                action.start_for(self.start_leaf.trigger.triggering if self.start_leaf is not None else ())
+            action.begin()
 
 
 class ActionElement(StoryElement):
@@ -71,11 +70,12 @@ class ActionElement(StoryElement):
         make: Callable[[str | None], list[ActionBehaviour]],
         actors: Sequence[str | None],
         *,
-        by_trigger: bool = False,
+        triggering: TriggeringEntities | None = None,
     ) -> None:
         super().__init__(stage, path)
         self._make = make
-        self.by_trigger = by_trigger
+        self.triggering = triggering
+        """Who acts beside the actors."""
         self._made: dict[str | None, list[ActionBehaviour]] = {}
         self.actors = tuple(actors)
         self.running: list[ActionBehaviour] = []
@@ -91,17 +91,17 @@ class ActionElement(StoryElement):
             self._made[actor] = self._make(actor)
         return self._made[actor]
 
-    def start_for(self, triggering: Sequence[str]) -> None:
-        """Start for the actors of the group, or for the entities that fulfilled the trigger."""
-        actors: Sequence[str | None] = self.actors
-        if self.by_trigger:
-            actors = tuple(dict.fromkeys([*actors, *triggering]))
+    def begin(self, why: str = "") -> None:
+        """standby -> running, for the actors of the group and those whom it selects."""
+        actors = self.actors
+        if self.triggering is not None:
+            actors = tuple(dict.fromkeys([*actors, *self.triggering.names]))
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
         self.stand_by()
         self._tried_at, self._decided_at = self.stage.progress.tick, None
         self._there = []
         self.executions += 1
-        self._change(Transition.START, State.RUNNING)
+        self._change(Transition.START, State.RUNNING, why)
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)

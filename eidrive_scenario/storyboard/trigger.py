@@ -124,7 +124,7 @@ class Trigger:
         self.why = ""
         self.witness: Witness | None = None
         self.triggering: tuple[str, ...] = ()
-        """The entities that fulfilled the conditions of the group that fired."""
+        """The entities that fulfilled the conditions of the groups that fired."""
 
     def __bool__(self) -> bool:
         return bool(self.groups)
@@ -133,9 +133,8 @@ class Trigger:
         """True where it fires; `why` then says what did it."""
         fired = [group for group in self.groups if group.evaluate(stage)]
         if fired:
-            monitors = fired[0].monitors
-            self.why = " and ".join(monitor.why(stage) for monitor in monitors)
-            names = [name for monitor in monitors for name in monitor.triggering]
+            self.why = " and ".join(monitor.why(stage) for monitor in fired[0].monitors)
+            names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
             self.triggering = tuple(dict.fromkeys(names))
         if self.witness is not None:
             self.witness.saw(stage)

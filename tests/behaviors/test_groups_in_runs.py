@@ -80,31 +80,47 @@ def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
 
 
 @pytest.mark.element("selectTriggeringEntities")
-def test_the_entities_that_triggered_act_beside_the_actors(group: Any) -> None:
-    """selectTriggeringEntities: Second and Third are slower than 15 m/s."""
+def test_the_entities_that_triggered_the_act_act_beside_the_actors(group: Any) -> None:
+    """Second and Third are slower than 15 m/s, Ego is faster; who triggers a single event does not matter (7.3.1)."""
     slower = by("all", '<SpeedCondition value="15" rule="lessThan"/>')
-    played = group(1, ("Ego", SPEED, slower), by_trigger=True)
+    faster = by("all", '<SpeedCondition value="15" rule="greaterThan"/>')
+    for start, actor, speeds in (
+        (slower, "Ego", [5, 5, 5]),
+        (faster, "Second", [5, 5, 10]),
+        (faster, "Ego", [5, 10, 10]),
+    ):
+        played = group(1, (actor, SPEED), start=start)
+        assert [played.of(name, "speed")[-1] for name in CARS] == speeds
+    played = group(1, ("Ego", SPEED, slower), start=faster)
+    assert [played.of(name, "speed")[-1] for name in CARS] == [5, 10, 10]
+
+
+@pytest.mark.element("selectTriggeringEntities")
+def test_all_groups_of_conditions_that_hold_select(group: Any) -> None:
+    """Of two condition groups Ego fulfils one, and Third the other; both act."""
+    far = by("Third", '<TraveledDistanceCondition value="0"/>')
+    fast = by("Ego", '<SpeedCondition value="15" rule="greaterThan"/>')
+    other = '</Condition></ConditionGroup><ConditionGroup><Condition name="d" delay="0" conditionEdge="none">'
+    played = group(1, ("Second", SPEED), start=f"{fast}{other}{far}")
     assert [played.of(name, "speed")[-1] for name in CARS] == [5, 5, 5]
-    played = group(1, ("Second", SPEED, by("all", '<SpeedCondition value="15" rule="greaterThan"/>')), by_trigger=True)
-    assert [played.of(name, "speed")[-1] for name in CARS] == [5, 5, 10]
-    assert [group(1, ("Ego", SPEED, slower)).of(name, "speed")[-1] for name in CARS] == [5, 10, 10]
 
 
 @pytest.mark.element("selectTriggeringEntities")
 def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
-    """Ego is faster than 15 m/s until 0.5 s, and no one is when the trigger fires."""
-    slow_down = ("Ego", SPEED, after(0.5))
-    fast = by("all", '<SpeedCondition value="15" rule="greaterThan"/>')
+    """Ego is nearer than 5 m to where it began until 0.25 s, and nobody is when the trigger fires."""
+    near = by(
+        "all",
+        '<DistanceCondition value="5" rule="lessThan" freespace="false"><Position><LanePosition roadId="1" laneId="-1" '
+        's="100"/></Position></DistanceCondition>',
+    )
     brighter = private(
         '<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="lowBeam"/></LightType>'
         '<LightState mode="on"/></LightStateAction></AppearanceAction>'
     )
-    falling = group(2, slow_down[:2], ("Third", brighter, fast), by_trigger=True, edge="falling")
-    assert falling.begun("event 1") == pytest.approx([0.05])
-    assert set(falling.frames[-1].appearances) == {"Ego", "Third"}
-    late = group(2, (*slow_down[:2],), ("Third", brighter, fast), by_trigger=True, delay=0.8)
-    assert late.begun("event 1") == pytest.approx([0.8])
-    assert set(late.frames[-1].appearances) == {"Ego", "Third"}
+    for options, time in (({"edge": "falling"}, 0.25), ({"delay": 0.8}, 0.8)):
+        played = group(2, ("Third", brighter), start=near, **options)
+        assert played.begun("event 0") == pytest.approx([time])
+        assert set(played.frames[-1].appearances) == {"Ego", "Third"}
 
 
 def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any) -> None:

@@ -18,7 +18,7 @@ FILE = """<OpenSCENARIO>
   <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/>{signals}</RoadNetwork>
   <Entities>{cars}{more}</Entities>
   <Storyboard><Init><Actions>{everywhere}{private}</Actions></Init>
-    <Story name="story"><Act name="act">{groups}</Act></Story>
+    <Story name="story"><Act name="act">{groups}{start}</Act></Story>
     <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
     <SimulationTimeCondition value="{end}" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
     </StopTrigger></Storyboard></OpenSCENARIO>"""
@@ -58,7 +58,10 @@ class Watched:
 
 @pytest.fixture
 def run(tmp_path: Path) -> Callable[..., Watched]:
-    """Plays `run(end, (actor, action[, condition]), …)` with Ego in lane -1 at 100 m, driven unless told otherwise."""
+    """Plays `run(end, (actor, action[, condition]), …)` with Ego in lane -1 at 100 m, driven unless told otherwise.
+
+    With a condition `start` the act begins by that, and whoever fulfils it acts in all groups.
+    """
 
     def play(
         end: float,
@@ -73,7 +76,7 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
         during: Callable[[Simulation, Frame], None] | None = None,
         settings: RunSettings | None = None,
         seed: int = 0,
-        by_trigger: bool = False,
+        start: str = "",
         edge: str = "none",
         delay: float = 0.0,
     ) -> Watched:
@@ -88,7 +91,8 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
             for number, (actor, action, *condition) in enumerate(steps)
         )
         groups = groups.replace('delay="0"', f'delay="{delay}"')
-        if by_trigger:
+        if start:
+            start = TRIGGER.format(edge=edge, condition=start).replace('delay="0"', f'delay="{delay}"')
             groups = groups.replace('selectTriggeringEntities="false"', 'selectTriggeringEntities="true"')
         places = {"Ego": ego, **(others or {})}
         text = FILE.format(
@@ -96,6 +100,7 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
             more=more,
             everywhere=globally,
             private="".join(f'<Private entityRef="{name}">{at(*place)}</Private>' for name, place in places.items()),
+            start=start,
             groups=groups or GROUP.format(number=0, actor="Ego", action=NOTHING, trigger=""),
             end=end,
             signals=signals,

@@ -74,13 +74,12 @@ def groups_without_actors(survey: Survey) -> Iterator[Problem]:
                 f"{node.title} has no actors, so nobody does what is private in {acting[0].title}",
                 "name them in Actors",
             )
-        for event in acting:
-            if group.actors.select_triggering_entities and not _about_entities(event):
-                yield at(
-                    event.element,
-                    f"{event.title} is for the entities that trigger it, and its trigger asks about none",
-                    "name the actors, or trigger it by a ByEntityCondition",
-                )
+        elif node.parent is not None and not _about_entities(node.parent):
+            yield at(
+                group,
+                f"{node.title} is for those who trigger {node.parent.title}, whose start trigger asks about nobody",
+                "name the actors, or start the act by a ByEntityCondition",
+            )
 
 
 def _acts(node: Node) -> bool:

@@ -63,6 +63,12 @@ def act(events: str, start: str = "", stop: str = "", name: str = "act") -> str:
 Check = Callable[..., list[str]]
 
 
+def selecting(events: str, start: str = "") -> str:
+    """An act whose only actors are those who trigger it."""
+    named = '<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>'
+    return act(events, start).replace(named, '<Actors selectTriggeringEntities="true"/>')
+
+
 @pytest.fixture
 def check(scenario_xml: Callable[..., bytes]) -> Check:
     """The rules that a story of these acts breaks, in the order of the file."""
@@ -289,3 +295,10 @@ def test_what_the_road_network_has_need_not_be_placed(check: Check, scenario_xml
     post = '<ScenarioObject name="Ego"><ExternalObjectReference name="post"/></ScenarioObject>'
     near = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
     assert check(act(event("go", near)), init="", entities=post) == []
+
+
+def test_who_triggers_an_act_acts_in_it_and_who_triggers_an_event_does_not(check: Check) -> None:
+    fast = trigger(when(entity('<SpeedCondition rule="greaterThan" value="1"/>')))
+    assert check(selecting(event("go"), fast)) == []
+    assert check(selecting(event("go", fast))) == ["no-actors"]
+    assert check(selecting(event("go", fast), trigger(when(time(GREATER, 1))))) == ["no-actors"]
