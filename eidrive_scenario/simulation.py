@@ -94,7 +94,8 @@ class Simulation:
             self.world.set_weather(self._weather)
         self._observers = tuple(observers)
         self._trace = TraceHash()
-        self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario))]
+        doubts = self.roads.doubts if self.roads is not None else ()
+        self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario), *doubts)]
         self._user_values = dict(self.settings.user_values)
         self.storyboard.stage.user_values = self._user_values.get
         self._environment: Environment | None = None

@@ -44,6 +44,7 @@ class Curve(ABC):
     length: float
     cos: float = field(init=False, repr=False)
     sin: float = field(init=False, repr=False)
+    line: int | None = field(default=None, kw_only=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cos", math.cos(self.h))
@@ -152,15 +153,19 @@ class Cubic(Curve):
         )
 
 
-def spiral(s: float, x: float, y: float, h: float, length: float, start: float, end: float) -> Curve:
+def spiral(
+    s: float, x: float, y: float, h: float, length: float, start: float, end: float, line: int | None = None
+) -> Curve:
     """The curve whose curvature runs linearly from `start` to `end` [1/m]; an arc where it hardly changes."""
     rate = (end - start) / length
     if rate == 0.0 or max(start * start, end * end) / (2.0 * abs(rate)) > FLAT_PHASE:
-        return Arc(s, x, y, h, length, 0.5 * (start + end))
-    return Spiral(s, x, y, h, length, start, rate)
+        return Arc(s, x, y, h, length, 0.5 * (start + end), line=line)
+    return Spiral(s, x, y, h, length, start, rate, line=line)
 
 
-def poly3(s: float, x: float, y: float, h: float, length: float, v: tuple[float, float, float, float]) -> list[Cubic]:
+def poly3(
+    s: float, x: float, y: float, h: float, length: float, v: tuple[float, float, float, float], line: int | None = None
+) -> list[Cubic]:
     """The curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature; each cubic meets the curve's points and tangents at both
@@ -191,7 +196,8 @@ def poly3(s: float, x: float, y: float, h: float, length: float, v: tuple[float,
     ends_u, ends_v = (u, du), (a + u * (b + u * (c + u * d)), rise * du)
     cubics = []
     for i in range(count):
-        cubics.append(Cubic(s + float(knots[i]), x, y, h, step, _hermite(*ends_u, i, step), _hermite(*ends_v, i, step)))
+        along, across = _hermite(*ends_u, i, step), _hermite(*ends_v, i, step)
+        cubics.append(Cubic(s + float(knots[i]), x, y, h, step, along, across, line=line))
     return cubics
 
 

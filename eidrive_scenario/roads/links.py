@@ -74,7 +74,7 @@ class LaneLinks:
         contact = link.contact or _nearest_end(road, side, other)
         other_side = 1 if contact == "end" else -1
         self._join_roads(RoadEnd(road.id, side), RoadEnd(other.id, other_side))
-        section, facing = _end_section(road, side), _end_section(other, other_side)
+        section, facing = end_section(road, side), end_section(other, other_side)
         for number, lane in section.lanes.items():
             for target in lane.successors if side > 0 else lane.predecessors:
                 if target in facing.lanes:
@@ -86,9 +86,9 @@ class LaneLinks:
         if not incoming.sections or not connecting.sections:
             return
         other_side = 1 if connection.contact == "end" else -1
-        side = _side_at(incoming, junction, connecting, connection.contact)
+        side = side_at(incoming, junction, connecting, connection.contact)
         self._join_roads(RoadEnd(incoming.id, side), RoadEnd(connecting.id, other_side))
-        section, facing = _end_section(incoming, side), _end_section(connecting, other_side)
+        section, facing = end_section(incoming, side), end_section(connecting, other_side)
         links = connection.lane_links or tuple((n, n) for n in section.lanes if n in facing.lanes)
         for number, target in links:
             if number in section.lanes and target in facing.lanes:
@@ -100,11 +100,12 @@ class LaneLinks:
         self._ends.setdefault(other, {})[one] = None
 
 
-def _end_section(road: Road, side: int) -> LaneSection:
+def end_section(road: Road, side: int) -> LaneSection:
+    """The lane section at an end of a road: side +1 is where s ends."""
     return road.sections[-1 if side > 0 else 0]
 
 
-def _side_at(incoming: Road, junction: Junction, connecting: Road, contact: Contact) -> int:
+def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Contact) -> int:
     """The end of the incoming road that lies at the junction."""
     sides = [
         side

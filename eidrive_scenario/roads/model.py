@@ -95,6 +95,9 @@ class Lane:
     heights: tuple[LaneHeight, ...] = ()
     speeds: tuple[tuple[float, float], ...] = ()
     """(s_offset, limit [m/s]) in the order of s_offset."""
+    width_from: float = 0.0
+    """The s_offset from which on the file gives a width; inf where it gives none. Before it, the width is 0."""
+    line: int | None = field(default=None, compare=False, repr=False)
 
     @property
     def side(self) -> int:
@@ -185,6 +188,7 @@ class Connection:
     connecting_road: str
     contact: Contact
     lane_links: tuple[tuple[int, int], ...]
+    line: int | None = None
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import read_road_map
 from eidrive_scenario.roads.reading.document import parse_road_map
 from eidrive_scenario.roads.route import Route, joined
+from eidrive_scenario.roads.soundness import doubts
 from eidrive_scenario.roads.tables import RoadTables
 
 
@@ -52,6 +53,11 @@ class RoadNetwork(Roads):
     def parse(cls, text: str | bytes, source: str = "<memory>") -> RoadNetwork:
         """The network of an OpenDRIVE text. Raises RoadError."""
         return cls(parse_road_map(text.encode() if isinstance(text, str) else text, source))
+
+    @cached_property
+    def doubts(self) -> tuple[Problem, ...]:
+        """What is likely wrong with the file, though it can be read: one finding a kind, each with its rule."""
+        return doubts(self.source, self.roads, self.junctions, self.links)
 
     @cached_property
     def tables(self) -> RoadTables:

@@ -210,7 +210,9 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], findings: 
         (findings.integer(link, "from"), findings.integer(link, "to")) for link in element.iterfind("laneLink")
     )
     contact = findings.contact(element, "contactPoint") or "start"
-    return None if missing else Connection(element.get("id", ""), incoming, connecting, contact, links)
+    if missing:
+        return None
+    return Connection(element.get("id", ""), incoming, connecting, contact, links, line_of(element))
 
 
 def _check_links(road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: Findings) -> None:

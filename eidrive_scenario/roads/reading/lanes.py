@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
+from dataclasses import replace
+from typing import Literal
 
 from lxml import etree
 
 from eidrive_scenario.roads.model import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.polynomials import Polynomials, combine
-from eidrive_scenario.roads.reading.findings import Findings
+from eidrive_scenario.roads.reading.findings import Findings, line_of
 
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
@@ -51,14 +53,39 @@ def read_sections(
         found = _join_sides(found)
     ends = [*(s for s, _ in found[1:]), length]
     sections: list[LaneSection] = []
+    left_out: list[Mapping[int, Lane]] = []
     for (s, element), end in zip(found, ends, strict=True):
-        if end - s <= 1e-6 and (sections or len(found) > 1):
-            continue
         read = _read_section(element, 0.0 if not sections else s, lane_offset, findings)
+        if end - s <= 1e-6 and (sections or len(found) > 1):
+            if sections:
+                sections[-1] = replace(sections[-1], lanes=_led_past(sections[-1].lanes, read, "successors"))
+            left_out.append(read)
+            continue
+        for between in reversed(left_out):
+            read = _led_past(read, between, "predecessors")
+        left_out.clear()
         sections.append(LaneSection(len(sections), 0.0 if not sections else s, max(end - s, 0.0), read))
     if not sections:
         findings.add(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
     return tuple(sections)
+
+
+def _led_past(
+    lanes: Mapping[int, Lane], between: Mapping[int, Lane], way: Literal["predecessors", "successors"]
+) -> dict[int, Lane]:
+    """Lanes whose links one way lead past a section that is left out, to where that one's lanes lead.
+
+    Where that one has no links at all, its lanes go on in those of their own ids.
+    """
+    if not any(lane.predecessors or lane.successors for lane in between.values()):
+        return dict(lanes)
+    beyond = {n: lane.successors if way == "successors" else lane.predecessors for n, lane in between.items()}
+    led = {}
+    for number, lane in lanes.items():
+        own = lane.successors if way == "successors" else lane.predecessors
+        there = tuple(dict.fromkeys(n for k in own for n in beyond.get(k, ())))
+        led[number] = replace(lane, successors=there) if way == "successors" else replace(lane, predecessors=there)
+    return led
 
 
 def _join_sides(found: list[tuple[float, etree._Element]]) -> list[tuple[float, etree._Element]]:
@@ -132,9 +159,9 @@ def _lane(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
 ) -> Lane:
     begin = float(element.get(ORIGIN, "0"))
-    width = ZERO
+    width, width_from = ZERO, 0.0
     if number:
-        width = _read_width(element, number, inner, lane_offset, findings)
+        width, width_from = _read_width(element, number, inner, lane_offset, findings)
     outer = inner if number == 0 else combine([(1.0, inner), (1.0, width)])
     centre = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
     link = element.find("link")
@@ -156,23 +183,29 @@ def _lane(
             for e in element.iterfind("height")
         ),
         speeds=tuple(sorted((s, limit) for s, limit in speeds if limit is not None)),
+        width_from=width_from,
+        line=line_of(element),
     )
 
 
 def _read_width(
     element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
-) -> Polynomials:
-    """Width over ds. A <border> counts from the reference line; <width> wins where both are given (clause 11.7)."""
+) -> tuple[Polynomials, float]:
+    """Width over ds, and the ds from which on the file gives it.
+
+    A <border> counts from the reference line; <width> wins where both are given (clause 11.7).
+    """
     begin = float(element.get(ORIGIN, "0"))
     widths = [findings.polynomial(e, "sOffset") for e in element.iterfind("width")]
     borders = [findings.polynomial(e, "sOffset") for e in element.iterfind("border")]
     given = Polynomials(widths or borders)
+    width_from = min((start for start, *_ in widths or borders), default=math.inf) + begin
     if begin:
         given = given.shifted(-begin)
     if widths or not borders:
-        return given
+        return given, width_from
     side = 1.0 if number > 0 else -1.0
-    return combine([(side, given), (-side, lane_offset), (-1.0, inner)])
+    return combine([(side, given), (-side, lane_offset), (-1.0, inner)]), width_from
 
 
 def _linked(link: etree._Element | None, name: str, findings: Findings) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from lxml import etree
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.roads import curves
 from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
-from eidrive_scenario.roads.reading.findings import Findings
+from eidrive_scenario.roads.reading.findings import Findings, line_of
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
@@ -54,16 +54,17 @@ def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Cur
     if shape is None:
         findings.add(geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS))
         return []
+    line = line_of(geometry)
     if shape.tag == "line":
-        return [Arc(s, x, y, h, length)]
+        return [Arc(s, x, y, h, length, line=line)]
     if shape.tag == "arc":
-        return [Arc(s, x, y, h, length, findings.number(shape, "curvature"))]
+        return [Arc(s, x, y, h, length, findings.number(shape, "curvature"), line=line)]
     if shape.tag == "spiral":
         start, end = findings.number(shape, "curvStart"), findings.number(shape, "curvEnd")
-        return [curves.spiral(s, x, y, h, length, start, end)]
+        return [curves.spiral(s, x, y, h, length, start, end, line)]
     if shape.tag == "poly3":
         a, b, c, d = (findings.number(shape, name) for name in "abcd")
-        return curves.poly3(s, x, y, h, length, (a, b, c, d))
+        return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
     if shape.tag == "paramPoly3":
         return [_read_param_poly3(shape, s, x, y, h, length, findings)]
     findings.add(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
@@ -81,4 +82,4 @@ def _read_param_poly3(
     if not any((u1, u2, u3, v1, v2, v3)):
         findings.add(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
     pace = 1.0 if span == "arcLength" else 1.0 / length
-    return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace)
+    return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace, line=line_of(shape.getparent()))

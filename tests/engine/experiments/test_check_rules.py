@@ -80,6 +80,8 @@ IN_PLACE_OF = {
     "StartTrigger": "StartTrigger",
 }
 """What of the first event an example's element replaces."""
+OF_ROADS = {"planView", "lanes", "junction"}
+"""Elements of the road file."""
 
 
 @pytest.fixture
@@ -95,10 +97,24 @@ def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[
     root = etree.fromstring(text)
     for fragment in fragments:
         for element in list(etree.fromstring(f"<Fragment>{fragment}</Fragment>")):
-            put(root, element)
+            if element.tag in OF_ROADS:
+                put_on_road(folder, element)
+            else:
+                put(root, element)
     path = folder / "scenario.xosc"
     path.write_bytes(etree.tostring(root, pretty_print=True))
     return list(broken_rules(load_scenario(path)))
+
+
+def put_on_road(folder: Path, element: etree._Element) -> None:
+    """An example of a rule about the road file takes the place of the road's part, or is added to the file."""
+    root = etree.fromstring(ROAD)
+    old = root.find(f".//{element.tag}")
+    if old is None:
+        root.append(element)
+    else:
+        old.getparent().replace(old, element)
+    (folder / "street.xodr").write_bytes(etree.tostring(root, pretty_print=True))
 
 
 def put(root: etree._Element, element: etree._Element) -> None:
@@ -150,8 +166,9 @@ def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> N
     found = findings(folder, example)
     assert {problem.rule for _, problem in found} == {name}
     assert {level.value for level, _ in found} == {level}
+    in_roads = etree.fromstring(f"<Fragment>{example}</Fragment>")[0].tag in OF_ROADS
     for _, problem in found:
-        assert problem.source == str(folder / "scenario.xosc")
+        assert problem.source == str(folder / ("street.xodr" if in_roads else "scenario.xosc"))
         assert problem.line is not None
         assert problem.remedy
 

@@ -1,0 +1,225 @@
+"""What is doubtful in a road file that can be read all the same: roads that jump, lanes without width, loose ends.
+
+Real maps have many small flaws of one kind. So each kind is told once, with its first place and a count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads.links import LaneLinks, end_section, side_at
+from eidrive_scenario.roads.location import LaneKey
+from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
+
+JUMP = 0.01
+"""Between a geometry's end and the next one's start [m]; also in s."""
+KINK = 1e-3
+"""Between their headings [rad]."""
+CORNER = math.radians(10.0)
+"""A larger angle than this is a corner that somebody drew [rad]."""
+NARROW = -0.01
+"""Widths below this are negative; rounding reaches less far [m]."""
+OPEN = 0.5
+"""A lane of this width at its end does not just taper off [m]."""
+SHOWN = 4
+"""Further lines that a finding names."""
+
+
+class Flaw(NamedTuple):
+    """One flaw: the rule that it breaks, what kind it is, what it is here, and what would be right."""
+
+    rule: str
+    kind: str
+    message: str
+    remedy: str
+    line: int | None
+
+
+def doubts(
+    source: str, roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks
+) -> tuple[Problem, ...]:
+    """What is likely wrong with a file's roads, one finding a kind, each with its rule of `eidrive check`."""
+    kinds: dict[tuple[str, str], list[Flaw]] = {}
+    for flaw in _flaws(roads, junctions, links):
+        kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)
+    return tuple(_told(flaws, source) for flaws in kinds.values())
+
+
+def _told(flaws: list[Flaw], source: str) -> Problem:
+    first = flaws[0]
+    message = first.message
+    if len(flaws) > 1:
+        lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
+        more = ", …" if len(flaws) > 1 + SHOWN else ""
+        message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
+    return Problem(message, first.remedy, source, first.line, first.rule)
+
+
+def _flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks) -> Iterator[Flaw]:
+    for road in roads.values():
+        yield from _jumps(road)
+        for section in road.sections:
+            for lane in section.lanes.values():
+                yield from _widths(road, section, lane)
+        for before, after in pairwise(road.sections):
+            yield from _broken(road, before, 1, after.lanes, f"the next lane section (s = {after.s:g} m)")
+            yield from _broken(road, after, -1, before.lanes, f"the lane section before (s = {before.s:g} m)")
+        for link, side in ((road.predecessor, -1), (road.successor, 1)):
+            yield from _end(roads, road, link, side)
+        yield from _dead_ends(road, links)
+    for junction in junctions.values():
+        for connection in junction.connections:
+            yield from _connection(roads, junction, connection)
+
+
+def _jumps(road: Road) -> Iterator[Flaw]:
+    curves = road.reference.curves
+    name = f"road {road.id!r}"
+    spans = "geometries that overlap or leave a gap in s"
+    if abs(curves[0].s) > JUMP:
+        what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
+        yield Flaw("road-jump", spans, what, "let it begin at s=0", curves[0].line)
+    for one, other in pairwise(curves):
+        if one.line is not None and one.line == other.line:
+            continue
+        missing = other.s - one.s - one.length
+        if abs(missing) > JUMP:
+            how = "ends before the next one begins" if missing > 0.0 else "runs on into the next one"
+            what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
+            yield Flaw("road-jump", spans, what, "let s be the sum of the lengths before", other.line)
+            continue
+        end, start = one.at(one.length), other.at(0.0)
+        apart = math.hypot(start.x - end.x, start.y - end.y)
+        turn = abs(wrap_angle(start.h - end.h))
+        if apart > JUMP:
+            what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
+            remedy = "let each geometry begin where the one before ends"
+            yield Flaw("road-jump", "such jumps", what, remedy, other.line)
+        elif KINK < turn < CORNER:
+            what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
+            yield Flaw("road-kink", "such kinks", what, "let each geometry go on with the heading before", other.line)
+    over = curves[-1].s + curves[-1].length - road.length
+    if abs(over) > JUMP:
+        there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
+        what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
+        yield Flaw("road-jump", "lengths that are not those of the geometry", what, "correct the length", road.line)
+
+
+def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
+    if lane.id == 0:
+        return
+    name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
+    if lane.width_from > JUMP:
+        until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
+        what = f"{name} has no width{until}"
+        yield Flaw("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
+    if lane.width.is_constant and lane.width.value(0.0) >= NARROW:
+        return
+    least = min(_extremes(lane, section.length))
+    if least < NARROW:
+        what = f"{name} becomes {least:.3g} m wide"
+        yield Flaw("lane-width", "negative widths", what, "let widths be 0 or more", lane.line)
+
+
+def _extremes(lane: Lane, length: float) -> Iterator[float]:
+    """The width of a lane at the ends of each of its pieces, and where it turns in between [m]."""
+    pieces = lane.width.pieces
+    ends = [*lane.width.starts[1:], length]
+    for (start, a, b, c, d), end in zip(pieces, ends, strict=True):
+        span = min(end, length) - start
+        if span <= 0.0:
+            continue
+        at = [0.0, span]
+        root = c * c - 3.0 * b * d
+        if d != 0.0 and root >= 0.0:
+            at += [(-c - math.sqrt(root)) / (3.0 * d), (-c + math.sqrt(root)) / (3.0 * d)]
+        elif d == 0.0 and c != 0.0:
+            at.append(-b / (2.0 * c))
+        for ds in at:
+            if 0.0 <= ds <= span:
+                yield a + ds * (b + ds * (c + ds * d))
+
+
+def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int) -> Iterator[Flaw]:
+    """Links of lanes at an end of a road, to another road."""
+    if link is None or link.element_type != "road" or not road.sections:
+        return
+    other = roads[link.element_id]
+    if link.contact is None or not other.sections:
+        return
+    facing = end_section(other, 1 if link.contact == "end" else -1)
+    yield from _broken(road, end_section(road, side), side, facing.lanes, f"the {link.contact} of road {other.id!r}")
+
+
+def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lane], where: str) -> Iterator[Flaw]:
+    for lane in section.lanes.values():
+        for number in lane.successors if side > 0 else lane.predecessors:
+            if number not in there:
+                word = "successor" if side > 0 else "predecessor"
+                what = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
+                remedy = "known: " + ", ".join(map(str, sorted(there)))
+                yield Flaw("lane-link", "links to lanes that do not exist", what, remedy, lane.line)
+
+
+def _dead_ends(road: Road, links: LaneLinks) -> Iterator[Flaw]:
+    """Lanes on which one drives to where the road goes on, and they do not.
+
+    Bidirectional lanes (those in the middle, for turning) may end at junctions.
+    """
+    for section in road.sections:
+        for lane in section.lanes.values():
+            if not lane.drivable or lane.id == 0 or lane.type == "bidirectional":
+                continue
+            side = road.directions[lane.id]
+            inside = 0 <= section.index + side < len(road.sections)
+            link = road.successor if side > 0 else road.predecessor
+            if not inside and link is None:
+                continue
+            if lane.width.value(section.length if side > 0 else 0.0) < OPEN:
+                continue
+            if next(links.beyond(LaneKey(road.id, section.index, lane.id), side), None) is None:
+                yield _dead_end(road, section, lane, None if inside else link)
+
+
+def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> Flaw:
+    what = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m) leads nowhere, and the road goes on"
+    if link is not None:
+        what += f" in {link.element_type} {link.element_id!r}"
+    if link is not None and link.element_type == "junction":
+        remedy = "add a <laneLink> from it to a <connection>"
+        return Flaw("lane-link", "lanes that lead nowhere at junctions", what, remedy, lane.line)
+    return Flaw("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
+
+
+def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[Flaw]:
+    incoming, connecting = roads[connection.incoming_road], roads[connection.connecting_road]
+    if not incoming.sections or not connecting.sections:
+        return
+    name = f"connection {connection.id!r} of junction {junction.id!r}"
+    rule = "junction-connection"
+    ends = [link for link in (incoming.predecessor, incoming.successor) if link is not None]
+    touches = any(link.element_type == "junction" and link.element_id == junction.id for link in ends)
+    if junction.type == "default" and not touches:
+        what = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
+        remedy = "link that road to the junction, or correct incomingRoad"
+        yield Flaw(rule, "connections from elsewhere", what, remedy, connection.line)
+    if junction.type == "default" and connecting.junction_id != junction.id:
+        what = f"{name} takes road {connecting.id!r}, which is not of this junction"
+        remedy = f"give that road junction={junction.id!r}, or correct connectingRoad"
+        yield Flaw(rule, "connections by roads outside", what, remedy, connection.line)
+    here = end_section(incoming, side_at(incoming, junction, connecting, connection.contact)).lanes
+    there = end_section(connecting, 1 if connection.contact == "end" else -1).lanes
+    for number, target in connection.lane_links:
+        for lane, known, road in ((number, here, incoming), (target, there, connecting)):
+            if lane not in known:
+                what = f"{name} links lane {lane} of road {road.id!r}, which it does not have there"
+                remedy = "known: " + ", ".join(map(str, sorted(known)))
+                yield Flaw(rule, "links of lanes that do not exist", what, remedy, connection.line)
+    if not connection.lane_links and not set(here) & set(there) - {0}:
+        what = f"{name} links no lane"
+        yield Flaw(rule, "connections without lanes", what, "add a <laneLink>", connection.line)

@@ -1,0 +1,166 @@
+"""What is doubtful in a road file that can be read: each kind, told once, and no more than that."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eidrive_scenario.roads import RoadNetwork
+
+Text = Callable[..., str]
+
+LINE = '<geometry s="{s}" x="{x}" y="{y}" hdg="{h}" length="50"><line/></geometry>'
+WIDTH = '<width sOffset="{0}" a="{1}" b="{2}" c="{3}" d="{4}"/>'
+
+
+def lane(number: int, link: str = "", width: str = WIDTH.format(0, 3.5, 0, 0, 0), kind: str = "driving") -> str:
+    return f'<lane id="{number}" type="{kind}"><link>{link}</link>{width}</lane>'
+
+
+def section(s: float, *right: str) -> str:
+    return (
+        f'<laneSection s="{s}"><center><lane id="0" type="none"/></center><right>{"".join(right)}</right></laneSection>'
+    )
+
+
+def told(text: str) -> list[tuple[str, str]]:
+    """Rule and message of each finding."""
+    return [(problem.rule, problem.message) for problem in RoadNetwork.parse(text, "town.xodr").doubts]
+
+
+def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) -> str:
+    return LINE.format(s=0, x=0, y=0, h=0) + "\n" + LINE.format(s=s, x=x, y=y, h=h)
+
+
+@pytest.mark.parametrize(
+    ("second", "rule", "message"),
+    [
+        ({"y": 0.3, "x": 50.4}, "road-jump", "road '1' jumps by 0.5 m at s = 50 m"),
+        ({"s": 50.2}, "road-jump", "road '1': the geometry at s = 0 m ends before the next one begins, by 0.2 m"),
+        ({"s": 49.8}, "road-jump", "road '1': the geometry at s = 0 m runs on into the next one, by 0.2 m"),
+        ({"h": 0.02}, "road-kink", "road '1' has a kink of 0.02 rad at s = 50 m"),
+        ({"h": 2 * math.pi - 0.02}, "road-kink", "road '1' has a kink of 0.02 rad at s = 50 m"),
+    ],
+)
+def test_geometries_that_do_not_join(road: Text, map_of: Text, second: dict, rule: str, message: str) -> None:
+    assert told(map_of(road(geometry=two_lines(**second))))[0] == (rule, message)
+
+
+@pytest.mark.parametrize("second", [{"y": 0.008}, {"h": 0.0008}, {"h": 2 * math.pi}, {"h": 0.5}, {"s": 50.004}])
+def test_rounding_and_corners_are_left_alone(road: Text, map_of: Text, second: dict) -> None:
+    assert told(map_of(road(geometry=two_lines(**second)))) == []
+
+
+def test_a_length_that_is_not_that_of_the_geometry(road: Text, map_of: Text) -> None:
+    text = map_of(road(length=100.05, geometry=two_lines()))
+    assert told(text) == [("road-jump", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")]
+
+
+def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of: Text) -> None:
+    text = map_of(*("\n" + road(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
+    (problem,) = RoadNetwork.parse(text, "town.xodr").doubts
+    assert str(problem) == (
+        "town.xodr:3: road '0' jumps by 1 m at s = 50 m; 7 more of such jumps: line 5, 7, 9, 11, …; "
+        "let each geometry begin where the one before ends"
+    )
+
+
+@pytest.mark.parametrize(
+    ("width", "message"),
+    [
+        ("", "has no width"),
+        (WIDTH.format(5, 3.5, 0, 0, 0), "has no width before its sOffset 5"),
+        (WIDTH.format(0, 2, -0.03, 0, 0), "becomes -1 m wide"),
+        # 1 - 6 (ds/100)² + 5 (ds/100)³ is least at 80 m: 1 - 3.84 + 2.56.
+        (WIDTH.format(0, 1, 0, -6e-4, 5e-6), "becomes -0.28 m wide"),
+    ],
+)
+def test_widths(road: Text, map_of: Text, width: str, message: str) -> None:
+    text = map_of(road(lanes=section(0, lane(-1), lane(-2, width=width, kind="shoulder"))))
+    assert told(text) == [("lane-width", f"lane -2 of road '1' (section at s = 0 m) {message}")]
+
+
+def test_a_width_of_0_and_one_that_ends_there_are_sound(road: Text, map_of: Text) -> None:
+    tapering = WIDTH.format(0, 3.5, -0.035, 0, 0)
+    assert (
+        told(
+            map_of(road(lanes=section(0, lane(-1), lane(-2, width=tapering), lane(-3, width=WIDTH.format(0, *"0000")))))
+        )
+        == []
+    )
+
+
+def test_links_within_a_road(road: Text, map_of: Text) -> None:
+    link = '<successor id="{}"/>'.format
+    later = section(60, lane(-1, '<predecessor id="-1"/>'))
+    broken = told(map_of(road(lanes=section(0, lane(-1), lane(-2, link(-2))) + later)))
+    assert broken == [
+        (
+            "lane-link",
+            "lane -2 of road '1' has the successor -2, which the next lane section (s = 60 m) does not have",
+        ),
+        ("lane-link", "lane -2 of road '1' (section at s = 0 m) leads nowhere, and the road goes on"),
+    ]
+    merging = section(0, lane(-1), lane(-2, width=WIDTH.format(0, 3.0, -0.05, 0, 0))) + later
+    assert told(map_of(road(lanes=merging))) == []
+
+
+def test_links_from_road_to_road(road: Text, map_of: Text) -> None:
+    onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
+    back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
+    other = road("2", x=100.0, link=back, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
+    sound = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-1"/>')))
+    assert told(map_of(sound, other)) == []
+    loose = road("1", link=onwards, lanes=section(0, lane(-1, '<successor id="-3"/>'), lane(-2)))
+    assert told(map_of(loose, other)) == [
+        ("lane-link", "lane -1 of road '1' has the successor -3, which the start of road '2' does not have"),
+        ("lane-link", "lane -2 of road '1' (section at s = 0 m) leads nowhere, and the road goes on in road '2'"),
+    ]
+
+
+def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
+    into = '<successor elementType="junction" elementId="9"/>'
+    through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
+    arm = road("1", link=into, lanes=section(0, lane(-1)))
+    inner = road("2", x=100.0, junction="9", link=through, lanes=section(0, lane(-1, '<predecessor id="-1"/>')))
+
+    def junction(incoming: str, connecting: str, links: str) -> str:
+        connection = f'<connection id="0" incomingRoad="{incoming}" connectingRoad="{connecting}" contactPoint="start">'
+        return f'<junction id="9" name="">{connection}{links}</connection></junction>'
+
+    fitting = '<laneLink from="-1" to="-1"/>'
+    assert told(map_of(arm, inner, rest=junction("1", "2", fitting))) == []
+    wrong = told(map_of(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
+    what = "connection '0' of junction '9' links lane -4 of road '1', which it does not have there"
+    assert wrong == [("junction-connection", what)]
+    elsewhere = road("3", y=50.0, lanes=section(0, lane(-1)))
+    outside = {message for _, message in told(map_of(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
+    assert "connection '0' of junction '9' comes from road '3', which does not end at the junction" in outside
+    assert "connection '0' of junction '9' takes road '3', which is not of this junction" in outside
+    closed = told(map_of(arm, road("2", x=100.0, junction="9"), rest=junction("1", "2", "")))
+    assert closed == []  # without a <laneLink>, lanes of the same id belong together
+
+
+def test_links_lead_past_a_section_of_no_length(road: Text, map_of: Text) -> None:
+    """Such a section is left out; Town06 has one, and renumbers its lanes there."""
+    first = section(0, lane(-1, '<successor id="-2"/>'), lane(-2, '<successor id="-3"/>'))
+    none = section(60, lane(-1), lane(-2, '<successor id="-1"/>'), lane(-3, '<successor id="-2"/>'))
+    last = section(60.0000004, lane(-1, '<predecessor id="-2"/>'), lane(-2, '<predecessor id="-3"/>'))
+    network = RoadNetwork.parse(map_of(road(lanes=first + none + last)), "town.xodr")
+    assert network.doubts == ()
+    for number in (-1, -2):
+        assert network.roads["1"].sections[0].lanes[number].successors == (number,)
+
+
+def test_real_maps_are_not_flooded(corpora: Path) -> None:
+    """Every map gives a finding or none for each kind; those below are true ones, looked up in the files."""
+    found = {}
+    for file in sorted(corpora.rglob("*.xodr")):
+        for problem in RoadNetwork.load(file).doubts:
+            found.setdefault((file.name, problem.rule), []).append(problem.line)
+    assert found == {
+        ("SampleDatabase.xodr", "lane-width"): [1807, 1807],
+        ("Town03.xodr", "lane-link"): [7913, 8040],
+        ("parking_demo.xodr", "lane-link"): [564],
+    }
