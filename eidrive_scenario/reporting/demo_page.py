@@ -111,6 +111,12 @@ def _place(
     }
 
 
+def _speed(speed: float) -> str:
+    """In words; what has been hit may roll backwards."""
+    whole = round(3.6 * speed)
+    return f"at {whole} km/h" if whole >= 0 else f"thrown back at {-whole} km/h"
+
+
 def _picture(moment: Moment, story: Story, arm: Arm, place: Place, window: Window, roads_id: str) -> dict[str, Any]:
     snapshot = moment.snapshot
     if snapshot is None:
@@ -119,7 +125,7 @@ def _picture(moment: Moment, story: Story, arm: Arm, place: Place, window: Windo
     lost = sum(event.outcome == "lost" for event in snapshot.links)
     caption = (
         f"at {snapshot.time:.2f} s, {story.centres[row]:.1f} m between centres, "
-        f"{story.ego} at {3.6 * story.speeds[row]:.0f} km/h" + (", last message lost" if lost else "")
+        f"{story.ego} {_speed(story.speeds[row])}" + (", last message lost" if lost else "")
     )
     svg = top_view(
         snapshot,

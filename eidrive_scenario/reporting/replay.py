@@ -59,7 +59,16 @@ def _facts(recording: Recording) -> dict[str, str]:
     """What the page tells of the run beside the pictures; each scenario parameter in a line of its own."""
     facts = {name: text for name, text in recording.metadata.items() if name not in ("format", "parameters")}
     parameters = json.loads(recording.metadata.get("parameters", "{}"))
-    return facts | {f"${name}": str(value) for name, value in parameters.items()}
+    return facts | {f"${name}": _shortly(str(value)) for name, value in parameters.items()}
+
+
+def _shortly(text: str) -> str:
+    """A number with six digits at most, as those that a seed draws have sixteen; other texts as they are."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return f"{number:.6g}" if len(text) > len(f"{number:.6g}") and math.isfinite(number) else text
 
 
 def replay_data(frames: Iterable[Frame], roads: RoadDrawing | None = None) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
 from eidrive_scenario.reporting.page import write_page
 
-PREFERRED = ("min_distance", "time_to_collision", "collision.count")
+PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.lost")
 """Metrics that the overview shows before others, by how their names begin."""
 SHOWN = 4
 """So many metrics stand in the overview."""
@@ -120,4 +120,5 @@ def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
 
 
 def _number(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.3g} {unit}".strip()
+    """With two decimals where it is measured, so that limits and values line up; counts as they are."""
+    return "" if value is None else f"{value:.2f} {unit}" if unit else f"{value:g}"

@@ -63,6 +63,21 @@ function box([x, y, length, width, yaw], fill, stroke, line, opacity) {
   pen.restore();
 }
 
+function outline(name, [x, y, yaw], at) {
+  const [length, width] = data.actors[name].size, cos = Math.abs(Math.cos(yaw)), sin = Math.abs(Math.sin(yaw));
+  const across = (cos * length + sin * width) / 2, up = (sin * length + cos * width) / 2;
+  return [...at(x - across, y + up), ...at(x + across, y - up)];
+}
+
+/* Where a label goes: right of its car, or else left, above, below, wherever it covers the least of others. */
+function place(text, [left, top, right, bottom], others) {
+  const width = pen.measureText(text).width, middle = (left + right) / 2 - width / 2 - 7;
+  const spots = [[right, (top + bottom) / 2], [left - width - 14, (top + bottom) / 2], [middle, top - 11], [middle, bottom + 11]];
+  const covered = ([x, y]) => others.reduce((sum, [, l, t, r, b]) =>
+    sum + Math.max(0, Math.min(x + 7 + width, r) - Math.max(x + 7, l)) * Math.max(0, Math.min(y + 8, b) - Math.max(y - 8, t)), 0);
+  return spots.reduce((best, spot) => covered(spot) < covered(best) ? spot : best);
+}
+
 function draw() {
   const area = canvas.getBoundingClientRect(), ratio = window.devicePixelRatio || 1;
   canvas.width = area.width * ratio;
@@ -105,11 +120,11 @@ function draw() {
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.font = "600 12.5px system-ui, sans-serif";
   pen.textBaseline = "middle";
-  for (const [name, [x, y, yaw, speed]] of Object.entries(poses)) {
-    const [length, width] = data.actors[name].size;
-    const reach = Math.abs(Math.cos(yaw)) * length / 2 + Math.abs(Math.sin(yaw)) * width / 2;
-    const [left, middle] = at(x + reach, y);
-    const text = Math.abs(speed) > 0.05 ? name + "  " + (3.6 * speed).toFixed(0) + " km/h" : name;
+  const taken = Object.entries(poses).map(([name, pose]) => [name, ...outline(name, pose, at)]);
+  for (const [name, pose] of Object.entries(poses)) {
+    const speed = pose[3], text = Math.abs(speed) > 0.05 ? name + "  " + (3.6 * speed).toFixed(0) + " km/h" : name;
+    const [left, middle] = place(text, outline(name, pose, at), taken.filter(([other]) => other !== name));
+    taken.push(["", left + 7, middle - 8, left + 7 + pen.measureText(text).width, middle + 8]);
     pen.lineWidth = 3.5; pen.lineJoin = "round"; pen.strokeStyle = "#fff"; pen.strokeText(text, left + 7, middle);
     pen.fillStyle = SELF; pen.fillText(text, left + 7, middle);
   }
@@ -124,7 +139,14 @@ function show(next) {
   for (const [key, value] of station ? [["sees", station.own.length], ["has heard of", station.heard.length], ["plan", station.plan || "does not drive"]] : [["", "not there"]]) {
     make("dt", key, known); make("dd", value, known);
   }
-  for (const item of element("changes").children) item.className = item.dataset.time <= data.times[index] + 1e-6 ? "past" : "future";
+  let last = null;
+  for (const item of element("changes").children) {
+    const past = item.dataset.time <= data.times[index] + 1e-6;
+    item.className = past ? "past" : "future";
+    if (past) last = item;
+  }
+  const list = element("changes");
+  if (last) list.scrollTop = last.offsetTop - list.offsetTop - list.clientHeight / 2;
   draw();
 }
 

@@ -12,7 +12,7 @@ from lxml import html
 from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, Rule, Table
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.demo_page import CameraPicture, Place, write_demo
+from eidrive_scenario.reporting.demo_page import CameraPicture, Place, _speed, write_demo
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.top_view import RoadDrawing
 
@@ -103,3 +103,10 @@ def test_checks_the_sentence_and_a_chart_per_table_are_there(page: str) -> None:
 def test_camera_pictures_are_inside_and_their_captions_escaped(page: str) -> None:
     assert page.count("data:image/png;base64,iVBORw==") == 2
     assert "a &lt;truck&gt;" in page
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"), [(8.0, "at 29 km/h"), (-0.1, "at 0 km/h"), (-1.4, "thrown back at 5 km/h")]
+)
+def test_a_car_that_was_hit_does_not_drive_at_less_than_nothing(speed: float, words: str) -> None:
+    assert _speed(speed) == words

@@ -13,7 +13,7 @@ from lxml import html
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay import replay_data, write_replay
+from eidrive_scenario.reporting.replay import _shortly, replay_data, write_replay
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 
 Play = Callable[..., list[Frame]]
@@ -78,3 +78,17 @@ def test_the_page_holds_the_run_and_nothing_from_elsewhere(street: Play, tmp_pat
 def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no frame"):
         write_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("0.0332751629550011", "0.0332752"),
+        ("14.4444", "14.4444"),
+        ("36.50", "36.5"),
+        ("1e400", "1e400"),
+        ("red", "red"),
+    ],
+)
+def test_parameters_as_a_reader_wants_them(text: str, shown: str) -> None:
+    assert _shortly(text) == shown

@@ -56,7 +56,7 @@ def test_each_run_shows_its_verdict_and_reason(tmp_path: Path) -> None:
     page = write_report([result(3, "none", False), result(1, "none", True)], tmp_path / "page.html")
     assert page.name == "page.html"
     passed, failed = rows(page)[1:]
-    assert passed == ["1", "passed", "min_distance", "4.2 m", "3.5 m", "", "stop trigger", "12.50"]
+    assert passed == ["1", "passed", "min_distance", "4.20 m", "3.50 m", "", "stop trigger", "12.50"]
     assert failed[:2] == ["3", "failed"]
     assert failed[5] == "Ego and <Incoming> came as near as 0.00 m at 3.10 s"
 
