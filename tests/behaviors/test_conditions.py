@@ -192,6 +192,26 @@ def test_angles(scene: Any) -> None:
         assert first(scene(0.5, ("Ego", NOTHING, condition), ("Ego", turn.format(0.9)), other=(1, 150, 0))) is None
 
 
+@pytest.mark.element("AngleCondition")
+@pytest.mark.parametrize(
+    ("frame", "angle", "times"),
+    [
+        ("entity", 0.0, (0.0, 0.0)),
+        ("entity", 1.571, (None, None)),
+        ("trajectory", 0.0, (0.0, 0.0)),
+        ("world", 1.571, (0.6, None)),
+    ],
+)
+def test_angles_to_the_own_axes_and_to_the_trajectory(scene: Any, frame: str, angle: float, times: Any) -> None:
+    """On a trajectory round a corner at 0.5 s, which is turned about within 2 m, and without one."""
+    condition = of(
+        f'<AngleCondition angleType="heading" angle="{angle}" angleTolerance="0.001" coordinateSystem="{frame}"/>'
+    )
+    for actions, time in zip(((("Ego", TURN),), ()), times, strict=True):
+        found = first(scene(1.5, ("Ego", NOTHING, condition), *actions))
+        assert found == (None if time is None else pytest.approx(time))
+
+
 @pytest.mark.element("RelativeClearanceCondition")
 @pytest.mark.parametrize(
     ("other", "opposite", "clear"),

@@ -144,13 +144,30 @@ def test_followed_profiles_round_their_corners() -> None:
 
 
 def test_one_change_of_speed_within_a_time_begins_and_ends_without_acceleration() -> None:
-    """8 m/s in 5 s at 4 m/s³: a (5 - a/4) = 8 gives a = 1.757 m/s²."""
+    """8 m/s in 5 s at 4 m/s³: a (5 - a/4) = 8 gives a = 1.754 m/s²."""
     pieces = rounded([(0.0, 0.0), (5.0, 8.0)], up=4.0, down=4.0)
     assert pieces is not None
     slope = 10.0 - math.sqrt(100.0 - 32.0)
     assert pieces[1].slope == pytest.approx(slope)
     assert pieces[2].at(pieces[3].time) == pytest.approx(8.0)
     assert pieces[3].time == 5.0
+
+
+@pytest.mark.element("SpeedProfileAction")
+@pytest.mark.parametrize("own", [False, True])
+def test_a_profile_keeps_to_the_limits_of_the_vehicle_unless_it_has_its_own(scene: Any, own: bool) -> None:
+    """8 m/s more in 5 s at 4 m/s³ as above: 2 m/s³ · (0.438 s)² and 1.754 m/s² · 0.562 s in the first second."""
+    action = profile("follow", (5.0, 28.0), rates='maxAccelerationRate="4" maxDecelerationRate="4"' if own else "")
+    rate = 100 if own else 4
+    played = scene(6, ("Ego", action), performance=f'maxAccelerationRate="{rate}" maxDecelerationRate="{rate}"')
+    assert [played.at(t).speed for t in (1.0, 2.5, 5.0)] == pytest.approx([21.3693, 24.0, 28.0], abs=1e-3)
+
+
+def test_a_profile_stays_below_the_largest_speed(scene: Any) -> None:
+    played = scene(3, ("Ego", profile("position", (1.0, 90.0))))
+    assert played.at(2.0).speed == 70.0
+    played = scene(3, ("Ego", profile("position", (1.0, 90.0), rates='maxSpeed="30"')))
+    assert played.at(2.0).speed == 30.0
 
 
 def keep(attributes: str, limits: str = "") -> str:

@@ -34,8 +34,8 @@ class SpeedProfileAction(ActionBehaviour):
 
     In the following mode `position` speeds go in straight lines from entry to entry. In `follow` the acceleration
     starts at zero and changes no faster than its rate limits: corners of the profile become parabolas about them. A
-    profile whose corners lie too close for that is driven in straight lines. With an entity, speeds are relative to
-    the speed that it has at the start.
+    profile whose corners lie too close for that is driven in straight lines. Limits are those of the action, else those
+    of the vehicle's Performance. With an entity, speeds are relative to the speed that it has at the start.
     """
 
     domains = Domain.LONGITUDINAL
@@ -46,10 +46,9 @@ class SpeedProfileAction(ActionBehaviour):
         start = self.actor.motion.speed
         corners = self._corners(start)
         self._pieces = straight(corners)
-        limits = self.action.dynamic_constraints
-        if self.action.following_mode is model.FollowingMode.FOLLOW and limits is not None:
-            up, down = limits.max_acceleration_rate, limits.max_deceleration_rate
-            if up is not None and down is not None and up > 0.0 and down > 0.0:
+        if self.action.following_mode is model.FollowingMode.FOLLOW:
+            up, down = self._limit("max_acceleration_rate"), self._limit("max_deceleration_rate")
+            if 0.0 < up < math.inf and 0.0 < down < math.inf:
                 self._pieces = rounded(corners, up, down) or self._pieces
         self._elapsed = 0.0
 
@@ -72,24 +71,27 @@ class SpeedProfileAction(ActionBehaviour):
         if name is None and self.action.entity_ref_element is not None:
             name = self.action.entity_ref_element.entity_ref
         base = self.stage.speed(name) if name is not None else 0.0
-        limits = self.action.dynamic_constraints
+        top = self._limit("max_speed")
         corners = [(0.0, start)]
         for number, entry in enumerate(self.action.speed_profile_entry):
             time, speed = corners[-1]
-            target = entry.speed + base
+            target = min(max(entry.speed + base, -top), top)
             span = entry.time
             if span is None:
-                limit = None
-                if limits is not None:
-                    limit = limits.max_acceleration if target > speed else limits.max_deceleration
-                if limit is None:
-                    limit = self.actor.limits()[1 if target > speed else 2]
+                limit = self._limit("max_acceleration" if target > speed else "max_deceleration")
                 span = abs(target - speed) / limit if math.isfinite(limit) and limit > 0.0 else 0.0
             if span > TINY:
                 corners.append((time + span, target))
             elif number > 0 or self.action.following_mode is model.FollowingMode.POSITION:
                 corners[-1] = (time, target)
         return corners
+
+    def _limit(self, name: str) -> float:
+        """A limit of the action, else of the vehicle's Performance; infinite where neither states it."""
+        entity = self.actor.entity
+        performance = entity.performance if isinstance(entity, model.Vehicle) else None
+        stated = (getattr(limits, name, None) for limits in (self.action.dynamic_constraints, performance))
+        return next((float(limit) for limit in stated if limit is not None), math.inf)
 
     def describe(self) -> str:
         """Its speeds."""

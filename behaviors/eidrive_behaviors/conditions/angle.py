@@ -4,25 +4,35 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import EntityCondition, Stage, model, wrap_angle
+from eidrive_scenario.api import EntityCondition, Pose, Stage, model, wrap_angle
 
 
 def angle_of(stage: Stage, entity: str, kind: model.AngleType) -> float:
     """Heading, pitch or roll of an entity in the world [rad]."""
-    pose = stage.pose(entity)
-    return {model.AngleType.HEADING: pose.h, model.AngleType.PITCH: pose.p, model.AngleType.ROLL: pose.r}[kind]
+    return _of(stage.pose(entity), kind)
 
 
 def reference_of(stage: Stage, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None) -> float:
-    """The angle from which an AngleCondition counts: the lane's or road's at the entity, 0 in other frames [rad]."""
-    if system not in (model.CoordinateSystem.LANE, model.CoordinateSystem.ROAD) or stage.roads is None:
+    """The angle from which an AngleCondition counts [rad]: that of the lane, road or trajectory at the entity.
+
+    Without a word it is 0, the world's. The entity's own axes are at no angle to themselves; the same is meant where it
+    follows no trajectory. NaN off the road.
+    """
+    if system is None or system is model.CoordinateSystem.WORLD:
         return 0.0
+    if system is model.CoordinateSystem.ENTITY:
+        return _of(stage.pose(entity), kind)
+    if system is model.CoordinateSystem.TRAJECTORY:
+        pose, followed = stage.pose(entity), stage.actors[entity].trajectory
+        return _of(pose if followed is None else followed.at(followed.beside(pose.x, pose.y)[0]), kind)
     here = stage.location(entity)
-    if here is None:
+    if stage.roads is None or here is None:
         return math.nan
-    pose = (
-        stage.roads.pose(here) if system is model.CoordinateSystem.LANE else stage.roads.road_pose_at(here.road, here.s)
-    )
+    lane = system is model.CoordinateSystem.LANE
+    return _of(stage.roads.pose(here) if lane else stage.roads.road_pose_at(here.road, here.s), kind)
+
+
+def _of(pose: Pose, kind: model.AngleType) -> float:
     return {model.AngleType.HEADING: pose.h, model.AngleType.PITCH: pose.p, model.AngleType.ROLL: pose.r}[kind]
 
 

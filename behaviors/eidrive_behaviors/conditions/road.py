@@ -32,8 +32,8 @@ class EndOfRoadCondition(EntityCondition):
         return span(stage, stage.actors[entity].end_of_road_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """Longer than the duration."""
-        return model.Rule.GREATER_THAN, self.element.duration
+        """At least the duration."""
+        return model.Rule.GREATER_OR_EQUAL, self.element.duration
 
 
 class OffroadCondition(EntityCondition):
