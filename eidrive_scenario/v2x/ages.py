@@ -14,7 +14,7 @@ MOST_STEPS = 1 << 20
 """So many bends are kept exactly, over all links [24 bytes each]: six hours of one link at 20 Hz."""
 GRID = 0.01
 """Relative width of the classes into which older ages are sorted then."""
-RESOLUTION = 2.0**-30
+RESOLUTION = 2.0**-40
 """To which the time spent below an age is counted [s]."""
 LEAST = 1e-6
 """Ages below this are 0 there [s]."""

@@ -11,8 +11,9 @@ Array = NDArray[np.float64]
 Keys = NDArray[np.uint64]
 Integers = NDArray[np.int64]
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+GOLDEN, FIRST, SECOND = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB
+_GOLDEN, _FIRST, _SECOND = np.uint64(GOLDEN), np.uint64(FIRST), np.uint64(SECOND)
+_64_BITS = (1 << 64) - 1
 
 
 def key(seed: int, *parts: str | int) -> int:
@@ -29,6 +30,14 @@ def uniforms(keys: Keys, counts: Integers | int) -> Array:
     mixed = _mixed(keys + (np.atleast_1d(counts).astype(np.uint64) + np.uint64(1)) * _GOLDEN)
     numbers: Array = ((mixed >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
     return numbers
+
+
+def uniform(key: int, count: int) -> float:
+    """One of `uniforms`, to the bit, for a handful of links."""
+    mixed = (key + (count + 1) * GOLDEN) & _64_BITS
+    mixed = ((mixed ^ mixed >> 30) * FIRST) & _64_BITS
+    mixed = ((mixed ^ mixed >> 27) * SECOND) & _64_BITS
+    return (((mixed ^ mixed >> 31) >> 11) + 0.5) * 2.0**-53
 
 
 def joined(first: Keys, second: Keys) -> Keys:

@@ -67,6 +67,8 @@ class Access(ABC):
         self._waiting: list[deque[Transmission]] = [deque() for _ in names]
         self._arrivals: deque[Transmission] = deque()
         self._head: list[Transmission | None] = [None] * count
+        self.contending = 0
+        """How many stations have a message for the medium."""
         self.ready = np.full(count, math.inf)
         """When the first message of each station may contend [s]; infinity where there is none."""
         self._last_start = np.full(count, -math.inf)
@@ -75,7 +77,8 @@ class Access(ABC):
         """From when on each station finds the medium free, as far as is known [s]."""
         self._busy_time = np.zeros(count)
         self._period_busy = np.zeros(count)
-        self._period_end: float | None = None
+        self._period: int | None = None
+        """Which period of congestion control goes on; None before the first message."""
         self.on_air: list[Transmission] = []
         """What may overlap with something whose end is not reached."""
 
@@ -99,9 +102,10 @@ class Access(ABC):
             return started, dropped
         sensed = power >= self.sensing_dbm
         np.fill_diagonal(sensed, True)
+        nobody = np.full(len(self.names), math.inf)
         while True:
-            starts = self.starts()
-            row = int(np.argmin(starts))
+            starts = self.starts() if self.contending else nobody
+            row = int(np.argmin(starts)) if self.contending else 0
             start = float(starts[row])
             if self._arrivals and self._arrivals[0].ready <= min(start, until - EARLY):
                 dropped += self._arrive(self._arrivals.popleft())
@@ -155,6 +159,7 @@ class Access(ABC):
         self._arrivals = deque(entry for entry in self._arrivals if entry.message.sender not in gone)
         self._waiting = [deque() if old is None else self._waiting[old] for old in rows]
         self._head = [None if old is None else self._head[old] for old in rows]
+        self.contending = sum(head is not None for head in self._head)
         for field, fresh in (
             ("ready", math.inf),
             ("_last_start", -math.inf),
@@ -199,6 +204,7 @@ class Access(ABC):
     def _next(self, row: int) -> None:
         """The first message in the queue of a station becomes the one that contends, as soon as the gate is open."""
         queue = self._waiting[row]
+        self.contending += bool(queue) - (self._head[row] is not None)
         if not queue:
             self._head[row], self.ready[row] = None, math.inf
             self.headed(row, None)
@@ -224,13 +230,13 @@ class Access(ABC):
     def _measure(self, now: float) -> None:
         """Tell congestion control how busy each of its periods was."""
         period = self.gate.control.period
-        if self._period_end is None:
-            self._period_end = math.floor(now / period + 1e-6) * period + period
-        while now >= self._period_end - EARLY:
+        if self._period is None:
+            self._period = math.floor(now / period + 1e-6)
+        while now >= (self._period + 1) * period - EARLY:
             self._busy_time += self._period_busy
             self.gate.measured(self._period_busy / period)
             self._period_busy = np.zeros(len(self.names))
-            self._period_end += period
+            self._period += 1
 
 
 def moved(values: Array, rows: Sequence[int | None], fresh: float) -> Array:

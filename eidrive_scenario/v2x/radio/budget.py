@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from eidrive_scenario.v2x.counter_draws import Integers, Keys, joined, key, uniforms
-from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss
+from eidrive_scenario.v2x.counter_draws import Integers, Keys, joined, key, uniform, uniforms
+from eidrive_scenario.v2x.radio.path_loss import Between, Link, PathLoss
 from eidrive_scenario.v2x.radio.propagation import probability_of_los
 from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Surroundings
 
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 OUT_OF_REACH = 170.0
 """Where even an open path loses so much, nobody looks what stands on it [dB]."""
+FEW = 8
+"""Up to so many pairs of stations, plain numbers are faster than arrays."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class LinkBudget:
         self._environment = environment
         self._spread = shadowing_db
         self._decorrelation = decorrelation
+        self._reach = self._distance_of(OUT_OF_REACH)
         self._names: tuple[str, ...] = ()
         self._rows: dict[str, int] = {}
         self._first = self._second = np.zeros(0, dtype=np.int64)
@@ -79,20 +82,94 @@ class LinkBudget:
 
     def at(self, surroundings: Surroundings) -> Budget:
         """The budget with the antennas where they are now."""
-        names, positions = surroundings.names, surroundings.positions
+        names = surroundings.names
         if names != self._names:
             self._take_in(names)
+        return self._at_few(surroundings) if 0 < len(self._pairs) <= FEW else self._at_many(surroundings)
+
+    def _at_many(self, surroundings: Surroundings) -> Budget:
+        names, positions = surroundings.names, surroundings.positions
         first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
         between, blockers = self._between(surroundings, positions, distance)
         shadow = self._walk(positions, between.states)
         mean_loss = self._path_loss.loss(between, self._frequency, ndtr(shadow[1]))
-        spread = self._path_loss.shadowing(between.states) if self._spread is None else self._spread
+        spread = np.take(self._path_loss.spreads, between.states) if self._spread is None else self._spread
         links = np.zeros((3, len(first) + 1))  # the last one is that of a station with itself
         links[0, :-1], links[1, :-1], links[2, :-1] = distance, mean_loss + spread * shadow[0], mean_loss
         square = links.take(self._pair_at, axis=1)
         states = np.append(between.states, LOS).take(self._pair_at)
         return Budget(names, self._rows, square[0], square[1], square[2], states, blockers)
+
+    def _at_few(self, surroundings: Surroundings) -> Budget:
+        """The same in plain numbers, pair by pair."""
+        names = surroundings.names
+        places = [surroundings.places[name] for name in names]
+        moved = [math.dist(here, there) for here, there in zip(self._places.tolist(), places, strict=True)]
+        self._places = np.array(places, dtype=float).reshape(-1, 3)
+        between, blockers = self._links(surroundings, places)
+        distance, loss, mean_loss = ([[0.0] * len(names) for _ in names] for _ in range(3))
+        states = [[LOS] * len(names) for _ in names]
+        for pair, (link, a, b) in enumerate(zip(between, self._first.tolist(), self._second.tolist(), strict=True)):
+            shadow, blockage = self._step(pair, moved[a] + moved[b], link.state)
+            mean = self._path_loss.loss_of(link, self._frequency, float(ndtr(blockage)))
+            spread = self._path_loss.spreads[link.state] if self._spread is None else self._spread
+            distance[a][b] = distance[b][a] = link.distance
+            loss[a][b] = loss[b][a] = mean + spread * shadow
+            mean_loss[a][b] = mean_loss[b][a] = mean
+            states[a][b] = states[b][a] = link.state
+        codes = np.array(states, dtype=np.int64)
+        return Budget(names, self._rows, np.array(distance), np.array(loss), np.array(mean_loss), codes, blockers)
+
+    def _links(
+        self, surroundings: Surroundings, places: Sequence[tuple[float, float, float]]
+    ) -> tuple[list[Link], dict[tuple[int, int], tuple[str, ...]]]:
+        """What is between the stations of each pair, and the bodies there by rows, for few pairs."""
+        links, blockers = [], {}
+        ends = list(zip(self._first.tolist(), self._second.tolist(), strict=True))
+        for pair, (a, b) in enumerate(ends):
+            lower, upper = sorted((places[a][2], places[b][2]))
+            link = Link(math.dist(places[a], places[b]), LOS, lower, upper, -math.inf, 0)
+            if self._line_of_sight == "random":
+                draw = uniform(int(self._sight_keys[pair]), 0)
+                if draw > float(probability_of_los(link.distance, self._environment)):
+                    link = link._replace(state=NLOSV, top=upper + 0.1, vehicles=1)
+            links.append(link)
+        if self._line_of_sight == "rays" and surroundings.sight is not None and links:
+            near = [pair for pair, link in enumerate(links) if link.distance < self._reach]
+            seen = surroundings.sight([self._pairs[pair] for pair in near])
+            for ray, (pair, state, top) in enumerate(
+                zip(near, seen.states.tolist(), seen.heights.tolist(), strict=True)
+            ):
+                if state != LOS:
+                    bodies = seen.blockers.get(ray, ())
+                    links[pair] = links[pair]._replace(state=state, top=top, vehicles=len(bodies))
+                    if bodies:
+                        blockers[ends[pair]] = bodies
+        return links, blockers
+
+    def _step(self, pair: int, way: float, state: int) -> tuple[float, float]:
+        """`_walk` of one pair of stations."""
+        shadow, blockage = self._normals[:, pair].tolist()
+        if way == 0.0:
+            return shadow, blockage
+        self._updates[pair] += 1
+        reach = self._path_loss.reaches[state] if self._decorrelation is None else self._decorrelation
+        kept = 0.0 if math.isnan(way) else math.exp(-way / reach)
+        fresh, count = math.sqrt(1.0 - kept * kept), int(self._updates[pair])
+        for_shadow, for_blockage = (float(ndtri(uniform(own, count))) for own in self._keys[:, pair].tolist())
+        shadow, blockage = kept * shadow + fresh * for_shadow, kept * blockage + fresh * for_blockage
+        self._normals[:, pair] = shadow, blockage
+        return shadow, blockage
+
+    def _distance_of(self, loss: float) -> float:
+        """From where on an open path loses at least so much [dB], in metres."""
+        near, far = 1.0, 1e9
+        for _ in range(100):
+            middle = math.sqrt(near * far)
+            there = self._path_loss.loss_of(Link(middle, LOS, 1.5, 1.5, -math.inf, 0), self._frequency, 0.5)
+            near, far = (near, middle) if there >= loss else (middle, far)
+        return far
 
     def _take_in(self, names: tuple[str, ...]) -> None:
         """Other stations from now on; pairs that were there keep their shadowing."""
@@ -137,8 +214,7 @@ class LinkBudget:
             hidden = uniforms(self._sight_keys, 0) > probability_of_los(distance, self._environment)
             states[hidden], tops[hidden], vehicles[hidden] = NLOSV, upper[hidden] + 0.1, 1
         elif self._line_of_sight == "rays" and surroundings.sight is not None and count:
-            open_loss = self._path_loss.loss(between, self._frequency, np.full(count, 0.5))
-            near = np.flatnonzero(open_loss < OUT_OF_REACH)
+            near = np.flatnonzero(distance < self._reach)
             asked = self._pairs if len(near) == count else [self._pairs[pair] for pair in near.tolist()]
             seen = surroundings.sight(asked)
             states[near], tops[near] = seen.states, seen.heights
@@ -158,7 +234,7 @@ class LinkBudget:
         self._places = positions.copy()
         if moving.any():
             self._updates += moving
-            reach = self._path_loss.decorrelation(states) if self._decorrelation is None else self._decorrelation
+            reach = np.take(self._path_loss.reaches, states) if self._decorrelation is None else self._decorrelation
             kept = np.exp(-way / reach)
             innovation = ndtri(uniforms(self._keys, self._updates))
             walked = kept * self._normals + np.sqrt(1.0 - kept * kept) * innovation

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.v2x.channel import Outgoing
 from eidrive_scenario.v2x.composed import delay_of
-from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniforms
+from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniform
 from eidrive_scenario.v2x.delay import ConstantDelay
 from eidrive_scenario.v2x.draws import LinkDraws
 from eidrive_scenario.v2x.hearings import Entry
@@ -81,7 +81,7 @@ class RadioChannel(LinkChannel):
         self._access = self._new_access(())
         self._ledger = Ledger(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
-        self._jitter_keys: Keys = np.zeros(0, dtype=np.uint64)
+        self._jitter_keys: list[int] = []
         self._budget: Budget | None = None
         self._open: list[Transmission] = []
         self._told: list[FateBlock] = []
@@ -109,13 +109,11 @@ class RadioChannel(LinkChannel):
 
     def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
         self._advance(now)
-        senders = np.array([self._row(message.sender) for message, _ in outbox], dtype=np.int64)
-        numbers = np.array([message.number for message, _ in outbox], dtype=np.int64)
-        waits = self.profile.jitter * uniforms(self._jitter_keys[senders], numbers)
         offered = []
-        for (message, receivers), row, wait in zip(outbox, senders.tolist(), waits.tolist(), strict=True):
-            duration = self.profile.airtime(message.size)
-            offered.append(Transmission(message, receivers, now, now + wait, duration))
+        for message, receivers in outbox:
+            row = self._row(message.sender)
+            ready = now + self.profile.jitter * uniform(self._jitter_keys[row], message.number)
+            offered.append(Transmission(message, receivers, now, ready, self.profile.airtime(message.size)))
             rows = self._rows_of(message.sender, receivers)
             if len(rows) < len(receivers):
                 missing = next(name for name in receivers if name not in self._rows)
@@ -181,7 +179,7 @@ class RadioChannel(LinkChannel):
         self._ledger = Ledger(names)
         own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
         self._keys = joined(own[:, None], own[None, :])
-        self._jitter_keys = np.array([key(self._seed, "jitter", name) for name in names], dtype=np.uint64)
+        self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
         for entry in [*lost, *gone]:
             for receiver in entry.receivers:
                 self._lose(entry, receiver, ABSENT)

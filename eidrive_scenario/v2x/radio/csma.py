@@ -52,6 +52,8 @@ class Csma(Access):
         self._slots[row] = self._fixed[row] = math.nan
 
     def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
+        if self.contending == 1:
+            return  # only the one that has just begun
         start = transmission.start
         others = sensed & np.isfinite(starts)
         others[row] = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +37,27 @@ class ErrorCurve:
             return errors
         scaled: Array = 1.0 - (1.0 - errors) ** (np.asarray(size) / self.size)
         return scaled
+
+    def of(self, ratio_db: float, size: float) -> float:
+        """The same for one packet."""
+        if ratio_db < self.ratios[0]:
+            error = 1.0
+        elif ratio_db > self.ratios[-1]:
+            error = self.floor
+        else:
+            error = interpolated(ratio_db, self.ratios, self.errors)
+        return error if self.size is None else 1.0 - (1.0 - error) ** (size / self.size)
+
+
+def interpolated(x: float, places: Sequence[float], values: Sequence[float]) -> float:
+    """`numpy.interp` of one number: straight lines between places that rise, constant beyond their ends."""
+    after = bisect_right(places, x)
+    if after == 0:
+        return values[0]
+    if after == len(places):
+        return values[-1]
+    low, high = places[after - 1], places[after]
+    return (values[after] - values[after - 1]) / (high - low) * (x - low) + values[after - 1]
 
 
 _WILAB = "WiLabV2Xsim, IEEE 802.11p at 6 Mbit/s (MCS 2), 350 bytes, channel model "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from eidrive_scenario.v2x.radio.propagation import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, Integers
+from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Integers
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,17 @@ class Between:
         self.vehicles = vehicles
 
 
+class Link(NamedTuple):
+    """One link of `Between`, in plain numbers."""
+
+    distance: float
+    state: int
+    lower: float
+    upper: float
+    top: float
+    vehicles: int
+
+
 class Tr37885(Settings):
     """3GPP TR 37.885: LOS of streets or of highways, NLOS behind buildings, and vehicles that add to LOS.
 
@@ -50,6 +61,14 @@ class Tr37885(Settings):
     kind: Literal["tr37885"] = "tr37885"
     environment: Literal["urban", "highway"] = "urban"
     blockage: Literal["lognormal", "normal", "mean"] = "lognormal"
+
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB] (table 6.2.1-2)."""
+
+    @property
+    def reaches(self) -> tuple[float, float, float]:
+        """Distance over which shadowing loses all but 1/e of its correlation, with LOS, NLOSv and NLOS [m]."""
+        return (10.0, 13.0, 13.0) if self.environment == "urban" else (25.0, 25.0, 25.0)
 
     def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
         """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
@@ -64,7 +83,18 @@ class Tr37885(Settings):
             building_nlos(between.distance, frequency_ghz),
         )
 
-    def _blocked(self, mean: Array, spread: Array, draws: Array) -> Array:
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        los = urban_los if self.environment == "urban" else highway_los
+        if link.state == LOS:
+            return float(los(distance, frequency_ghz))
+        if link.state != NLOSV:
+            return float(building_nlos(distance, frequency_ghz))
+        mean, spread = blockage_moments(distance, link.lower, link.upper, link.top)
+        return float(los(distance, frequency_ghz) + self._blocked(mean, spread, draw))
+
+    def _blocked(self, mean: Array, spread: Array, draws: Array | float) -> Array:
         if self.blockage == "mean":
             return mean
         if self.blockage == "normal":
@@ -72,14 +102,6 @@ class Tr37885(Settings):
         some = np.where(mean > 0.0, mean, 1.0)
         variance = np.log1p((spread / some) ** 2)
         return np.where(mean > 0.0, np.exp(np.log(some) - variance / 2.0 + np.sqrt(variance) * ndtri(draws)), 0.0)
-
-    def shadowing(self, states: Integers) -> Array:
-        """Its standard deviation (M,) [dB] (table 6.2.1-2)."""
-        return np.where(states == NLOS, 4.0, 3.0)
-
-    def decorrelation(self, states: Integers) -> Array:
-        """Distance over which shadowing loses all but 1/e of its correlation (M,) [m]: 25 m on highways."""
-        return np.where(states == LOS, 10.0, 13.0) if self.environment == "urban" else np.full(len(states), 25.0)
 
 
 class WinnerB1(Settings):
@@ -94,6 +116,11 @@ class WinnerB1(Settings):
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 1.0
     per_vehicle_db: NonNegativeFloat = 6.9
 
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
+    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
+    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
+
     def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
         """(M,) path loss without shadowing [dB]; nothing is drawn."""
         height = 1.5 - self.environment_height
@@ -106,13 +133,16 @@ class WinnerB1(Settings):
             np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
         )
 
-    def shadowing(self, states: Integers) -> Array:
-        """Its standard deviation (M,) [dB]."""
-        return np.where(states == NLOS, 4.0, 3.0)
-
-    def decorrelation(self, states: Integers) -> Array:
-        """Distance over which shadowing loses all but 1/e of its correlation (M,) [m]."""
-        return np.full(len(states), 25.0)
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        height = 1.5 - self.environment_height
+        clear = float(winner_b1(distance, frequency_ghz, height, height))
+        if link.state == LOS:
+            return clear
+        if link.state == NLOSV:
+            return clear + self.per_vehicle_db * link.vehicles
+        return max(clear, float(building_nlos(distance, frequency_ghz)))
 
 
 PathLoss = Annotated[Tr37885 | WinnerB1, Field(discriminator="kind")]

@@ -1,4 +1,4 @@
-"""Path loss between two antennas, as published; arrays in, decibels out."""
+"""Path loss between two antennas, as published; arrays or numbers in, decibels out."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Values = Array | float
 
 SPEED_OF_LIGHT = 3e8
 """As the models round it [m/s]."""
@@ -14,25 +15,25 @@ NEAREST = 3.0
 """The WINNER+ formulas are kept at their value for this distance below it [m] (TR 36.885, A.1.4)."""
 
 
-def highway_los(distance: Array, frequency_ghz: float) -> Array:
+def highway_los(distance: Values, frequency_ghz: float) -> Array:
     """3GPP TR 37.885, table 6.2.1-1, highway, LOS [dB]; distance in m."""
     loss: Array = 32.4 + 20.0 * np.log10(distance) + 20.0 * np.log10(frequency_ghz)
     return loss
 
 
-def urban_los(distance: Array, frequency_ghz: float) -> Array:
+def urban_los(distance: Values, frequency_ghz: float) -> Array:
     """3GPP TR 37.885, table 6.2.1-1, urban, LOS [dB]; distance in m."""
     loss: Array = 38.77 + 16.7 * np.log10(distance) + 18.2 * np.log10(frequency_ghz)
     return loss
 
 
-def building_nlos(distance: Array, frequency_ghz: float) -> Array:
+def building_nlos(distance: Values, frequency_ghz: float) -> Array:
     """3GPP TR 37.885, table 6.2.1-1, NLOS behind buildings [dB]; distance in m."""
     loss: Array = 36.85 + 30.0 * np.log10(distance) + 18.9 * np.log10(frequency_ghz)
     return loss
 
 
-def blockage_moments(distance: Array, lower: Array, upper: Array, blocker: Array) -> tuple[Array, Array]:
+def blockage_moments(distance: Values, lower: Values, upper: Values, blocker: Values) -> tuple[Array, Array]:
     """Mean and standard deviation [dB] of the loss that vehicles in between add (3GPP TR 37.885, 6.2.1).
 
     lower, upper  heights of the lower and the higher antenna; blocker  top of the highest vehicle in between [m]
@@ -44,7 +45,7 @@ def blockage_moments(distance: Array, lower: Array, upper: Array, blocker: Array
     return np.where(over, 0.0, mean), np.where(over, 0.0, spread)
 
 
-def winner_b1(distance: Array, frequency_ghz: float, first: float, second: float) -> Array:
+def winner_b1(distance: Values, frequency_ghz: float, first: float, second: float) -> Array:
     """WINNER+ B1 with LOS, as 3GPP TR 36.885, A.1.4 takes it over [dB]; distance in m.
 
     `first` and `second` are the effective antenna heights: above the ground, less the environment height [m]. Published
@@ -61,7 +62,7 @@ def winner_b1(distance: Array, frequency_ghz: float, first: float, second: float
     return loss
 
 
-def probability_of_los(distance: Array, environment: str) -> Array:
+def probability_of_los(distance: Values, environment: str) -> Array:
     """That nothing stands between two cars of random traffic (3GPP TR 37.885, table 6.2-1), `highway` or `urban`."""
     if environment == "urban":
         return np.minimum(1.0, 1.05 * np.exp(-0.0114 * distance))

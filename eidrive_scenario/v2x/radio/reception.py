@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.counter_draws import Keys, uniforms
+from eidrive_scenario.v2x.counter_draws import Keys, uniform, uniforms
 from eidrive_scenario.v2x.load.table import ErrorTable
 from eidrive_scenario.v2x.radio.access import EARLY, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
-from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
+from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolated
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -22,6 +24,8 @@ Rows = NDArray[np.int64]
 CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")
 """In the order in which they strike; codes in arrays are places here. `queue`: it never went on the air."""
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION, QUEUE = range(len(CAUSES))
+FEW = 12
+"""Up to so many receptions, plain numbers are faster than arrays."""
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
 """What traffic that is not simulated adds; signal strength is known, and so not among them."""
 
@@ -59,6 +63,12 @@ class Receiver:
         power  (N, N) at which each station (column) receives each other (row) [dBm]
         keys   (N, N) of the links, by sender and receiver
         """
+        few = len(ended) * len(power) <= FEW
+        return (self._receive_few if few else self._receive_many)(ended, on_air, power, budget, keys)
+
+    def _receive_many(
+        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+    ) -> Receptions:
         rows = np.array([budget.rows[entry.message.sender] for entry in on_air], dtype=np.int64)
         place = {id(entry): index for index, entry in enumerate(on_air)}
         own = np.array([place[id(entry)] for entry in ended], dtype=np.int64)
@@ -92,6 +102,63 @@ class Receiver:
             self._add_background(causes, budget.mean_loss[senders], keys[senders], numbers)
         return Receptions(causes, snr, senders)
 
+    def _receive_few(
+        self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
+    ) -> Receptions:
+        """The same in plain numbers, one reception after the other."""
+        powers, links = power.tolist(), keys.tolist()
+        states, mean_loss = budget.states.tolist(), budget.mean_loss.tolist()
+        senders = [budget.rows[entry.message.sender] for entry in ended]
+        causes, ratios = [], []
+        for entry, sender in zip(ended, senders, strict=True):
+            together = [other for other in on_air if other is not entry and _overlap(other, entry)]
+            talking = {budget.rows[other.message.sender] for other in together}
+            disturbing = sorted(
+                (budget.rows[other.message.sender], other.start) for other in together if _share_a_band(other, entry)
+            )
+            earlier = {row for row, start in disturbing if start < entry.start} if self.locks else set()
+            number, size = entry.message.number, entry.message.size
+            found = []
+            for station, signal in enumerate(powers[sender]):
+                curve, draw = self.curves[states[sender][station]], uniform(links[sender][station], number)
+                cause = DELIVERED
+                if station in talking:
+                    cause = HALF_DUPLEX
+                elif signal < self.sensing_dbm:
+                    cause = SENSING
+                elif any(powers[row][station] >= self.sensing_dbm for row in earlier):
+                    cause = BUSY
+                elif draw < curve.of(signal - self.noise_dbm, size):
+                    cause = PROPAGATION
+                elif disturbing:
+                    others = sum(10.0 ** (powers[row][station] / 10.0) for row, _ in disturbing)
+                    floor = 10.0 * math.log10(10.0 ** (self.noise_dbm / 10.0) + others)
+                    cause = COLLISION if draw < curve.of(signal - floor, size) else DELIVERED
+                if self.background is not None:
+                    cause = self._in_background(cause, mean_loss[sender][station], links[sender][station], number)
+                found.append(cause)
+            causes.append(found)
+            ratios.append([signal - self.noise_dbm for signal in powers[sender]])
+        return Receptions(np.array(causes, dtype=np.int8), np.array(ratios), np.array(senders, dtype=np.int64))
+
+    def _in_background(self, cause: int, mean_loss: float, link: int, number: int) -> int:
+        """`_add_background` for one reception."""
+        losses, distances, given = self._background_lists
+        distance = interpolated(mean_loss, losses, distances)
+        for salt, code, probabilities in given:
+            if cause == DELIVERED or cause > code:
+                draw = uniform(link + salt, number)
+                cause = code if draw < interpolated(distance, distances, probabilities) else cause
+        return cause
+
+    @cached_property
+    def _background_lists(self) -> tuple[list[float], list[float], list[tuple[int, int, list[float]]]]:
+        """The background's path loss, distances, and salt, code and probabilities of each cause."""
+        assert self.background is not None
+        table, loss_at = self.background
+        given = [(salt, BACKGROUND[cause], table.given[cause].tolist()) for salt, cause in _salted(table)]
+        return loss_at.tolist(), table.distance.tolist(), given
+
     def _together(
         self, together: Bools, same_band: Bools, start: Array, own: Rows, rows: Rows, power: Array
     ) -> tuple[Array, Bools, Bools]:
@@ -121,7 +188,7 @@ class Receiver:
         """Losses by vehicles that are not simulated, at the distance at which their model has this path loss."""
         assert self.background is not None
         table, loss_at = self.background
-        given = [(salt, cause) for salt, cause in enumerate(BACKGROUND, start=1) if cause in table.given]
+        given = _salted(table)
         distance = np.interp(mean_loss, loss_at, table.distance)
         salts = np.array([salt for salt, _ in given], dtype=np.uint64)
         draws = uniforms(keys + salts[:, None, None], numbers)
@@ -129,3 +196,16 @@ class Receiver:
             code = BACKGROUND[cause]
             probability = np.interp(distance, table.distance, table.given[cause])
             causes[(own < probability) & ((causes == DELIVERED) | (causes > code))] = code
+
+
+def _salted(table: ErrorTable) -> list[tuple[int, str]]:
+    """The causes that background traffic adds, each with what tells its draws from others of the link."""
+    return [(salt, cause) for salt, cause in enumerate(BACKGROUND, start=1) if cause in table.given]
+
+
+def _overlap(first: Transmission, second: Transmission) -> bool:
+    return first.start < second.end - EARLY and second.start < first.end - EARLY
+
+
+def _share_a_band(first: Transmission, second: Transmission) -> bool:
+    return first.first_band < second.first_band + second.bands and second.first_band < first.first_band + first.bands

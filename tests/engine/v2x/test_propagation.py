@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from eidrive_scenario.v2x.counter_draws import uniform, uniforms
 from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.path_loss import Between, Tr37885, WinnerB1
@@ -24,8 +25,9 @@ D = np.array([10.0, 100.0, 1000.0])
 
 
 def between(state: int, distance: float, top: float = 3.0, lower: float = 1.6, upper: float = 1.6) -> Between:
-    values = (np.array([value]) for value in (lower, upper, top))
-    return Between(np.array([distance]), np.array([state]), *values, np.array([1 if state == NLOSV else 0]))
+    vehicles = np.array([1 if state == NLOSV else 0])
+    heights = [np.array([value]) for value in (lower, upper, top)]
+    return Between(np.array([distance]), np.array([state]), heights[0], heights[1], heights[2], vehicles)
 
 
 def test_tr_37_885_gives_the_vectors_of_ns_3() -> None:
@@ -82,7 +84,9 @@ def test_states_of_the_line_of_sight_differ_by_the_model_s_loss(environment: str
 def test_the_loss_by_vehicles_has_the_report_s_mean_and_spread() -> None:
     """Moments by the midpoint rule over the draws; the normal reading is cut at 0 dB, 2.3 % of it."""
     draws = (np.arange(20000) + 0.5) / 20000
-    many = Between(*(np.full(20000, value) for value in (60.0, NLOSV, 1.6, 1.6, 3.0)), np.ones(20000, dtype=np.int64))
+    one = np.ones(20000)
+    states = np.full(20000, NLOSV)
+    many = Between(60.0 * one, states, 1.6 * one, 1.6 * one, 3.0 * one, np.ones(20000, dtype=np.int64))
     for blockage, tolerance in (("lognormal", 0.01), ("normal", 0.06)):
         model = Tr37885.model_validate({"blockage": blockage})
         extra = model.loss(many, 5.9, draws) - urban_los(many.distance, 5.9)
@@ -143,3 +147,17 @@ def test_curves_of_packet_errors_fall_and_larger_packets_err_more() -> None:
             assert curve.at(np.array([3.0]), 2 * curve.size)[0] == pytest.approx(
                 1.0 - (1.0 - curve.at(np.array([3.0]), curve.size)[0]) ** 2
             )
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_one_packet_errs_as_many(name: str) -> None:
+    ratios = np.linspace(-5.0, 25.0, 301)
+    for size in (100.0, 350.0, 1400.0):
+        one_by_one = [CURVES[name].of(ratio, size) for ratio in ratios.tolist()]
+        assert one_by_one == pytest.approx(CURVES[name].at(ratios, size).tolist(), abs=1e-12)
+
+
+def test_one_draw_is_that_of_many_to_the_bit() -> None:
+    keys = np.array([0, 1, 2**63, 2**64 - 1, 0x9E3779B97F4A7C15], dtype=np.uint64)
+    for count in (-1, 0, 1, 12345678):
+        assert [uniform(key, count) for key in keys.tolist()] == uniforms(keys, count).tolist()

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.radio import budget, reception
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
@@ -120,6 +121,38 @@ def test_the_order_of_the_stations_does_not_matter(profile: dict[str, object]) -
     forth = fates(ROW)
     assert fates(dict(reversed(ROW.items()))) == forth
     assert len(forth) > 300
+
+
+def mixed_sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
+    """By the letters of the stations: open, behind a truck, or behind a building."""
+    states = np.array([(ord(first) + 2 * ord(second)) % 3 for first, second in pairs], dtype=np.int64)
+    heights = np.where(states == NLOSV, 3.0, -np.inf)
+    return SightLines(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
+
+
+@pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20)])
+@pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
+def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
+    monkeypatch: pytest.MonkeyPatch, profile: dict[str, object], path_loss: str, power: float
+) -> None:
+    def told() -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+        near = {name: (110.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCD")}
+        carrier = radio(3, **{"path_loss": {"kind": path_loss}, "tx_power_dbm": power, **profile, "jitter": 0.01})
+        return talk(carrier, near, 60, speed=9.0, sizes=(200, 900), sight=mixed_sight)
+
+    (few, heard_few) = told()
+    monkeypatch.setattr(budget, "FEW", 0)
+    monkeypatch.setattr(reception, "FEW", 0)
+    (many, heard_many) = told()
+    assert len(few) == len(many) > 400
+    assert len({event.reason for event in few}) > 2
+    for one, other in zip(few, many, strict=True):
+        assert replace(one, path_loss_db=None, snr_db=None) == replace(other, path_loss_db=None, snr_db=None)
+        if one.reason not in ("queue", "loss", "burst"):
+            assert (one.path_loss_db, one.snr_db) == pytest.approx((other.path_loss_db, other.snr_db), abs=1e-9)
+    assert [(name, at, said.arrived) for name, at, said in heard_few] == [
+        (name, at, said.arrived) for name, at, said in heard_many
+    ]
 
 
 @pytest.mark.parametrize("profile", PROFILES[:7:6], ids=["80211p", "cv2x"])
