@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from eidrive_scenario.errors import Problem, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
@@ -47,6 +48,14 @@ CRITERION = "criteria_"
 """Conditions with such names in the storyboard's stop trigger are criteria, as ScenarioRunner has them."""
 
 Place = tuple[str, ...]
+
+
+class Cast(NamedTuple):
+    """Who acts in a maneuver group: by name, which of them form selections, and whom its act selects."""
+
+    actors: Sequence[str]
+    selections: Sequence[Sequence[str]]
+    triggering: TriggeringEntities | None
 
 
 class Builder:
@@ -106,50 +115,48 @@ class Builder:
 
     def _group(self, group: model.ManeuverGroup, above: Place, triggering: TriggeringEntities) -> ManeuverGroupElement:
         path = (*above, group.name)
-        actors = [name for ref in group.actors.entity_ref for name in self._entities(ref.entity_ref)]
+        members = [self._entities(ref.entity_ref) for ref in group.actors.entity_ref]
+        selected = triggering if group.actors.select_triggering_entities else None
+        cast = Cast(
+            [name for names in members for name in names], [names for names in members if len(names) > 1], selected
+        )
         maneuvers = list(group.maneuver)
         for reference in group.catalog_reference:
             try:
                 maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver))
             except ScenarioError as error:
                 self._problems += error.problems
-        selected = triggering if group.actors.select_triggering_entities else None
-        children = [self._maneuver(maneuver, path, actors, selected) for maneuver in maneuvers]
+        children = [self._maneuver(maneuver, path, cast) for maneuver in maneuvers]
         return ManeuverGroupElement(self._stage, path, children, limit=group.maximum_execution_count)
 
-    def _maneuver(
-        self, maneuver: model.Maneuver, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
-    ) -> ManeuverElement:
+    def _maneuver(self, maneuver: model.Maneuver, above: Place, cast: Cast) -> ManeuverElement:
         path = (*above, maneuver.name)
-        events = tuple(self._event(event, path, actors, selected) for event in maneuver.event)
+        events = tuple(self._event(event, path, cast) for event in maneuver.event)
         for event in events:
             event.rivals = events
         return ManeuverElement(self._stage, path, events)
 
-    def _event(
-        self, event: model.Event, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
-    ) -> EventElement:
+    def _event(self, event: model.Event, above: Place, cast: Cast) -> EventElement:
         path = (*above, event.name)
         limit = 1 if event.maximum_execution_count is None else event.maximum_execution_count
         return EventElement(
             self._stage,
             path,
-            [self._action(action, path, actors, selected) for action in event.action],
+            [self._action(action, path, cast) for action in event.action],
             priority=event.priority.value,
             start=self._wait("start", event.start_trigger),
             limit=limit,
         )
 
-    def _action(
-        self, action: model.Action, above: Place, actors: Sequence[str], selected: TriggeringEntities | None
-    ) -> ActionElement:
+    def _action(self, action: model.Action, above: Place, cast: Cast) -> ActionElement:
         private = action.private_action is not None
         return ActionElement(
             self._stage,
             (*above, action.name),
             lambda actor: self._behaviours(action, actor),
-            actors if private else (None,),
-            triggering=selected if private else None,
+            cast.actors if private else (None,),
+            selections=cast.selections,
+            triggering=cast.triggering if private else None,
         )
 
     def _behaviours(self, wrapper: model.Element, actor: str | None) -> list[ActionBehaviour]:

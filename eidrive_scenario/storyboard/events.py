@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -59,7 +59,10 @@ class EventElement(StoryElement):
 
 
 class ActionElement(StoryElement):
-    """An Action: one behaviour per actor. `make(actor)` builds them, as the actors may be known only at the start."""
+    """An Action: one behaviour per actor. `make(actor)` builds them, as the actors may be known only at the start.
+
+    `selections` are the groups among the actors: of these it loses its domains together.
+    """
 
     kind = "action"
 
@@ -71,9 +74,11 @@ class ActionElement(StoryElement):
         actors: Sequence[str | None],
         *,
         triggering: TriggeringEntities | None = None,
+        selections: Sequence[Collection[str]] = (),
     ) -> None:
         super().__init__(stage, path)
         self._make = make
+        self._selections = selections
         self.triggering = triggering
         """Who acts beside the actors."""
         self._made: dict[str | None, list[ActionBehaviour]] = {}
@@ -113,6 +118,14 @@ class ActionElement(StoryElement):
             self.stage.release(behaviour)
         if not self.running and not actors:
             self._change(Transition.END, State.COMPLETE)
+
+    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+        """That one, and those of the entities with which its actor forms a selection among the actors."""
+        names = {held.actor_name for held in self.running if held is behaviour}
+        for members in self._selections:
+            if not names.isdisjoint(members):
+                names |= set(members)
+        return [held for held in self.running if held.actor_name in names]
 
     def displace(self, behaviour: Holder, why: str) -> None:
         """A younger action took the domain of this behaviour."""

@@ -46,6 +46,11 @@ class InitBlock(Composite):
             self.running.remove(behaviour)
         return True
 
+    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+        """Those of one action: of a selection, else the one alone."""
+        actions = [other.action for other in self.running if other is behaviour]
+        return [other for other in self.running if any(other.action is action for action in actions)]
+
     def displace(self, behaviour: Holder, why: str) -> None:
         """A younger action took the domain."""
         self.running = [other for other in self.running if other is not behaviour]

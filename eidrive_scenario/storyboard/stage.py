@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 from eidrive_scenario.driving.overrides import Override
@@ -37,6 +37,9 @@ class Absent(LookupError):
 
 class Occupant(Protocol):
     """Whoever holds a domain of an actor: it can be told that a younger action took it."""
+
+    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+        """The behaviours that lose their domains with this one, itself among them."""
 
     def displace(self, behaviour: Holder, why: str) -> None:
         """Let go of the domain."""
@@ -213,13 +216,17 @@ class Stage:
         self.appearances = {**self.appearances, name: appearance}
 
     def occupy(self, actor: str | None, domains: Domain, occupant: Occupant, holder: Holder) -> None:
-        """A behaviour begins to control domains of an actor; older ones on these domains end."""
+        """A behaviour begins to control domains of an actor; older ones on these domains end.
+
+        An older one of a selection of entities ends for all of them (ASAM OpenSCENARIO XML 1.3.1, 7.5.1).
+        """
         if actor is None or not domains:
             return
         for held, other_domains, other, behaviour in list(self._holders):
             if held == actor and other_domains & domains and behaviour.resource == holder.resource:
-                self._holders = [entry for entry in self._holders if entry[3] is not behaviour]
-                other.displace(behaviour, f"{holder.name} took over")
+                for loser in other.bound_to(behaviour):
+                    self.release(loser)
+                    other.displace(loser, f"{holder.name} took over")
         self._holders.append((actor, domains, occupant, holder))
 
     def release(self, holder: Holder) -> None:

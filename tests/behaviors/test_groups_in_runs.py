@@ -47,6 +47,37 @@ def test_a_group_acts_as_each_of_its_members(group: Any) -> None:
         assert [played.of(name, "speed")[-1] for name in CARS] == expected
 
 
+SLOW_DOWN = private(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>'
+    '<SpeedActionTarget><AbsoluteTargetSpeed value="6"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+)
+
+
+@pytest.mark.element("EntitySelection")
+def test_who_of_a_selection_is_taken_over_frees_all_of_it(group: Any) -> None:
+    """Conflict of one entity is conflict of all (7.5.1): from 10 to 6 m/s in 2 s, Third keeps the 8 m/s of half way."""
+    played = group(3, ("slow", SLOW_DOWN), ("Second", SPEED, after(0.95)))
+    assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
+
+
+def test_so_it_is_with_actions_of_init(group: Any) -> None:
+    init = f'<Private entityRef="slow">{SLOW_DOWN}</Private>'
+    played = group(3, ("Second", SPEED, after(0.95)), init=init)
+    assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
+
+
+def test_actors_that_are_named_one_by_one_are_taken_over_one_by_one(group: Any) -> None:
+    named = 'Second"/><EntityRef entityRef="Third'
+    played = group(3, (named, SLOW_DOWN), ("Second", SPEED, after(0.95)))
+    assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 6])
+
+
+def test_who_of_a_selection_is_deleted_leaves_the_others_to_it(group: Any) -> None:
+    delete = everywhere('<EntityAction entityRef="Second"><DeleteEntityAction/></EntityAction>')
+    played = group(3, ("slow", SLOW_DOWN), ("Ego", delete, after(0.95)))
+    assert played.of("Third", "speed")[-1] == pytest.approx(6)
+
+
 @pytest.mark.element("EntitySelection", "triggeringEntitiesRule")
 def test_a_group_triggers_by_any_or_all_of_its_members(group: Any) -> None:
     """At 10 m/s from s = 120 m and 300 m the group's first member has gone 3 m after 0.3 s, and both have."""
