@@ -12,6 +12,7 @@ from xml.parsers import expat
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.xml_lines import parse_numbered
 
 
 class WrittenInPython(Protocol):
@@ -108,7 +109,7 @@ def parse(content: bytes, name: str) -> etree._Element:
     _refuse_document_type(content, name)
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
-        root = etree.fromstring(content, parser)
+        root = parse_numbered(content, parser)
     except etree.XMLSyntaxError as error:
         raise ScenarioError(_not_well_formed(error.msg, error.lineno, name)) from error
     too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)

@@ -24,6 +24,7 @@ from eidrive_scenario.roads.reading.findings import Findings, line_of
 from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
+from eidrive_scenario.xml_lines import parse_numbered
 
 LARGEST = 256 * 1024 * 1024
 """Bytes of a file that is read at all."""
@@ -77,7 +78,7 @@ def _parse(text: bytes, source: str) -> etree._Element:
         resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_comments=True, remove_pis=True
     )
     try:
-        root = etree.fromstring(text, parser)
+        root = parse_numbered(text, parser)
     except etree.XMLSyntaxError as error:
         line = error.lineno if error.lineno else None
         raise RoadError(Problem(f"not well-formed XML: {error.msg}", "repair it there", source, line)) from error
