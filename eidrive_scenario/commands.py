@@ -20,12 +20,14 @@ CRITERION = "eidrive.criterion"
 
 def check_commands(scenario: Scenario) -> None:
     """Read every command of ours in the scenario. Raises ScenarioError with all that is wrong in them."""
+    declared = scenario.document.monitor_declarations
+    monitors = [one.name for one in declared.monitor_declaration] if declared is not None else []
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
         CHANNEL: lambda command: load_profile(
             command.content, (library_path() / "channels",), origin=command.source, line=command.line
         ),
         CRITERION: lambda command: parse_criteria(
-            command.content, source=command.source, line=command.line, entities=scenario.entities
+            command.content, source=command.source, line=command.line, entities=scenario.entities, monitors=monitors
         ),
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }

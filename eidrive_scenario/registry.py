@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from inspect import isabstract
 from typing import Any
 
 from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
@@ -40,15 +41,20 @@ class Registry:
         return self._points[name].value
 
     def load(self, name: str) -> Any:
-        """The extension of that name. Raises SettingError if there is none, RegistryError if it does not import."""
+        """The extension of that name. Raises SettingError if there is none, RegistryError if it does not import
+        or leaves out a method that its base class asks for."""
         point = self._points.get(name)
         if point is None:
             singular = self.kind.removesuffix("s")
             raise SettingError(Problem(f"unknown {singular} {name!r}", suggestion(name, self._points)))
         try:
-            return point.load()
+            found = point.load()
         except (ImportError, AttributeError) as error:
             raise RegistryError(f"{self.kind} {name!r} ({point.value}) does not load: {error}") from error
+        if isabstract(found):
+            missing = ", ".join(sorted(found.__abstractmethods__))
+            raise RegistryError(f"{self.kind} {name!r} ({point.value}) lacks {missing}")
+        return found
 
 
 @cache

@@ -229,7 +229,7 @@ class Simulation:
         )
 
     def _command_exit(self, command: CustomCommand) -> None:
-        self._exit = exit_verdict(command)
+        self._exit = exit_verdict(command, self.world.time)
 
     def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
         verdicts = [criterion.verdict() for criterion in self.criteria]

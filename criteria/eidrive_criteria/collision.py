@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
 
@@ -15,6 +16,12 @@ class CollisionSettings(CriterionSettings):
 
     of: str
     others: str | tuple[str, ...] | None = Field(default=None, alias="with")
+
+    @model_validator(mode="after")
+    def _not_itself(self) -> Self:
+        if self.others is not None and self.of in ((self.others,) if isinstance(self.others, str) else self.others):
+            raise ValueError(f"{self.of!r} cannot hit itself: name another actor in 'with'")
+        return self
 
 
 @dataclass(frozen=True)

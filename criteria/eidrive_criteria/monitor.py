@@ -25,6 +25,7 @@ class Monitor(Criterion):
     def __init__(self, settings: MonitorSettings) -> None:
         super().__init__(settings)
         self._settings = settings
+        self.monitors = (settings.of,)
         self._value: bool | None = None
         self._changed = 0.0
         self._violated: float | None = None

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, WorldView, never_appeared
 
@@ -17,6 +17,12 @@ class PairSettings(CriterionSettings):
     of: str
     to: str
     at_least: Annotated[float, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _two_actors(self) -> Self:
+        if self.of == self.to:
+            raise ValueError(f"of and to are both {self.of!r}: name two actors")
+        return self
 
 
 class PairCriterion(Criterion):

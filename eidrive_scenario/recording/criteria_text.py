@@ -35,11 +35,13 @@ def parse_criteria(
     source: str = "",
     line: int | None = None,
     entities: Collection[str] | None = None,
+    monitors: Collection[str] | None = None,
     taken: Collection[str] = (),
 ) -> list[Criterion]:
     """The criteria that a command's text declares, in its order.
 
     entities  names of the scenario's entities, to check the actors against
+    monitors  names of the scenario's monitors, to check those against that are read
     taken     names of criteria that the run already has; a criterion that would repeat one gets a number after it
 
     Raises SettingError with the file and line of every mistake.
@@ -55,7 +57,8 @@ def parse_criteria(
         here = lines.get("", line)
         try:
             criterion = _build(kind, settings, source, here, lines)
-            _check_subjects(criterion, entities, source, here)
+            _check_known(criterion, criterion.subjects, "entity", entities, source, here)
+            _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
         except SettingError as error:
             problems.extend(error.problems)
             continue
@@ -97,14 +100,21 @@ def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mappi
     return criterion
 
 
-def _check_subjects(criterion: Criterion, entities: Collection[str] | None, source: str, line: int | None) -> None:
-    unknown = [name for name in criterion.subjects if entities is not None and name not in entities]
+def _check_known(
+    criterion: Criterion,
+    names: Collection[str],
+    what: str,
+    known: Collection[str] | None,
+    source: str,
+    line: int | None,
+) -> None:
+    unknown = [name for name in names if known is not None and name not in known]
     if unknown:
         raise SettingError(
             [
                 Problem(
-                    f"{criterion.name} looks at {name!r}, which is no entity of this scenario",
-                    suggestion(name, entities or ()),
+                    f"{criterion.name} looks at {name!r}, which is no {what} of this scenario",
+                    suggestion(name, known) if known else "it declares none",
                     source,
                     line,
                 )

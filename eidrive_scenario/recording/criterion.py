@@ -5,7 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
+
+from pydantic import Field
 
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.settings import Settings
@@ -29,7 +31,7 @@ class Verdict:
 class CriterionSettings(Settings):
     """What every criterion may be told; a criterion's own settings add to it."""
 
-    name: str | None = None
+    name: Annotated[str, Field(min_length=1)] | None = None
     """What the verdict is called; the criterion's registered name where None."""
     fatal: bool = False
     """End the run as soon as this criterion has failed for good."""
@@ -48,6 +50,8 @@ class Criterion(ABC):
     fatal: bool = False
     subjects: tuple[str, ...] = ()
     """The actors that it cannot do without; whoever knows the scenario's entities checks them before the run."""
+    monitors: tuple[str, ...] = ()
+    """The MonitorDeclarations that it reads, checked in the same way."""
 
     def __init__(self, settings: CriterionSettings) -> None:
         if settings.name is not None:

@@ -50,6 +50,32 @@ def test_every_mistake_is_named_where_it_stands() -> None:
     ]
 
 
+def test_what_is_looked_at_has_to_be_there() -> None:
+    known = {"entities": ["Ego", "Incoming"], "monitors": ["CutIn"]}
+    assert problems("monitor: {of: CutInn}", **known) == [
+        "a.xosc:10: monitor looks at 'CutInn', which is no monitor of this scenario; did you mean 'CutIn'?"
+    ]
+    assert problems("monitor: {of: CutIn}", monitors=[]) == [
+        "a.xosc:10: monitor looks at 'CutIn', which is no monitor of this scenario; it declares none"
+    ]
+    assert len(parse_criteria("monitor: {of: CutIn}", entities=[], monitors=["CutIn"])) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("min_distance: {of: Ego, to: Ego}", "of and to are both 'Ego': name two actors"),
+        ("collision: {of: Ego, with: Ego}", "'Ego' cannot hit itself: name another actor in 'with'"),
+        ("collision: {of: Ego, with: [Incoming, Ego]}", "'Ego' cannot hit itself: name another actor in 'with'"),
+        ("max_speed: {of: Ego, at_most: 3, name: ''}", "setting 'name' is ''; string should have at least 1 character"),
+    ],
+)
+def test_settings_without_meaning(text: str, told: str) -> None:
+    (problem,) = problems(text)
+    assert problem.startswith("a.xosc:10: ")
+    assert told in problem
+
+
 def test_in_a_list_each_has_its_own_lines() -> None:
     text = "[collision: {off_: A},\n collision: {of: B},\n collision: {\n of: C, with: 3}]"
     assert [problem.split(": ")[0] for problem in problems(text)] == [

@@ -1,0 +1,47 @@
+"""Extensions by name, and what is told of those that are wrong."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from eidrive_scenario.errors import RegistryError, SettingError
+from eidrive_scenario.registry import Registry
+
+GROUP = "eidrive_scenario.criteria"
+
+
+def registry_of(**values: str) -> Registry:
+    return Registry("criteria", [EntryPoint(name, value, GROUP) for name, value in values.items()])
+
+
+def test_what_is_there_is_loaded_when_it_is_asked_for() -> None:
+    known = registry_of(collision="eidrive_criteria.collision:Collision", broken="no.such.module:Thing")
+    assert list(known) == ["broken", "collision"]
+    assert known.load("collision").name == "collision"
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("no.such.module:Thing", r"\(no\.such\.module:Thing\) does not load: No module named 'no'"),
+        ("eidrive_criteria.collision:Colision", "does not load: .* has no attribute 'Colision'"),
+        ("eidrive_scenario.recording.criterion:Criterion", "lacks observe, verdict"),
+    ],
+)
+def test_an_extension_that_cannot_work_is_named(value: str, told: str) -> None:
+    with pytest.raises(RegistryError, match=f"criteria 'mine' .*{told}"):
+        registry_of(mine=value).load("mine")
+
+
+def test_two_of_one_name_are_an_error_that_names_both() -> None:
+    points = [EntryPoint("mine", value, GROUP) for value in ("one:Thing", "two:Thing")]
+    with pytest.raises(RegistryError, match="two criteria are named 'mine': one:Thing and two:Thing"):
+        Registry("criteria", points)
+    assert list(Registry("criteria", points[:1] * 2)) == ["mine"], "one package found twice is no clash"
+
+
+def test_an_unknown_name_gets_the_nearest() -> None:
+    with pytest.raises(SettingError, match="did you mean 'collision'"):
+        registry_of(collision="eidrive_criteria.collision:Collision").load("colision")
