@@ -34,15 +34,33 @@ def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
 def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
     """Where the back one stands once the front one is at its place.
 
-    The coupler is at the hitch, and the trailer's reference point (its axle) follows the hitch like a wheel on a rod,
-    as a single-track model without slip has it. `straight` puts it in line.
+    The coupler is at the hitch, and the trailer's axle follows the hitch like a wheel on a rod, as a single-track model
+    without slip has it: at the reference point, with several axles where `bar` ends. `straight` puts it in line.
     """
     pose = front.motion.pose
     hitch, reach = _hitch(front), _coupler(back)
     x, y = pose.x + hitch * math.cos(pose.h), pose.y + hitch * math.sin(pose.h)
     before = back.motion.pose
-    heading = pose.h if straight else math.atan2(y - before.y, x - before.x)
+    behind = bar(back.entity, reach) - reach
+    rolling_x, rolling_y = before.x, before.y
+    if behind:
+        rolling_x, rolling_y = before.x - behind * math.cos(before.h), before.y - behind * math.sin(before.h)
+    heading = pose.h if straight else math.atan2(y - rolling_y, x - rolling_x)
     return Pose(x - reach * math.cos(heading), y - reach * math.sin(heading), pose.z, heading, pose.p, pose.r)
+
+
+def bar(entity: model.Element, reach: float) -> float:
+    """How far behind its coupler a trailer rolls as on a single axle [m]; with one, `reach`, at the reference point.
+
+    The coupler lets it turn, so that the side forces of its fixed axles, of slips in proportion to how each moves
+    sideways, have no moment about the coupler: at distances d behind it, that is Σd² / Σd.
+    """
+    if not isinstance(entity, model.Vehicle) or not entity.axles.additional_axle:
+        return reach
+    extra = [axle.position_x for axle in entity.axles.additional_axle if axle.max_steering == 0.0]
+    distances = [reach - x for x in (entity.axles.rear_axle.position_x, *extra)]
+    total = sum(distances)
+    return sum(d * d for d in distances) / total if total > 0.0 else reach
 
 
 def _hitch(actor: Actor) -> float:
