@@ -32,10 +32,14 @@ def whole(path: Path) -> Iterator[Path]:
     """Where to write a file that shall have its own name only once all of it is there.
 
     What was written before an error or an interruption is kept under the other name, so that nobody takes it for a
-    whole run; of wrong input nothing is kept. Raises SettingError if the place is a folder.
+    whole run; of wrong input nothing is kept. What is no plain file, such as /dev/stdout, is written as it is. Raises
+    SettingError if the place is a folder.
     """
     if path.is_dir():
         raise SettingError(Problem("cannot write: Is a directory", "choose another place", str(path)))
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        yield path
+        return
     unfinished = partial(path)
     try:
         yield unfinished

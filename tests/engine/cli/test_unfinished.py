@@ -90,3 +90,14 @@ def test_a_reader_that_has_enough_hears_no_complaint(passing_by: Path, arguments
     finally:
         os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_link_or_a_pipe_is_written_as_it_is(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    table, link, null = tmp_path / "table.csv", tmp_path / "link.csv", Path(os.devnull)
+    table.touch()
+    link.symlink_to(table)
+    assert eidrive("run", passing_by, "--csv", link).exit_code == 0
+    assert link.is_symlink()
+    assert table.read_text(encoding="utf-8").startswith("time,name,x")
+    assert eidrive("run", passing_by, "--csv", null).exit_code == 0
+    assert null.is_char_device()
