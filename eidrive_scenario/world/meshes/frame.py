@@ -43,16 +43,16 @@ class Frame:
 def add_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, *, axles: tuple[float, ...] = ()) -> None:
     """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side.
 
-    Without `axles`, those of all axles.
+    Without `axles` those of all axles: the body then hides what lies further in.
     """
     for x in axles or (frame.front, frame.rear):
         _add_pair(mesh, x, frame.wheel_radius, side, tyre)
-    if not axles:
-        add_extra_wheels(mesh, frame, side, tyre)
+    for axle in () if axles else frame.extra_axles:
+        _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, side, tyre)
 
 
 def add_extra_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, steered: float | None = None) -> None:
-    """The wheels of the further axles, on their own track, as far as that lies within y = ±side.
+    """The wheels of the further axles below a body, on their own track, as far as that lies within y = ±side.
 
     tyre  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
     """
