@@ -5,6 +5,9 @@ truck. All stations listen to all others, so each simulated second decides 398,0
 does for the radio: messages are given out, said and sent, and what became of them enters the hash of the trace. Times
 are those of the processor, summed over threads, and the least of some repetitions.
 
+Then whole runs: 200 scripted cars of a generated scenario send CAM, at 10 Hz or by the rules of ETSI, and one of them
+listens, or all do, each with fusion of its own. What stands between the antennas is drawn, or found by 19,900 rays.
+
     python benchmarks/bench_radio.py [--stations 200] [--seconds 3] [--technology 80211p] [--repetitions 3]
 """
 
@@ -15,12 +18,16 @@ import cProfile
 import pstats
 import time
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+from radio_scenes import write_scenario
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
@@ -95,6 +102,22 @@ def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[flo
     return time.process_time() - started, channel
 
 
+def whole_run(stations: int, seconds: float, rate: float | None, all_listen: bool, sight: str) -> float:
+    """Simulated seconds per second of the processor, loading and the books at the end aside."""
+    channel = (
+        f"{{model: radio, jitter: {TICK}, line_of_sight: {sight}, path_loss: {{kind: tr37885, environment: highway}}}}"
+    )
+    with TemporaryDirectory() as folder:
+        path = write_scenario(Path(folder), stations, rate=rate, all_listen=all_listen)
+        settings = RunSettings(dt=TICK, channel=channel, time_limit=seconds)
+        with Simulation(load_for_seed(path, 1, {}), seed=1, settings=settings) as simulation:
+            started = time.process_time()
+            end = None
+            while end is None:
+                frame, end = simulation.tick()
+            return frame.view.time / (time.process_time() - started)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -123,6 +146,19 @@ def main() -> None:
             profile = cProfile.Profile()
             profile.runcall(run, given.stations, given.seconds, technology, False)
             pstats.Stats(profile).sort_stats("tottime").print_stats(22)
+    if given.technology is not None:
+        return
+    print(f"whole runs with {given.stations} stations that send CAM, IEEE 802.11p")
+    for rate, all_listen, sight, seconds in (
+        (RATE, False, "random", 1.0),
+        (None, False, "random", 1.0),
+        (RATE, False, "rays", 0.5),
+        (RATE, True, "random", 0.3),
+    ):
+        best = max(whole_run(given.stations, seconds, rate, all_listen, sight) for _ in range(given.repetitions))
+        said = f"{rate:g} Hz" if rate is not None else "by the rules of ETSI"
+        what = f"{said}, {'all listen' if all_listen else 'one listens'}, line of sight {sight}"
+        print(f"  {what:58} {best:6.2f} times real time")
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
             return SightLines(np.full(count, LOS), np.full(count, -np.inf), {})
     origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
     states, heights = np.full(count, LOS), np.full(count, -np.inf)
-    found: list[list[str]] = [[] for _ in pairs]
+    found: dict[int, list[str]] = {}
     tops = view.centres[:, 2] + view.size[:, 2] / 2.0
     length = np.maximum(np.linalg.norm(targets - origins, axis=1), _BEYOND)
     begun = np.zeros(count)
@@ -71,15 +71,15 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
             name = view.names[row]
             if name == pairs[ray][1]:
                 continue  # the body of the other station, and nothing is between that and its antenna
-            if name != pairs[ray][0] and name not in found[ray]:
-                found[ray].append(name)
+            if name != pairs[ray][0] and name not in found.get(ray, ()):
+                found.setdefault(ray, []).append(name)
                 states[ray] = NLOSV
                 heights[ray] = max(heights[ray], tops[row])
             begun[ray] += fraction * (1.0 - begun[ray]) + _BEYOND / length[ray]
             if begun[ray] < 1.0:
                 going_on.append(ray)
         open_rays = np.array(going_on, dtype=np.int64)
-    return SightLines(states, heights, {ray: tuple(names) for ray, names in enumerate(found) if names})
+    return SightLines(states, heights, {ray: tuple(names) for ray, names in found.items()})
 
 
 def _ends(places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> tuple[list[Place], list[Place]]:

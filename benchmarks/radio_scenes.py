@@ -1,0 +1,98 @@
+"""A generated scenario of many stations: cars on a straight road of four lanes, each of which says where it is."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from pathlib import Path
+
+LENGTH = 2000.0
+"""Over which the cars are spread at the start [m]."""
+SPEED = 25.0
+"""[m/s]"""
+EGO = "Car000"
+"""It listens, in any case."""
+
+_LANE = (
+    '<lane id="{id}" type="driving" level="false"><link/><width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+    '<roadMark sOffset="0" type="broken" weight="standard" color="white" width="0.13" laneChange="both"/></lane>'
+)
+_CAR = """
+<ScenarioObject name="{name}">
+  <Vehicle name="car" vehicleCategory="car">
+    <BoundingBox><Center x="1.4" y="0" z="0.75"/><Dimensions width="1.8" length="4.5" height="1.5"/></BoundingBox>
+    <Performance maxSpeed="60" maxAcceleration="5" maxDeceleration="9"/>
+    <Axles>
+      <FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
+      <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/>
+    </Axles>
+    <Properties/>
+  </Vehicle>
+  <ObjectController><Controller name="{name}Stack"><Properties>
+    <Property name="module" value="eidrive"/><Property name="planner" value="none"/>
+    <Property name="detector" value="oracle"/><Property name="range" value="1"/>
+    <Property name="messages" value="cam"/><Property name="generation" value="{generation}"/>{rate}
+    <Property name="fusion" value="{fusion}"/><Property name="cooperates_with" value="{hears}"/>
+  </Properties></Controller></ObjectController>
+</ScenarioObject>"""
+_START = """
+<Private entityRef="{name}">
+  <PrivateAction><TeleportAction><Position>
+    <LanePosition roadId="1" laneId="{lane}" s="{s:g}"/>
+  </Position></TeleportAction></PrivateAction>
+  <PrivateAction><LongitudinalAction><SpeedAction>
+    <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
+    <SpeedActionTarget><AbsoluteTargetSpeed value="{speed:g}"/></SpeedActionTarget>
+  </SpeedAction></LongitudinalAction></PrivateAction>
+  <PrivateAction><ControllerAction><ActivateControllerAction lateral="false" longitudinal="false"/></ControllerAction>
+  </PrivateAction>
+</Private>"""
+
+
+def write_scenario(folder: Path, stations: int, *, rate: float | None, all_listen: bool) -> Path:
+    """The scenario in this folder, its road beside it.
+
+    The cars drive as scripted, without physics, so that what is measured are stations and radio. They have an oracle
+    that sees one metre far, as a CAM is of its sender alone.
+
+    rate        of the messages [Hz]; None: by the rules of ETSI for CAM
+    all_listen  whether every station hears all others, or the first one alone
+    """
+    road = folder / "straight.xodr"
+    sides = {
+        side: "".join(_LANE.format(id=lane) for lane in lanes)
+        for side, lanes in (("left", (2, 1)), ("right", (-1, -2)))
+    }
+    road.write_text(
+        '<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="6" name="straight"/>'
+        f'<road name="straight" length="{4.0 * LENGTH:g}" id="1" junction="-1" rule="RHT"><link/>'
+        '<type s="0" type="motorway"/><planView>'
+        f'<geometry s="0" x="0" y="0" hdg="0" length="{4.0 * LENGTH:g}"><line/></geometry></planView>'
+        f'<lanes><laneSection s="0"><left>{sides["left"]}</left>'
+        '<center><lane id="0" type="none" level="false"/></center>'
+        f"<right>{sides['right']}</right></laneSection></lanes></road></OpenDRIVE>"
+    )
+    names = [f"Car{number:03d}" for number in range(stations)]
+    generation = "etsi" if rate is None else "rate"
+    said = "" if rate is None else f'<Property name="message_rate" value="{rate:g}"/>'
+    cars = "".join(
+        _CAR.format(
+            name=name,
+            generation=generation,
+            rate=said,
+            hears="all" if all_listen or name == EGO else "none",
+            fusion="covariance_intersection" if all_listen or name == EGO else "average",
+        )
+        for name in names
+    )
+    starts = "".join(
+        _START.format(name=name, lane=lane, s=LENGTH * (1.5 + number / stations), speed=SPEED)
+        for number, (name, lane) in enumerate(zip(names, cycle((-2, -1, 1, 2)), strict=False))
+    )
+    scenario = folder / "stations.xosc"
+    scenario.write_text(
+        '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" '
+        f'author="eidrive-scenario" description="Many stations"/><CatalogLocations/><RoadNetwork>'
+        f'<LogicFile filepath="{road.name}"/></RoadNetwork><Entities>{cars}</Entities>'
+        f"<Storyboard><Init><Actions>{starts}</Actions></Init><StopTrigger/></Storyboard></OpenSCENARIO>"
+    )
+    return scenario
