@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from eidrive_scenario.errors import ConstraintError, InputError, Problem
 from eidrive_scenario.experiments.inspection import Findings, inspect_scenario
-from eidrive_scenario.openscenario import Unfolding, load_distribution, load_scenario
+from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import Combinations, Listed
+from eidrive_scenario.openscenario.lint import Level
+from eidrive_scenario.roads import RoadNetwork
 
 _MOST_LOADED = 1000
 """Runs that are read; the file of a distribution may list more values."""
+_SPREAD = 100
+"""Runs that are read besides, spread over all combinations."""
 _FIRST_DRAWS = 20
 
 
@@ -27,7 +33,8 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
     """Read a distribution, its scenario, and the scenario with each value that the distribution lists.
 
     Every listed value is in one of the runs that are read, with the first value of all other parameters; so are the
-    ends of each range, and the first draws. A run that constraints rule out is a warning, as it will be left out.
+    ends of each range, and the first draws. A run that constraints rule out is a warning, as it will be left out. What
+    the rules find in these runs and in some more all over, and not in the scenario alone, is told with a run's number.
     """
     try:
         unfolding = load_distribution(path)
@@ -37,21 +44,61 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
     if alone.problems:
         known = (*unfolding.warnings, *alone.warnings)
         return DistributionFindings(alone.problems, known, len(unfolding), notes=alone.notes)
-    problems: dict[Problem, None] = {}
-    warnings = dict.fromkeys((*unfolding.warnings, *alone.warnings))
+    found = _Gathered(alone, unfolding.warnings, ignored)
     telling = sorted(set(_telling(unfolding)))
     for number in telling[:_MOST_LOADED]:
-        try:
-            load_scenario(unfolding.scenario, unfolding[number].assignments)
-        except ConstraintError as error:
-            left_out = (replace(one, remedy=f"{one.remedy}; such runs are left out") for one in error.problems)
-            warnings.update(dict.fromkeys(left_out))
-        except InputError as error:
-            problems.update(dict.fromkeys(error.problems))
+        found.read(unfolding[number], every_value=True)
+    for number in unfolding.spread(_SPREAD):
+        found.read(unfolding[number], every_value=False)
     if len(telling) > _MOST_LOADED:
         unread = f"{len(telling) - _MOST_LOADED} of the listed values were not tried"
-        warnings[Problem(unread, "run them", unfolding.source)] = None
-    return DistributionFindings(tuple(problems), tuple(warnings), len(unfolding), notes=alone.notes)
+        found.told[Level.WARNING][Problem(unread, "run them", unfolding.source)] = None
+    problems, warnings, notes = (tuple(found.told[level]) for level in (Level.ERROR, Level.WARNING, Level.NOTE))
+    return DistributionFindings(problems, warnings, len(unfolding), notes=notes)
+
+
+class _Gathered:
+    """What is found in one run after the other; of each rule at each place once."""
+
+    def __init__(self, alone: Findings, warnings: Iterable[Problem], ignored: Collection[str]) -> None:
+        self.told: dict[Level, dict[Problem, None]] = {
+            Level.ERROR: {},
+            Level.WARNING: dict.fromkeys((*warnings, *alone.warnings)),
+            Level.NOTE: dict.fromkeys(alone.notes),
+        }
+        self._ignored = ignored
+        self._known = {_place(problem) for problem in (*alone.warnings, *alone.notes) if problem.rule}
+        self._load = cache(RoadNetwork.load)
+        self._read: set[int] = set()
+
+    def read(self, run: ConcreteRun, *, every_value: bool) -> None:
+        """Read the scenario of a run, and ask the rules; with `every_value` each value that is refused is told."""
+        if run.number in self._read:
+            return
+        self._read.add(run.number)
+        try:
+            scenario = load_scenario(run.scenario, run.assignments)
+        except InputError as error:
+            self._refused(error, every_value)
+            return
+        for level, problem in broken_rules(scenario, self._ignored, self._load):
+            if _place(problem) not in self._known:
+                self._known.add(_place(problem))
+                self.told[level][replace(problem, message=f"in run {run.number}: {problem.message}")] = None
+
+    def _refused(self, error: InputError, every_value: bool) -> None:
+        """A run that cannot be played; of one that was read besides only what is new."""
+        known = {_place(problem) for told in self.told.values() for problem in told}
+        problems = [one for one in error.problems if every_value or _place(one) not in known]
+        if isinstance(error, ConstraintError):
+            left_out = (replace(one, remedy=f"{one.remedy}; such runs are left out") for one in problems)
+            self.told[Level.WARNING].update(dict.fromkeys(left_out))
+        else:
+            self.told[Level.ERROR].update(dict.fromkeys(problems))
+
+
+def _place(problem: Problem) -> tuple[str, str, int | None]:
+    return problem.rule, problem.source, problem.line
 
 
 def _telling(unfolding: Unfolding) -> Iterator[int]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
 
 from eidrive_scenario.errors import InputError, Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
@@ -13,10 +14,13 @@ from eidrive_scenario.storyboard.lint import ROAD_RULES, RoadSurvey
 ALL_RULES: tuple[Rule[RoadSurvey], ...] = (*RULES, *ROAD_RULES)
 
 
-def broken_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Problem]]:
+def broken_rules(
+    scenario: Scenario, ignored: Collection[str] = (), load: Callable[[Path], RoadNetwork] = RoadNetwork.load
+) -> Iterator[tuple[Level, Problem]]:
     """What the rules find, but for those whose names are ignored; without those on roads where these cannot be read.
 
-    Raises SettingError if a rule is to be ignored that does not exist.
+    `load` reads the road file; who asks about many scenarios on one map may keep it. Raises SettingError if a rule is
+    to be ignored that does not exist.
     """
     known = {rule.name for rule in ALL_RULES}
     for name in ignored:
@@ -25,7 +29,7 @@ def broken_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[
     chosen = ALL_RULES
     roads = None
     try:
-        roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+        roads = load(scenario.road_file) if scenario.road_file else None
     except InputError:
         chosen = RULES
     survey = RoadSurvey(scenario, roads)

@@ -72,6 +72,15 @@ def test_a_cut_in_at_a_gap_of_less_than_nothing_never_begins() -> None:
     )
 
 
+def test_check_tells_of_such_runs() -> None:
+    """In the others the condition can hold."""
+    path = next(path for path in distributions() if path.name == LARGEST)
+    (told,) = (one for one in inspect_distribution(path).warnings if one.rule == "impossible-condition")
+    number, _, what = told.message.removeprefix("in run ").partition(": ")
+    assert load_distribution(path)[int(number)].parameters[TRIGGER] == "0"
+    assert what.startswith("condition 'CutInStartCondition' never counts as true: a distance is never negative")
+
+
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
 def test_every_value_makes_a_scenario(path: Path) -> None:
     """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""

@@ -166,6 +166,21 @@ class TestCheck:
         ) in lines
         assert lines[-1] == "1 file, 2 problems, 1 warning"
 
+    def test_what_the_rules_say_of_single_runs_alone(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
+        """The time is never below 0; with an End of 1 s it is at first."""
+        path = vary(values("OtherY", "5", "4"), values("End", "1", "0"))
+        scenario = path.with_name("passing_by.xosc")
+        text = scenario.read_text(encoding="utf-8")
+        late = text.replace('value="$End" rule="greaterOrEqual"', 'value="$End" rule="lessThan"')
+        assert late != text
+        scenario.write_text(late, encoding="utf-8")
+        result = eidrive("check", path)
+        told = [line for line in result.stdout.splitlines() if "impossible-condition" in line]
+        assert len(told) == 1
+        assert "in run 1: simulation time < 0 s never counts as true" in told[0]
+        assert result.exit_code == 0
+        assert "impossible-condition" not in eidrive("check", path, "--ignore", "impossible-condition").stdout
+
     def test_a_mistake_in_the_scenario_is_told_once(self, eidrive: Eidrive, vary: Callable[..., Path]) -> None:
         path = vary(values("OtherY", "5"))
         scenario = path.with_name("passing_by.xosc")
