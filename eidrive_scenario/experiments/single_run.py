@@ -118,11 +118,18 @@ def _attachments(path: Path, scenario: Scenario) -> dict[str, bytes]:
 
 
 def recording_in(place: Path) -> Path:
-    """The recording in a run's folder, or what there is of one whose run did not end; a file as it is."""
+    """The recording in a run's folder, or what there is of one whose run did not end; a file as it is.
+
+    Raises InputError for a folder without one.
+    """
     if not place.is_dir():
         return place
-    path = place / RECORDING
-    return partial(path) if partial(path).exists() and not path.exists() else path
+    for path in (place / RECORDING, partial(place / RECORDING)):
+        if path.exists():
+            return path
+    below = sorted(place.rglob(RECORDING))
+    remedy = f"there is one in {below[0].parent}" if below else "eidrive run … --out DIR records"
+    raise InputError(Problem(f"no {RECORDING} in this folder", remedy, str(place)))
 
 
 def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:

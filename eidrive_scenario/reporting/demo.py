@@ -37,6 +37,7 @@ from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.recording.output import create
 from eidrive_scenario.reporting.demo_page import CameraPicture, Place, write_demo
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.road_drawing import road_drawing
@@ -101,9 +102,9 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
 
 def write_results(out: Path, runs: Sequence[tuple[Job, RunResult]]) -> Path:
     """All results as JSON, one object a run as `--json` prints it, one line each. Returns `out`."""
-    out.parent.mkdir(parents=True, exist_ok=True)
     lines = (as_json_text(replace(result, scenario=job.scenario)) for job, result in runs)
-    out.write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
+    with create(out) as stream:
+        stream.write(("[\n" + ",\n".join(lines) + "\n]\n").encode())
     return out
 
 
@@ -139,6 +140,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.seeds < 1 or (given.workers is not None and given.workers < 1):
         parser.error("--seeds and --workers need at least 1")
+    if given.out.is_dir() or any(above.exists() and not above.is_dir() for above in given.out.parents):
+        parser.error(f"--out {given.out} is no place for a page; name a file, such as reports/demo.html")
     try:
         demo(given.out, range(1, given.seeds + 1), given.workers, Console())
     except EidriveError as error:

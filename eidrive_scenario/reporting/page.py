@@ -9,6 +9,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from eidrive_scenario.recording.output import create
+
 
 @cache
 def _environment() -> Environment:
@@ -27,9 +29,12 @@ def render_page(template: str, **values: Any) -> str:
 
 
 def write_page(out: Path, template: str, **values: Any) -> Path:
-    """Render a template into the file `out`, whose folder is made if it is missing. Returns `out`."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(render_page(template, **values), encoding="utf-8")
+    """Render a template into the file `out`, whose folder is made if it is missing. Returns `out`.
+
+    Raises SettingError if it cannot be written.
+    """
+    with create(out) as stream:
+        stream.write(render_page(template, **values).encode())
     return out
 
 

@@ -66,6 +66,23 @@ def test_view_writes_a_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) 
     assert "<html" in page.read_text(encoding="utf-8")
 
 
+def test_view_of_a_folder_above_those_of_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    result = eidrive("view", tmp_path)
+    assert result.exit_code == 2
+    assert f"{tmp_path}: no recording.mcap in this folder; eidrive run … --out DIR records" in result.stderr
+    eidrive("run", passing_by, "--out", tmp_path / "one")
+    assert f"; there is one in {tmp_path / 'one'}" in eidrive("view", tmp_path).stderr
+
+
+def test_a_page_that_cannot_be_written(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path)
+    (tmp_path / "file").touch()
+    for arguments in (("view", tmp_path, "-o", tmp_path), ("report", tmp_path, "-o", tmp_path / "file")):
+        result = eidrive(*arguments)
+        assert result.exit_code == 2, result.output
+        assert "cannot write" in result.stderr
+
+
 def test_view_of_no_recording(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("view", passing_by)
     assert result.exit_code == 2
