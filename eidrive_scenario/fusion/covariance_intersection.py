@@ -62,9 +62,12 @@ class CovarianceIntersectionFusion(FusionMethod):
         self._memory.hear(report)
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
+        self._memory.forget(now)
         tracks = self._memory.tracks()
         names = self._memory.stations
-        rank = {name: place for place, name in enumerate(sorted({report.station for report in reports}))}
+        rank: dict[str | None, int] = {
+            name: place for place, name in enumerate(sorted({report.station for report in reports}))
+        }
         station = np.array([rank.get(name, -1) for name in names], dtype=np.int64)[tracks["station"]]
         rows = np.flatnonzero((station >= 0) & (now - tracks["seen"] <= self.settings.max_age + TIME_TOLERANCE))
         if not len(rows):

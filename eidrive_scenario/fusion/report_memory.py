@@ -43,18 +43,46 @@ class ReportMemory:
 
     def __init__(self, span: float, gate: Gate) -> None:
         self.span = span
-        self.stations: list[str] = []
-        """In the order in which they were first heard; rows of `tracks` name them by their place here."""
+        self.stations: list[str | None] = []
+        """Rows of `tracks` name a station by its place here; places of those who are forgotten are None, or reused."""
         self._gate = gate
         self._tracks: Table = np.zeros(0, TRACK)
         self._histories: list[_History] = []
+        self._places: dict[str, int] = {}
 
     def hear(self, report: Report) -> None:
         """Remember a report; it enters the tracks when they are next asked for."""
-        if report.station not in self.stations:
-            self.stations.append(report.station)
-            self._histories.append(_History())
-        self._histories[self.stations.index(report.station)].new.append(report)
+        place = self._places.get(report.station)
+        if place is None:
+            place = self._places[report.station] = self._free_place(report.station)
+        self._histories[place].new.append(report)
+
+    def forget(self, now: float) -> None:
+        """Drop the stations that have been silent for so long that nothing of what is known of them can count again.
+
+        What is older than `span` is not used, and no newer report can continue a track that ended `span` before it.
+        """
+        silent = [
+            place
+            for place in self._places.values()
+            if not (history := self._histories[place]).new
+            and (not history.entries or history.entries[-1].report.detections.time < now - 2.0 * self.span)
+        ]
+        for place in silent:
+            name = self.stations[place]
+            assert name is not None
+            del self._places[name]
+            self.stations[place], self._histories[place] = None, _History()
+            self._tracks = self._tracks[self._tracks["station"] != place]
+
+    def _free_place(self, station: str) -> int:
+        if None in self.stations:
+            place = self.stations.index(None)
+            self.stations[place] = station
+            return place
+        self.stations.append(station)
+        self._histories.append(_History())
+        return len(self.stations) - 1
 
     def tracks(self) -> Table:
         """What all reports so far say, a row for each object of each station, as of its station's newest report."""

@@ -110,3 +110,41 @@ def test_the_memory_stays_small(report: Make) -> None:
         memory.tracks()
     assert len(memory._histories[0].entries) <= 22
     assert len(memory.tracks()) == 1
+
+
+def test_stations_that_have_gone_are_forgotten_and_nobody_notices(
+    report: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A new car passes every second, for a minute; one station comes back after a while, late and out of order."""
+    rng = generator(1, "passers-by")
+    heard: list[tuple[float, Report]] = []
+    for tick in range(1200):
+        time = 0.05 * tick
+        for number in range(60):
+            if number <= time < number + 3.0 or (number == 2 and time > 30.0):
+                place = (10.0 * time + rng.normal(0.0, 0.2), 8.0 * (number % 3))
+                said = report(f"car {number}", time, [place], velocity=(math.nan, math.nan))
+                heard.append((time + rng.uniform(0.0, 0.4), said))
+    heard.sort(key=lambda entry: entry[0])
+
+    def fused() -> tuple[list[Detections], CovarianceIntersectionFusion]:
+        fusion = CovarianceIntersectionFusion()
+        pictures, newest, waiting = [], {}, list(reversed(heard))
+        for tick in range(1200):
+            now = 0.05 * tick
+            while waiting and waiting[-1][0] <= now:
+                said = waiting.pop()[1]
+                fusion.hear(said)
+                newest[said.station] = max(said, newest.get(said.station, said), key=lambda one: one.detections.time)
+            pictures.append(fusion.fuse(list(newest.values()), now))
+        return pictures, fusion
+
+    forgetting, fusion = fused()
+    assert len(fusion._memory.stations) < 12
+    assert len(fusion._memory.tracks()) < 12
+    monkeypatch.setattr(ReportMemory, "forget", lambda memory, now: None)
+    remembering, fusion = fused()
+    assert len(fusion._memory.stations) == 60
+    assert max(map(len, forgetting)) > 2
+    for one, other in zip(forgetting, remembering, strict=True):
+        assert_equal(one, other)
