@@ -2,9 +2,9 @@
 
 A tick (`play`) begins with the actions that the last step brought to their goal: they end, and with them, from the
 bottom up, what has nothing left to do. Then two phases take turns. The triggers judge (`judge`): elements stop and
-start, from the top down, as far as they come. The running actions decide on the next step (py_trees' `tick`), each
-once; those that only set a value end at once. Where a phase changed a state the triggers judge again, so that a chain
-of elements falls through in one tick: no transition consumes simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1).
+start, from the top down, as far as they come. The running actions decide on the next step (`decide`), each once; those
+that only set a value end at once. Where a phase changed a state the triggers judge again, so that a chain of elements
+falls through in one tick: no transition consumes simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1).
 An element starts at most once in a tick, which bounds the turns.
 """
 
@@ -69,15 +69,16 @@ class StoryElement(Composite):
 
         A stop trigger is asked from the tick after the start on, that of the storyboard from the first tick.
         """
+        record = self.record
+        if record.state is State.COMPLETE:
+            return
         tried = self._tried_at == self.stage.progress.tick
-        if self.state is State.RUNNING and self.stop_leaf is not None and not tried:
-            self.stop_leaf.tick_once()
-            if self.stop_leaf.status is Status.SUCCESS:
-                self.halt(self.stop_leaf.trigger.why)
-                return
-        if self.state is State.STANDBY and not tried and self._may_start():
+        if record.state is State.RUNNING and not tried and self.stop_leaf is not None and self.stop_leaf.fires():
+            self.halt(self.stop_leaf.trigger.why)
+            return
+        if record.state is State.STANDBY and not tried and (self.start_leaf is None or self.start_leaf.fires()):
             self.begin(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
-        if self.state is State.RUNNING:
+        if record.state is State.RUNNING:
             for element in self.elements:
                 element.judge()
 
@@ -112,16 +113,20 @@ class StoryElement(Composite):
                 element.arrive()
             self.settle()
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Second phase of a turn: the running children tick; all of them complete, so is this one."""
+    def decide(self) -> None:
+        """Second phase of a turn: the running children decide; all of them complete, so is this one."""
         self.status = Status.RUNNING
-        if self.state is State.RUNNING:
+        if self.record.state is State.RUNNING:
             for element in self.elements:
-                if element.state is State.RUNNING:
-                    yield from element.tick()
+                if element.record.state is State.RUNNING:
+                    element.decide()
             self.settle()
-        if self.state is State.COMPLETE:
+        if self.record.state is State.COMPLETE:
             self.status = Status.SUCCESS
+
+    def tick(self) -> Iterator[Behaviour]:
+        """`decide` as py_trees asks for it."""
+        self.decide()
         yield self
 
     def settle(self) -> None:
@@ -138,12 +143,6 @@ class StoryElement(Composite):
             if leaf is not None:
                 leaf.stop(Status.INVALID)
         self._change(None, State.STANDBY)
-
-    def _may_start(self) -> bool:
-        if self.start_leaf is None:
-            return True
-        self.start_leaf.tick_once()
-        return self.start_leaf.status is Status.SUCCESS
 
     def _change(self, transition: Transition | None, after: State, why: str = "") -> None:
         self.stage.progress.change(self.record, transition, after, why)
@@ -173,7 +172,7 @@ class StoryboardElement(StoryElement):
             if init is not None:
                 init.tick_once()
                 init = None
-            self.tick_once()
+            self.decide()
 
     def settle(self) -> None:
         """End with the last story, if nothing else would end the storyboard."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
@@ -111,8 +110,7 @@ class ActionElement(StoryElement):
             behaviour.stop(Status.INVALID)
             self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
-                for _ in self._decide(behaviour):
-                    pass
+                self._let_decide(behaviour)
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
             self.stage.release(behaviour)
@@ -152,7 +150,7 @@ class ActionElement(StoryElement):
             there, self._there = self._there, []
             self._let_go(there)
 
-    def tick(self) -> Iterator[Behaviour]:
+    def decide(self) -> None:
         """The behaviours decide, once per tick; what they bring about shows at the end of the step: there they end."""
         self.status = Status.RUNNING
         now = self.stage.progress.tick
@@ -160,18 +158,17 @@ class ActionElement(StoryElement):
             self._decided_at = now
             done: list[ActionBehaviour] = []
             for behaviour in tuple(self.running):
-                yield from self._decide(behaviour)
+                self._let_decide(behaviour)
                 if behaviour.status in (Status.SUCCESS, Status.FAILURE):
                     (done if behaviour.immediate else self._there).append(behaviour)
             self.stage.arriving = self.stage.arriving or bool(self._there)
             self._let_go(done)
         if self.state is State.COMPLETE:
             self.status = Status.SUCCESS
-        yield self
 
-    def _decide(self, behaviour: ActionBehaviour) -> Iterator[Behaviour]:
+    def _let_decide(self, behaviour: ActionBehaviour) -> None:
         try:
-            yield from behaviour.tick()
+            behaviour.tick_once()
         except Absent as who:
             self.displace(behaviour, behaviour.give_up(who))
 

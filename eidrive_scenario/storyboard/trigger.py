@@ -167,3 +167,9 @@ class WaitFor(py_trees.behaviour.Behaviour):
     def update(self) -> Status:
         """Ask the trigger."""
         return Status.SUCCESS if self.trigger.evaluate(self.stage) else Status.RUNNING
+
+    def fires(self) -> bool:
+        """What `tick_once` does, without its ceremony: triggers are asked in every tick of a run."""
+        self.initialise()
+        self.status = self.update()
+        return self.status is Status.SUCCESS
