@@ -31,7 +31,14 @@ from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
-from eidrive_scenario.storyboard.condition import Condition, EntityCondition, Measure, compares, in_words
+from eidrive_scenario.storyboard.condition import (
+    Condition,
+    EntityCondition,
+    Measure,
+    QuantityCondition,
+    compares,
+    in_words,
+)
 from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.environments import changed as changed_environment
@@ -103,6 +110,7 @@ __all__ = [
     "Pose",
     "Problem",
     "Progress",
+    "QuantityCondition",
     "Readings",
     "Received",
     "Report",

@@ -145,3 +145,31 @@ class EntityCondition(Condition):
     def describe_for(self) -> str:
         """The condition in words, without values."""
         return type(self.element).__name__
+
+
+class QuantityCondition(EntityCondition):
+    """A condition that compares a quantity of each entity with a limit."""
+
+    def holds_for(self, stage: Stage, entity: str) -> bool:
+        """Compare it."""
+        rule, limit = self.threshold()
+        return compares(self.quantity(stage, entity), rule, limit)
+
+    def explain_for(self, stage: Stage, entity: str) -> str:
+        """The quantity, the rule and the limit."""
+        rule, limit = self.threshold()
+        value = f"{self.quantity(stage, entity):.2f} {self.unit}"
+        return f"{entity}: {self.what()} {value} {in_words(rule)} {limit:g} {self.unit}"
+
+    def describe_for(self) -> str:
+        """The quantity by its name, the rule and the limit."""
+        rule, limit = self.threshold()
+        return f"{self.what()} {in_words(rule)} {limit:g} {self.unit}"
+
+    def what(self) -> str:
+        """What the quantity is called."""
+        return type(self.element).__name__
+
+    @abstractmethod
+    def quantity(self, stage: Stage, entity: str) -> float:
+        """What it compares for this entity, which is in the world; NaN where that is undefined now."""

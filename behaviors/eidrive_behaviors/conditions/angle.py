@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 
-from eidrive_scenario.api import EntityCondition, Pose, Stage, model, wrap_angle
+from eidrive_scenario.api import Pose, QuantityCondition, Stage, model, wrap_angle
 
 
 def angle_of(stage: Stage, entity: str, kind: model.AngleType) -> float:
@@ -36,19 +37,15 @@ def _of(pose: Pose, kind: model.AngleType) -> float:
     return {model.AngleType.HEADING: pose.h, model.AngleType.PITCH: pose.p, model.AngleType.ROLL: pose.r}[kind]
 
 
-class AngleCondition(EntityCondition):
-    """An angle of the entity lies within a tolerance of a value [rad]."""
+class AngleWithin(QuantityCondition):
+    """An angle of the entity lies within a tolerance of a value [rad]; compared is how far it is from that."""
 
-    element: model.AngleCondition
+    element: model.AngleCondition | model.RelativeAngleCondition
     unit = "rad"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare it, the short way round the circle."""
-        return self.quantity(stage, entity) <= self.element.angle_tolerance
-
     def quantity(self, stage: Stage, entity: str) -> float:
-        """How far the angle is from the value."""
-        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle))
+        """How far the angle is from the value, the short way round the circle."""
+        return abs(wrap_angle(self.angle(stage, entity) - self.element.angle))
 
     def threshold(self) -> tuple[model.Rule, float]:
         """At most the tolerance."""
@@ -56,47 +53,44 @@ class AngleCondition(EntityCondition):
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The angle."""
-        return f"{entity}: {self.describe_for()}, it is {wrap_angle(self._angle(stage, entity)):.3f} rad"
+        return f"{entity}: {self.describe_for()}, it is {wrap_angle(self.angle(stage, entity)):.3f} rad"
 
     def describe_for(self) -> str:
         """Value and tolerance."""
-        what = self.element.angle_type.value
-        return f"{what} {self.element.angle:g} ± {self.element.angle_tolerance:g} rad"
+        return f"{self.what()} {self.element.angle:g} ± {self.element.angle_tolerance:g} rad"
 
-    def _angle(self, stage: Stage, entity: str) -> float:
+    @abstractmethod
+    def angle(self, stage: Stage, entity: str) -> float:
+        """The angle; NaN where there is none now."""
+
+
+class AngleCondition(AngleWithin):
+    """An angle to the axes of a coordinate system."""
+
+    element: model.AngleCondition
+
+    def what(self) -> str:
+        """Which angle."""
+        return str(self.element.angle_type.value)
+
+    def angle(self, stage: Stage, entity: str) -> float:
+        """The angle to the axes at the entity."""
         kind = self.element.angle_type
         return angle_of(stage, entity, kind) - reference_of(stage, entity, kind, self.element.coordinate_system)
 
 
-class RelativeAngleCondition(EntityCondition):
-    """An angle of the entity less that of another entity lies within a tolerance of a value [rad]."""
+class RelativeAngleCondition(AngleWithin):
+    """An angle of the entity less that of another one."""
 
     element: model.RelativeAngleCondition
-    unit = "rad"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare it, the short way round the circle."""
-        return self.quantity(stage, entity) <= self.element.angle_tolerance
+    def what(self) -> str:
+        """Which angle, and to whom."""
+        return f"{self.element.angle_type.value} to {self.element.entity_ref}"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
-        """How far the angle is from the value."""
+    def angle(self, stage: Stage, entity: str) -> float:
+        """The difference."""
         if self.element.entity_ref not in stage.view:
             return math.nan
-        return abs(wrap_angle(self._angle(stage, entity) - self.element.angle))
-
-    def threshold(self) -> tuple[model.Rule, float]:
-        """At most the tolerance."""
-        return model.Rule.LESS_OR_EQUAL, self.element.angle_tolerance
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The angle."""
-        return f"{entity}: {self.describe_for()}, it is {wrap_angle(self._angle(stage, entity)):.3f} rad"
-
-    def describe_for(self) -> str:
-        """Value and tolerance."""
-        what = f"{self.element.angle_type.value} to {self.element.entity_ref}"
-        return f"{what} {self.element.angle:g} ± {self.element.angle_tolerance:g} rad"
-
-    def _angle(self, stage: Stage, entity: str) -> float:
         kind = self.element.angle_type
         return angle_of(stage, entity, kind) - angle_of(stage, self.element.entity_ref, kind)

@@ -6,13 +6,11 @@ import math
 
 from eidrive_scenario.api import (
     Absent,
-    EntityCondition,
     Place,
+    QuantityCondition,
     Stage,
-    compares,
     distance,
     frame_of,
-    in_words,
     kind_of,
     model,
     resolve,
@@ -55,72 +53,44 @@ def place_of(stage: Stage, position: model.Position, entity: str) -> Place | Non
         return None
 
 
-class DistanceCondition(EntityCondition):
+class DistanceCondition(QuantityCondition):
     """Distance to a position [m]; positions relative to entities move with them."""
 
     element: model.DistanceCondition
     unit = "m"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare its amount."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The distance."""
-        value = self.quantity(stage, entity)
-        return f"{entity}: distance {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"distance to {self._target()} {in_words(self.element.rule)} {self.element.value:g} m"
+    def what(self) -> str:
+        """What is compared."""
+        return f"distance to {type(self.element.position.chosen()).__name__}"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The amount of the distance."""
         place = place_of(stage, self.element.position, entity)
         return math.nan if place is None else abs(measured(stage, entity, place, self.element))
 
-    def _target(self) -> str:
-        return type(self.element.position.chosen()).__name__
 
-
-class RelativeDistanceCondition(EntityCondition):
+class RelativeDistanceCondition(QuantityCondition):
     """Distance to another entity [m]."""
 
     element: model.RelativeDistanceCondition
     unit = "m"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare its amount."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The distance."""
-        value = self.quantity(stage, entity)
-        return f"{entity}: {self._what()} {value:.2f} m {in_words(self.element.rule)} {self.element.value:g} m"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"{self._what()} {in_words(self.element.rule)} {self.element.value:g} m"
-
     def quantity(self, stage: Stage, entity: str) -> float:
         """The amount of the distance."""
         return abs(measured(stage, entity, self.element.entity_ref, self.element))
 
-    def _what(self) -> str:
+    def what(self) -> str:
+        """Which distance, and to whom."""
         gap = " free" if self.element.freespace else ""
         kind = kind_of(self.element.relative_distance_type).removesuffix("Distance").replace("euclidian", "straight")
         return f"{kind}{gap} distance to {self.element.entity_ref}"
 
 
-class ReachPositionCondition(EntityCondition):
+class ReachPositionCondition(QuantityCondition):
     """Within a tolerance [m] of a position, seen from above."""
 
     element: model.ReachPositionCondition
     unit = "m"
-
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the distance between the reference point and the position."""
-        return self.quantity(stage, entity) <= self.element.tolerance
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """The distance."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import EntityCondition, Stage, compares, in_words, model
+from eidrive_scenario.api import QuantityCondition, Stage, model
 from eidrive_scenario.api import WorldView as View
 
 
@@ -25,24 +25,15 @@ def velocity_of(view: View, entity: str) -> list[float]:
     return vector
 
 
-class SpeedCondition(EntityCondition):
+class SpeedCondition(QuantityCondition):
     """Speed [m/s], signed along the heading; with a direction the velocity's component along that axis."""
 
     element: model.SpeedCondition
     unit = "m/s"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the speed."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The speed."""
-        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
-        return f"{entity}: speed {value:.2f} m/s {rule} {self.element.value:g} m/s"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"speed {in_words(self.element.rule)} {self.element.value:g} m/s"
+    def what(self) -> str:
+        """What is compared."""
+        return "speed"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The speed."""
@@ -51,25 +42,15 @@ class SpeedCondition(EntityCondition):
         return along(velocity_of(stage.view, entity), stage.pose(entity).h, self.element.direction)
 
 
-class RelativeSpeedCondition(EntityCondition):
+class RelativeSpeedCondition(QuantityCondition):
     """Own speed less another entity's [m/s]; with a direction along that axis of the other entity."""
 
     element: model.RelativeSpeedCondition
     unit = "m/s"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the difference."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The difference."""
-        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
-        return f"{entity}: {value:.2f} m/s faster than {self.element.entity_ref} {rule} {self.element.value:g} m/s"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        rule = in_words(self.element.rule)
-        return f"speed above that of {self.element.entity_ref} {rule} {self.element.value:g} m/s"
+    def what(self) -> str:
+        """What is compared."""
+        return f"speed above that of {self.element.entity_ref}"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The difference."""
@@ -83,24 +64,15 @@ class RelativeSpeedCondition(EntityCondition):
         return along(difference, stage.pose(other).h, self.element.direction)
 
 
-class AccelerationCondition(EntityCondition):
+class AccelerationCondition(QuantityCondition):
     """Acceleration [m/s²]: its amount, or with a direction its component along that axis."""
 
     element: model.AccelerationCondition
     unit = "m/s²"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the acceleration."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The acceleration."""
-        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
-        return f"{entity}: acceleration {value:.2f} m/s² {rule} {self.element.value:g} m/s²"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"acceleration {in_words(self.element.rule)} {self.element.value:g} m/s²"
+    def what(self) -> str:
+        """What is compared."""
+        return "acceleration"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The acceleration."""
@@ -108,15 +80,11 @@ class AccelerationCondition(EntityCondition):
         return along(vector, stage.pose(entity).h, self.element.direction)
 
 
-class StandStillCondition(EntityCondition):
+class StandStillCondition(QuantityCondition):
     """Has stood still for longer than a duration [s]."""
 
     element: model.StandStillCondition
     unit = "s"
-
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare how long it stands."""
-        return lasted(stage, stage.actors[entity].standing_since, self.element.duration)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long it stands."""
@@ -135,23 +103,15 @@ class StandStillCondition(EntityCondition):
         return model.Rule.GREATER_THAN, self.element.duration
 
 
-class TraveledDistanceCondition(EntityCondition):
+class TraveledDistanceCondition(QuantityCondition):
     """Has covered a distance since it entered the world [m]."""
 
     element: model.TraveledDistanceCondition
     unit = "m"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the distance covered."""
-        return stage.actors[entity].traveled >= self.element.value - 1e-6
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The distance covered."""
-        return f"{entity}: travelled {stage.actors[entity].traveled:.2f} m ≥ {self.element.value:g} m"
-
-    def describe_for(self) -> str:
-        """The limit."""
-        return f"travelled ≥ {self.element.value:g} m"
+    def what(self) -> str:
+        """What is compared."""
+        return "travelled"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The distance covered."""
@@ -160,11 +120,6 @@ class TraveledDistanceCondition(EntityCondition):
     def threshold(self) -> tuple[model.Rule, float]:
         """At least the distance."""
         return model.Rule.GREATER_OR_EQUAL, self.element.value
-
-
-def lasted(stage: Stage, start: float | None, duration: float) -> bool:
-    """True where something that began at `start` has gone on for longer than `duration` [s]."""
-    return start is not None and stage.time - start > duration + 1e-6
 
 
 def span(stage: Stage, start: float | None) -> float:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from eidrive_behaviors.conditions.motion import lasted, since, span
-from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, model
+from eidrive_behaviors.conditions.motion import since, span
+from eidrive_scenario.api import LaneLocation, QuantityCondition, Stage, model
 
 
-class EndOfRoadCondition(EntityCondition):
+class EndOfRoadCondition(QuantityCondition):
     """Has been at the end of its road for a duration [s]."""
 
     element: model.EndOfRoadCondition
     unit = "s"
-
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare how long."""
-        start = stage.actors[entity].end_of_road_since
-        return start is not None and stage.time - start >= self.element.duration - 1e-6
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long."""
@@ -36,7 +31,7 @@ class EndOfRoadCondition(EntityCondition):
         return model.Rule.GREATER_OR_EQUAL, self.element.duration
 
 
-class OffroadCondition(EntityCondition):
+class OffroadCondition(QuantityCondition):
     """Has been off the road with its reference point for longer than a duration [s]. Lanes `none` are no road."""
 
     element: model.OffroadCondition
@@ -50,7 +45,7 @@ class OffroadCondition(EntityCondition):
             actor.off_road_since = None
         elif actor.off_road_since is None:
             actor.off_road_since = stage.time
-        return lasted(stage, actor.off_road_since, self.element.duration)
+        return super().holds_for(stage, entity)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long."""

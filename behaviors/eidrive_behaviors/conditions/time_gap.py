@@ -5,30 +5,20 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.conditions.distance import frame_and_kind, measured, place_of
-from eidrive_scenario.api import EntityCondition, Place, Stage, closing_speed, compares, in_words, model
+from eidrive_scenario.api import Place, QuantityCondition, Stage, closing_speed, model
 
 STANDING = 1e-6
 
 
-class TimeHeadwayCondition(EntityCondition):
+class TimeHeadwayCondition(QuantityCondition):
     """Distance to another entity over the own speed [s]; that of a standing entity is without end."""
 
     element: model.TimeHeadwayCondition
     unit = "s"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the headway."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The headway."""
-        value = self.quantity(stage, entity)
-        rule = in_words(self.element.rule)
-        return f"{entity}: time headway to {self.element.entity_ref} {value:.2f} s {rule} {self.element.value:g} s"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"time headway to {self.element.entity_ref} {in_words(self.element.rule)} {self.element.value:g} s"
+    def what(self) -> str:
+        """What is compared."""
+        return f"time headway to {self.element.entity_ref}"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The headway."""
@@ -36,7 +26,7 @@ class TimeHeadwayCondition(EntityCondition):
         return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
 
 
-class TimeToCollisionCondition(EntityCondition):
+class TimeToCollisionCondition(QuantityCondition):
     """Distance to an entity or a position over the speed of approach [s]; where they do not approach there is none.
 
     The speed is that in which the distance shrinks, by the same coordinate system and along the same axis.
@@ -45,22 +35,10 @@ class TimeToCollisionCondition(EntityCondition):
     element: model.TimeToCollisionCondition
     unit = "s"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare the time to collision."""
-        return compares(self.quantity(stage, entity), self.element.rule, self.element.value)
-
-    def explain_for(self, stage: Stage, entity: str) -> str:
-        """The time to collision."""
-        value, rule = self.quantity(stage, entity), in_words(self.element.rule)
-        return f"{entity}: time to collision with {self._target()} {value:.2f} s {rule} {self.element.value:g} s"
-
-    def describe_for(self) -> str:
-        """Rule and limit."""
-        return f"time to collision with {self._target()} {in_words(self.element.rule)} {self.element.value:g} s"
-
-    def _target(self) -> str:
-        target = self.element.time_to_collision_condition_target
-        return target.entity_ref.entity_ref if target.entity_ref is not None else "the position"
+    def what(self) -> str:
+        """With whom."""
+        other = self.element.time_to_collision_condition_target.entity_ref
+        return f"time to collision with {'the position' if other is None else other.entity_ref}"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The time to collision."""
