@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,11 +25,13 @@ from eidrive_scenario.roads.model import RoadMap
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
 from eidrive_scenario.roads.nearby import locate_near
 from eidrive_scenario.roads.preferences import Cost, speed_on
-from eidrive_scenario.roads.reading import read_road_map
-from eidrive_scenario.roads.reading.document import parse_road_map
+from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.route import Route, joined
 from eidrive_scenario.roads.soundness import doubts
 from eidrive_scenario.roads.tables import RoadTables
+
+KEPT = 2
+"""So many networks of files are kept for the next run."""
 
 
 class RoadNetwork(Roads):
@@ -46,8 +48,12 @@ class RoadNetwork(Roads):
 
     @classmethod
     def load(cls, path: str | Path) -> RoadNetwork:
-        """The network of an OpenDRIVE file. Raises RoadError with all findings."""
-        return cls(read_road_map(Path(path)))
+        """The network of an OpenDRIVE file. Raises RoadError with all findings.
+
+        A network does not change: the runs of a campaign share it, and what was once worked out from it, as long as
+        the file says the same.
+        """
+        return _loaded(read_road_text(Path(path)), str(path))
 
     @classmethod
     def parse(cls, text: str | bytes, source: str = "<memory>") -> RoadNetwork:
@@ -233,3 +239,8 @@ class RoadNetwork(Roads):
         points: Array = self._locator.sample_points
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@lru_cache(maxsize=KEPT)
+def _loaded(text: bytes, source: str) -> RoadNetwork:
+    return RoadNetwork(parse_road_map(text, source))

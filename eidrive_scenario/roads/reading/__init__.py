@@ -1,5 +1,5 @@
 """Reads an OpenDRIVE file into the plain data of `roads.model`."""
 
-from eidrive_scenario.roads.reading.document import read_road_map
+from eidrive_scenario.roads.reading.document import parse_road_map, read_road_text
 
-__all__ = ["read_road_map"]
+__all__ = ["parse_road_map", "read_road_text"]

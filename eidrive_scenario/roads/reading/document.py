@@ -30,8 +30,8 @@ LARGEST = 256 * 1024 * 1024
 """Bytes of a file that is read at all."""
 
 
-def read_road_map(path: Path) -> RoadMap:
-    """An OpenDRIVE file. Raises RoadError with every finding, its line and what would be right."""
+def read_road_text(path: Path) -> bytes:
+    """The text of an OpenDRIVE file. Raises RoadError if it cannot be read."""
     source = str(path)
     try:
         size = path.stat().st_size
@@ -41,11 +41,11 @@ def read_road_map(path: Path) -> RoadMap:
         raise RoadError(Problem(f"cannot read: {reason}", "give the path of an OpenDRIVE file", source)) from error
     if size > LARGEST:
         raise RoadError(Problem(f"is {size} bytes large", f"at most {LARGEST} are read", source))
-    return parse_road_map(text, source)
+    return text
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
-    """OpenDRIVE from memory; `source` names it in errors. Raises RoadError."""
+    """OpenDRIVE; `source` names it in errors. Raises RoadError with every finding, its line and what would be right."""
     root = _parse(text, source)
     findings = Findings(source)
     elements = [(findings.text(element, "id"), element) for element in root.iterfind("road")]
