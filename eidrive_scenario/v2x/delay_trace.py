@@ -36,7 +36,12 @@ class TraceDelay(Settings):
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or data.get("file") is None:
+        if not isinstance(data, dict):
+            return data
+        if data.get("file") is None:
+            idle = [name for name in ("column", "unit") if name in data]
+            if idle:
+                raise ValueError(f"{idle[0]} belongs to a file; the list of seconds has none")
             return data
         if data.get("seconds") is not None:
             raise ValueError("give either seconds or a file")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from array import array
+
+import numpy as np
+
 from eidrive_scenario.randomness import generator
 
 BLOCK = 128
@@ -13,7 +17,7 @@ class LinkDraws:
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._blocks: dict[tuple[str, str, str], tuple[int, list[float]]] = {}
+        self._blocks: dict[tuple[str, str, str], tuple[int, array[float]]] = {}
 
     def uniform(self, purpose: str, sender: str, receiver: str, number: int) -> float:
         """One number in (0, 1) for this purpose, link and message."""
@@ -22,5 +26,5 @@ class LinkDraws:
         held = self._blocks.get(link)
         if held is None or held[0] != block:
             numbers = generator(self._seed, *link, block).random(BLOCK)
-            held = self._blocks[link] = (block, [min(max(float(u), 1e-16), 1.0 - 1e-16) for u in numbers])
+            held = self._blocks[link] = (block, array("d", np.clip(numbers, 1e-16, 1.0 - 1e-16).tobytes()))
         return held[1][place]

@@ -18,7 +18,7 @@ Codes = NDArray[np.int64]
 Entry = tuple[float, str, int, float, Received]
 """Arrival, sender, number, sending, and what the receiver gets; several receivers may share one."""
 
-MOST_WAITING = 1 << 17
+MOST_WAITING = 1 << 14
 """So many messages are held at most before they are written down, as each holds what it says."""
 
 

@@ -8,6 +8,10 @@ from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.loss import AnyLoss, BernoulliLoss, DistanceLoss, GilbertElliottLoss, NoLoss
 from eidrive_scenario.v2x.message import Message
 
+RENEWAL = 4096
+"""After so many messages of a link the chain of Gilbert and Elliott begins anew, in its long-run state: it would take
+too long to play it from the first message on for somebody who begins to listen after hours."""
+
 
 class LossDraws:
     """A message is lost where its draw lies below the probability of loss.
@@ -54,10 +58,12 @@ class LossDraws:
     def _gilbert_elliott(self, loss: GilbertElliottLoss, message: Message, receiver: str) -> str | None:
         link = (message.sender, receiver)
         to_bad, to_good = loss.steps
+        begin = message.number - message.number % RENEWAL
         number, bad = self._chains.get(link, (-1, False))
+        number = max(number, begin - 1)
         while number < message.number:
             number += 1
-            likely = loss.share_bad if number == 0 else 1.0 - to_good if bad else to_bad
+            likely = loss.share_bad if number == begin else 1.0 - to_good if bad else to_bad
             bad = self._draws.uniform("state", *link, number) < likely
         self._chains[link] = (number, bad)
         probability = loss.bad_loss if bad else loss.good_loss

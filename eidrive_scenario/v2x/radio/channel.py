@@ -86,8 +86,10 @@ class RadioChannel(LinkChannel):
         self._open: list[Transmission] = []
         self._told: list[FateBlock] = []
         self._dropped: list[LinkEvent] = []
-        self._since: float | None = None
-        self._until = 0.0
+        self._until: float | None = None
+        """Up to when the medium was played [s]."""
+        self._joined: dict[str, float] = {}
+        self._last_arrival: dict[tuple[str, str], float] = {}
 
     def _new_access(self, names: tuple[str, ...]) -> Access:
         profile = self.profile
@@ -136,9 +138,9 @@ class RadioChannel(LinkChannel):
 
     def busy_ratio(self, station: str) -> float | None:
         row = self._rows.get(station)
-        if row is None or self._since is None or self._until <= self._since:
+        if row is None or self._until is None or self._until <= self._joined[station]:
             return self._outside
-        return min(1.0, self._access.busy_for(row) / (self._until - self._since) + self._outside)
+        return min(1.0, self._access.busy_for(row) / (self._until - self._joined[station]) + self._outside)
 
     def interval(self, station: str) -> float:
         row = self._rows.get(station)
@@ -167,8 +169,9 @@ class RadioChannel(LinkChannel):
             raise ValueError(f"the radio was not told where {name!r} is")
         return row
 
-    def _take_in(self, names: tuple[str, ...]) -> None:
+    def _take_in(self, names: tuple[str, ...], now: float) -> None:
         """Other stations from now on; what those say who have left is lost."""
+        self._joined = {name: self._joined.get(name, now) for name in names}
         self._ledger.write_into(self._links)
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
@@ -186,19 +189,19 @@ class RadioChannel(LinkChannel):
 
     def _advance(self, now: float) -> None:
         """Play the medium up to `now`; more than once at one instant does nothing."""
+        if self._until is None:
+            self._until = now
         if self.surroundings.names != self._access.names:
-            self._take_in(self.surroundings.names)
-        if self._since is None:
-            self._since = self._until = now
+            self._take_in(self.surroundings.names, self._until)
         if now <= self._until:
             return
         if math.isfinite(now):
             self._until = now
+        if self._budget is None:  # even where nobody talks: who talks when shall not shift the draws of shadowing
+            self._budget = self._link_budget.at(self.surroundings)
         if not self._open and not self._access.waiting:
             self._access.rest(now)
             return
-        if self._budget is None:
-            self._budget = self._link_budget.at(self.surroundings)
         power = self.profile.radiated - self._budget.loss
         started, dropped = self._access.advance(now, power)
         for entry in dropped:
@@ -249,8 +252,12 @@ class RadioChannel(LinkChannel):
         arrivals = []
         for entry, hearing in zip(batch.ended, receivers, strict=True):
             for name in hearing:
-                arrivals.append(entry.end + delay_of(delay, self._draws, entry.message, name))
-                self._links.carry(_parcel(entry, arrivals[-1]), name)
+                arrives = entry.end + delay_of(delay, self._draws, entry.message, name)
+                if not self.profile.reordering:
+                    link = (entry.message.sender, name)
+                    arrives = self._last_arrival[link] = max(arrives, self._last_arrival.get(link, arrives))
+                arrivals.append(arrives)
+                self._links.carry(_parcel(entry, arrives), name)
         batch.arrives[heard] = arrivals
 
     def _spared(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:

@@ -31,6 +31,8 @@ _CURVES = {
     "80211p": ("80211p_highway_los", "80211p_highway_nlos", "80211p_crossing_nlos"),
     "cv2x_mode4": ("cv2x_r0.7",) * 3,
 }
+_IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu"}}
+"""What has no meaning to each technology."""
 _BLOCKS, _BLOCKS_OF_A_MESSAGE = 50, 10
 
 
@@ -104,6 +106,9 @@ class RadioProfile(ComposedProfile):
             raise ValueError("own_perception does not go with a radio: nobody hears its own antenna")
         if self.background is not None and self.background.kind != self.technology:
             raise ValueError(f"the background is {self.background.kind}, the technology {self.technology}")
+        idle = self.model_fields_set & _IDLE[self.technology]
+        if idle:
+            raise ValueError(f"{min(idle)} means nothing to {self.technology}")
         return self
 
     @property

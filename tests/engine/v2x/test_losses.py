@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import groupby, pairwise
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -62,6 +63,18 @@ def test_losses_within_both_states() -> None:
     assert loss.share_lost == pytest.approx(0.25 * 0.8 + 0.75 * 0.02)
     kept = received(channel(2, loss=loss.model_dump(exclude_none=True)), 40000)
     assert 1 - np.mean(kept) == pytest.approx(loss.share_lost, abs=0.02)
+
+
+def test_who_begins_to_listen_late_meets_the_bursts_that_others_met() -> None:
+    """The state of a link is one of seed, link and number; it does not take the messages before to know it."""
+    early = received(channel(6, loss=burst(0.3, 4)), 10_000)
+    late = channel(6, loss=burst(0.3, 4))
+    for number in (4095, 4096, 4200, 9990, 9999):
+        assert (late.send(message(number), ["Ego"], number * DT)[0].outcome == "delivered") == early[number]
+    far = channel(6, loss=burst(0.3, 4))
+    begun = process_time()
+    far.send(message(10**9), ["Ego"], 1e8)
+    assert process_time() - begun < 1.0
 
 
 def test_what_arrives_with_more_bursts_arrives_with_fewer() -> None:

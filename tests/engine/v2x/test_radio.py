@@ -17,6 +17,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
 from eidrive_scenario.v2x.radio import budget, reception
+from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
@@ -153,6 +154,52 @@ def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
     assert [(name, at, said.arrived) for name, at, said in heard_few] == [
         (name, at, said.arrived) for name, at, said in heard_many
     ]
+
+
+def test_who_talks_shifts_no_draw_of_the_others() -> None:
+    """The shadowing between A and B is the same whether C talks in each tick, or nobody does but for one message."""
+
+    def seen(talking: Sequence[str], ticks: Sequence[int]) -> dict[int, float | None]:
+        carrier, told = radio(7), []
+        for tick in range(40):
+            now = DT * tick
+            places = {name: (30.0 * row + 5.0 * row * now, 0.0, 1.5) for row, name in enumerate("ABC")}
+            carrier.around(Surroundings(places))
+            for name in places:
+                carrier.deliver(name, now)
+            says = [name for name in places if name in talking or (name == "A" and tick in ticks)]
+            told += list(carrier.transmit([(message(name, tick, now), ["B"]) for name in says if name != "B"], now))
+        return {event.number: event.path_loss_db for event in told if event.sender == "A"}
+
+    alone, among_others = seen((), (10, 25)), seen("AC", ())
+    assert set(alone) == {10, 25}
+    assert all(among_others[number] == loss for number, loss in alone.items())
+    assert len(set(among_others.values())) > 30
+
+
+def test_without_reordering_messages_wait_for_those_before() -> None:
+    delay = {"delay": {"kind": "uniform", "minimum": 0.0, "maximum": 0.5}}
+    arrivals = {}
+    for reordering in (True, False):
+        carrier = radio(2, reordering=reordering, **delay, **QUIET)
+        events, _ = talk(carrier, {"A": (0.0, 0.0, 1.5), "B": (30.0, 0.0, 1.5)}, 100)
+        arrivals[reordering] = [event.arrives for event in events if event.sender == "A" and event.arrives is not None]
+    assert arrivals[True] != sorted(arrivals[True])
+    assert arrivals[False] == sorted(arrivals[False])
+    assert all(late >= early for late, early in zip(arrivals[False], arrivals[True], strict=True))
+
+
+def test_who_joins_late_measures_its_own_time() -> None:
+    """Half of the run is over when C joins: the channel is as busy for it as for the others."""
+    carrier = radio(1, **QUIET)
+    for tick in range(200):
+        now = DT * tick
+        present = "AB" if tick < 100 else "ABC"
+        carrier.around(Surroundings({name: (20.0 * row, 0.0, 1.5) for row, name in enumerate(present)}))
+        carrier.transmit([(message(name, tick, now, 1400), ["A"]) for name in "AB" if name != "A"], now)
+    ratios = [carrier.busy_ratio(name) for name in "ABC"]
+    assert ratios == pytest.approx([ratios[0]] * 3, rel=0.03)
+    assert ratios[0] == pytest.approx(ieee80211p_airtime(1400, 6.0, 1400) / DT, rel=0.03)
 
 
 @pytest.mark.parametrize("profile", PROFILES[:7:6], ids=["80211p", "cv2x"])
