@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from argparse import ArgumentTypeError
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +16,8 @@ MARKER = (
     "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
 )
 _MOST_RUNS = 100
+_LONGEST = 80
+"""Characters of a channel in the name of a test."""
 _GIVEN = pytest.StashKey[tuple[Path, ...]]()
 _WORKER_KEY = "eidrive_given"
 
@@ -26,8 +30,12 @@ class Arm:
     seed: int
 
     def __str__(self) -> str:
-        channel = [] if self.channel is None else [Path(self.channel).stem]
-        return "-".join([*channel, f"seed{self.seed}"])
+        return "-".join([*([] if self.channel is None else [_short(self.channel)]), f"seed{self.seed}"])
+
+
+def _short(channel: str) -> str:
+    """A profile's name without folder and suffix; one that is written out, in words that fit a file's name."""
+    return re.sub(r"[^\w.]+", "_", channel).strip("_")[:_LONGEST] if "{" in channel else Path(channel).stem
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -59,14 +67,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise ValueError
-    return count
+    if not text.isdecimal() or int(text) < 1:
+        raise ArgumentTypeError(f"{text!r} is no number from 1 on")
+    return int(text)
 
 
 def _count_or_all(text: str) -> int | None:
     return None if text == "all" else _count(text)
+
+
+def _channels(text: str) -> list[str]:
+    """What stands between the commas, but for those within braces; each once."""
+    parts, depth = [""], 0
+    for sign in text:
+        depth += (sign in "{[") - (sign in "}]")
+        if sign == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return [name for name in dict.fromkeys(part.strip() for part in parts) if name]
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -88,7 +107,7 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None) -> Iterator[Arm]:
     """Every channel with every seed; the command line wins over `channels` and `seeds`."""
     given = config.getoption("eidrive_channel")
-    names: Sequence[str | None] = [name.strip() for name in given.split(",") if name.strip()] if given else []
+    names: Sequence[str | None] = _channels(given) if given else []
     count = config.getoption("eidrive_seeds") or seeds or 1
     for channel in names or channels or (None,):
         for seed in range(1, count + 1):

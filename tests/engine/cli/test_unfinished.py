@@ -72,6 +72,10 @@ def test_wrong_input_leaves_nothing(eidrive: Eidrive, passing_by: Path, tmp_path
     result = eidrive("run", passing_by, "--out", tmp_path, "--csv", tmp_path / "motion.csv", "--channel", "idael")
     assert result.exit_code == 2
     assert names(tmp_path) == []
+    (tmp_path / "file").touch()
+    result = eidrive("run", passing_by, "--out", tmp_path / "file" / "run")
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert "cannot write" in result.stderr
 
 
 @pytest.mark.parametrize("arguments", [["list", "conditions"], ["run", "{file}"], ["tree", "{file}"]])

@@ -77,7 +77,17 @@ def test_k_selects(project: pytest.Pytester) -> None:
 def test_seeds_must_count(project: pytest.Pytester) -> None:
     result = project.runpytest_inprocess("data", "--eidrive-seeds", "0")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*--eidrive-seeds*invalid*"])
+    result.stderr.fnmatch_lines(["*--eidrive-seeds: '0' is no number from 1 on"])
+
+
+def test_a_channel_may_be_written_out_and_none_comes_twice(project: pytest.Pytester) -> None:
+    channels = "ideal, {delay: {kind: uniform, low: 0, high: 0.1}, loss: {kind: none}},ideal,none,"
+    items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
+    assert [item.split("::")[1] for item in items] == [
+        "first[ideal-seed1]",
+        "first[delay_kind_uniform_low_0_high_0.1_loss_kind_none-seed1]",
+        "first[none-seed1]",
+    ]
 
 
 def test_bare_pytest_under_xdist_is_left_alone_too(project: pytest.Pytester) -> None:
