@@ -20,7 +20,7 @@ from eidrive_scenario.storyboard.elements import (
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.init_block import InitBlock
-from eidrive_scenario.storyboard.selections import Selections, joined
+from eidrive_scenario.storyboard.selections import AnyMember, Selections
 from eidrive_scenario.storyboard.stage import Stage
 from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
 
@@ -163,15 +163,7 @@ class Builder:
         behaviours = []
         for leaf, parent in _leaves(wrapper, wrapper):
             name = _registered(leaf, self._actions)
-            if name not in self._actions:
-                self._problems.append(
-                    Problem(
-                        f"{name} is not executed yet",
-                        f"take it out, or install a package that registers it; {suggestion(name, self._actions)}",
-                        leaf.source,
-                        leaf.line,
-                    )
-                )
+            if not self._known(name, self._actions, leaf, f"{name} is not executed yet"):
                 continue
             try:
                 one = self._selections.single(leaf)
@@ -194,40 +186,44 @@ class Builder:
         return WaitFor(name, Trigger(groups), self._stage)
 
     def _monitor(self, entry: model.Condition) -> ConditionMonitor | None:
-        by_entity = entry.by_entity_condition
-        chosen = entry.chosen() if by_entity is None else by_entity.entity_condition
-        leaf = chosen.chosen()
-        name = _registered(leaf, self._conditions)
-        if name not in self._conditions:
-            self._problems.append(
-                Problem(
-                    f"{name} is not evaluated yet",
-                    f"use another one, or install a package that registers it; {suggestion(name, self._conditions)}",
-                    leaf.source,
-                    leaf.line,
-                )
-            )
-            return None
-        kind = self._conditions.load(name)
-        made: list[Condition] = []
         try:
-            if by_entity is None:
-                made = [kind(leaf)]
-            else:
-                triggering = by_entity.triggering_entities
-                names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
-                rule = triggering.triggering_entities_rule.value
-                made = [kind(one, names, rule) for one in self._selections.alternatives(leaf)]
+            condition = self._condition(entry)
         except ScenarioError as error:
             self._problems += error.problems
             return None
-        needed = Condition if by_entity is None else EntityCondition
-        if not all(isinstance(one, needed) for one in made):
-            raise RegistryError(f"conditions {name!r} ({self._conditions.value(name)}) is no Condition of this kind")
-        towards = [one for one in made if isinstance(one, EntityCondition)]
-        condition = made[0] if by_entity is None else joined(towards)
+        if condition is None:
+            return None
         self._made.append(condition)
         return ConditionMonitor(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
+
+    def _condition(self, entry: model.Condition) -> Condition | None:
+        by_entity = entry.by_entity_condition
+        leaf = (entry.chosen() if by_entity is None else by_entity.entity_condition).chosen()
+        name = _registered(leaf, self._conditions)
+        if not self._known(name, self._conditions, leaf, f"{name} is not evaluated yet"):
+            return None
+        make = self._conditions.load(name)
+        wrong = RegistryError(f"conditions {name!r} ({self._conditions.value(name)}) is no Condition of this kind")
+        if by_entity is None:
+            condition = make(leaf)
+            if not isinstance(condition, Condition):
+                raise wrong
+            return condition
+        triggering = by_entity.triggering_entities
+        names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
+        rule = triggering.triggering_entities_rule.value
+        towards = [make(one, names, rule) for one in self._selections.alternatives(leaf)]
+        if not all(isinstance(one, EntityCondition) for one in towards):
+            raise wrong
+        return towards[0] if len(towards) == 1 else AnyMember(leaf, names, rule, towards)
+
+    def _known(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
+        """Whether something of that name is registered; if not, that is a problem."""
+        if name in registry:
+            return True
+        remedy = f"take it out, or install a package that registers it; {suggestion(name, registry)}"
+        self._problems.append(Problem(otherwise, remedy, leaf.source, leaf.line))
+        return False
 
     def _entities(self, name: str) -> list[str]:
         """The entity of this name, or the members of the selection of this name."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import product
 from typing import Any, TypeVar
@@ -16,6 +16,9 @@ E = TypeVar("E", bound=model.Element)
 
 REFERENCES = ("entity_ref", "master_entity_ref", "trailer_ref")
 """Attributes that name an entity."""
+
+NOBODY = ""
+"""What stands in a list of entities for a group without members: an empty list would mean all entities."""
 
 TYPES: Mapping[type[model.Element], str] = {
     model.Vehicle: "vehicle",
@@ -89,23 +92,26 @@ class Selections:
         return {name for name in named if isinstance(name, str) and name in self._groups}
 
     def _with_lists(self, element: E) -> E:
-        """The element with groups in its own lists of entities replaced by their members."""
+        """The element with groups in its own lists of entities replaced by their members; empty ones mean nobody."""
         if not self._groups:
             return element
         listed = getattr(element, "entity_ref", None)
         if not isinstance(listed, tuple):
             return element
-        refs = [replace(ref, entity_ref=member) for ref in listed for member in self.members(ref.entity_ref)]
+        refs = [
+            replace(ref, entity_ref=member) for ref in listed for member in self.members(ref.entity_ref) or [NOBODY]
+        ]
         changes: dict[str, Any] = {"entity_ref": tuple(dict.fromkeys(refs))}
         return replace(element, **changes)
 
 
 class AnyMember(EntityCondition):
-    """A condition that names a group: it holds for an entity if it holds towards any member."""
+    """A condition that names a group: it holds for an entity if it holds towards any member, one condition each."""
 
-    def __init__(self, conditions: Sequence[EntityCondition]) -> None:
-        first = conditions[0]
-        super().__init__(first.element, first.entities, first.rule)
+    def __init__(
+        self, element: model.Element, entities: Sequence[str], rule: str, conditions: Sequence[EntityCondition]
+    ) -> None:
+        super().__init__(element, entities, rule)
         self.conditions = tuple(conditions)
 
     def bind(self, stage: Stage) -> None:
@@ -120,21 +126,17 @@ class AnyMember(EntityCondition):
     def explain_for(self, stage: Stage, entity: str) -> str:
         """What is true of the first member towards which it holds, or of all."""
         holding = [condition for condition in self.conditions if condition.holds_for(stage, entity)]
-        return " or ".join(condition.explain_for(stage, entity) for condition in holding[:1] or self.conditions)
+        told = [condition.explain_for(stage, entity) for condition in holding[:1] or self.conditions]
+        return " or ".join(told) or f"{entity}: {self.describe_for()}"
 
     def describe_for(self) -> str:
         """Each of them."""
-        return " or ".join(condition.describe_for() for condition in self.conditions)
+        told = [condition.describe_for() for condition in self.conditions]
+        return " or ".join(told) or f"{super().describe_for()} towards a selection without members"
 
     def measures(self, stage: Stage) -> tuple[Measure, ...]:
         """Those of all."""
         return tuple(measure for condition in self.conditions for measure in condition.measures(stage))
-
-
-def joined(conditions: Iterable[EntityCondition]) -> EntityCondition:
-    """One condition, or several towards the members of a group as one."""
-    found = list(conditions)
-    return found[0] if len(found) == 1 else AnyMember(found)
 
 
 def _renamed(element: E, names: Mapping[str, str]) -> E:

@@ -154,6 +154,19 @@ def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
         assert set(played.frames[-1].appearances) == {"Ego", "Third"}
 
 
+@pytest.mark.element("EntitySelection")
+def test_a_group_without_members_is_near_nobody_and_in_nobody_s_way(group: Any) -> None:
+    nobody = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'
+    near = """<RelativeDistanceCondition entityRef="walkers" relativeDistanceType="longitudinal" value="1000"
+      freespace="false" rule="lessThan"/>"""
+    assert group(0.5, ("Ego", NOTHING, by("Ego", near)), more=nobody).begun("event 0") == []
+    free = """<RelativeClearanceCondition distanceForward="50" distanceBackward="0" freeSpace="false"
+      oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/>{}</RelativeClearanceCondition>"""
+    walkers = free.format('<EntityRef entityRef="walkers"/>')
+    assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(""))), more=nobody).begun("event 0") == []
+    assert group(0.5, ("Ego", NOTHING, by("Ego", walkers)), more=nobody).begun("event 0") == [0.0]
+
+
 def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any) -> None:
     delete = everywhere('<EntityAction entityRef="slow"><DeleteEntityAction/></EntityAction>')
     played = group(1, ("Ego", delete, after(0.5)))
