@@ -53,6 +53,13 @@ class LaneLinks:
         for other in self._ends.get(RoadEnd(road, direction), ()):
             yield other.road, -other.side
 
+    def between_roads(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
+        """Ends of lanes of different roads that are linked, each pair once."""
+        for one, others in self._lanes.items():
+            for other in others:
+                if one.lane.road < other.lane.road:
+                    yield one, other
+
     def _join(self, one: LaneEnd, other: LaneEnd) -> None:
         self._lanes.setdefault(one, {})[other] = None
         self._lanes.setdefault(other, {})[one] = None

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads.links import LaneLinks, end_section, side_at
+from eidrive_scenario.roads.links import LaneEnd, LaneLinks, end_section, side_at
 from eidrive_scenario.roads.location import LaneKey
 from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
 
@@ -72,6 +72,7 @@ def _flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: 
         for link, side in ((road.predecessor, -1), (road.successor, 1)):
             yield from _end(roads, road, link, side)
         yield from _dead_ends(road, links)
+    yield from _gaps(roads, links)
     for junction in junctions.values():
         for connection in junction.connections:
             yield from _connection(roads, junction, connection)
@@ -111,15 +112,14 @@ def _jumps(road: Road) -> Iterator[Flaw]:
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
-    if lane.id == 0:
+    sound = lane.width.is_constant and lane.width.value(0.0) >= NARROW
+    if lane.id == 0 or (sound and lane.width_from <= JUMP):
         return
     name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
     if lane.width_from > JUMP:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
         what = f"{name} has no width{until}"
         yield Flaw("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
-    if lane.width.is_constant and lane.width.value(0.0) >= NARROW:
-        return
     least = min(_extremes(lane, section.length))
     if least < NARROW:
         what = f"{name} becomes {least:.3g} m wide"
@@ -194,6 +194,39 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
         remedy = "add a <laneLink> from it to a <connection>"
         return Flaw("lane-link", "lanes that lead nowhere at junctions", what, remedy, lane.line)
     return Flaw("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
+
+
+def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[Flaw]:
+    """Linked lanes of two roads that do not meet: cars jump there. The reference lines need not meet."""
+    ends: dict[tuple[str, int], tuple[float, float, float, float, float]] = {}
+    for one, other in links.between_roads():
+        road, beyond = roads[one.lane.road], roads[other.lane.road]
+        lane = road.sections[one.lane.section].lanes[one.lane.lane]
+        if not lane.drivable or not beyond.sections[other.lane.section].lanes[other.lane.lane].drivable:
+            continue
+        x, y = _lane_end(road, one, ends)
+        u, v = _lane_end(beyond, other, ends)
+        apart = math.hypot(u - x, v - y)
+        if apart > JUMP:
+            names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
+            what = f"{names} are linked, and their ends are {apart:.3g} m apart"
+            yield Flaw("road-jump", "linked lanes that do not meet", what, "let the roads meet there", lane.line)
+
+
+def _lane_end(
+    road: Road, end: LaneEnd, known: dict[tuple[str, int], tuple[float, float, float, float, float]]
+) -> tuple[float, float]:
+    """Where the middle of a lane ends; `known` keeps what is the same for all lanes of an end of a road."""
+    found = known.get((road.id, end.side))
+    if found is None:
+        s = road.length if end.side > 0 else 0.0
+        x, y, heading, *_ = road.reference.at(s)
+        found = known[road.id, end.side] = x, y, math.sin(heading), math.cos(heading), road.lane_offset.value(s)
+    x, y, sin, cos, offset = found
+    section = road.sections[end.lane.section]
+    lane = section.lanes[end.lane.lane]
+    t = offset + lane.side * lane.centre.value(section.length if end.side > 0 else 0.0)
+    return x - t * sin, y + t * cos
 
 
 def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[Flaw]:

@@ -119,6 +119,18 @@ def test_links_from_road_to_road(road: Text, map_of: Text) -> None:
     ]
 
 
+def test_linked_lanes_that_do_not_meet(road: Text, map_of: Text) -> None:
+    """The reference lines need not: a lane of the second road, whose line is further right, goes on as the third."""
+    onwards = '<successor elementType="road" elementId="2" contactPoint="start"/>'
+    back = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
+    first = road("1", link=onwards, lanes=section(0, lane(-1), lane(-2, '<successor id="-1"/>')))
+    first = first.replace('<lane id="-1" type="driving"', '<lane id="-1" type="shoulder"')
+    for y, apart in ((-3.5, ""), (-3.505, ""), (-3.1, "0.4"), (0.0, "3.5")):
+        second = road("2", x=100.0, y=y, link=back, lanes=section(0, lane(-1, '<predecessor id="-2"/>')))
+        what = f"lane -2 of road '1' and lane -1 of road '2' are linked, and their ends are {apart} m apart"
+        assert told(map_of(first, second)) == ([("road-jump", what)] if apart else [])
+
+
 def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
@@ -161,6 +173,7 @@ def test_real_maps_are_not_flooded(corpora: Path) -> None:
             found.setdefault((file.name, problem.rule), []).append(problem.line)
     assert found == {
         ("SampleDatabase.xodr", "lane-width"): [1807, 1807],
+        ("SampleDatabase.xodr", "road-jump"): [3237, 3237],
         ("Town03.xodr", "lane-link"): [7913, 8040],
         ("parking_demo.xodr", "lane-link"): [564],
     }
