@@ -45,7 +45,7 @@ def told(tmp_path: Path, **properties: str) -> Path:
 
 def play(source: Path, channel: str = "ideal", **more: object) -> tuple[RunResult, list[Frame]]:
     kept = Kept()
-    settings = RunSettings(channel=channel, time_limit=4.0, **more)  # type: ignore[arg-type]
+    settings = RunSettings(channel=channel, **{"time_limit": 4.0, **more})  # type: ignore[arg-type]
     return run_file(source, seed=1, settings=settings, observers=[kept]), kept.frames
 
 
@@ -112,6 +112,20 @@ def test_a_mast_hears_over_a_radio_too(tmp_path: Path) -> None:
     assert both.links["RSU", "Ego"] == alone.links["RSU", "Ego"], "who listens changes nothing on the air"
     assert both.links["Ego", "RSU"].received > 70
     assert any(item.message.sender == "Ego" for frame in frames for item in frame.steps["RSU"].inbox)
+
+
+def test_points_of_others_are_joined_where_a_mast_names_them(tmp_path: Path) -> None:
+    frames = {}
+    for names in ("none", "Ego"):
+        path = told(tmp_path, cooperates_with=names)
+        text = path.read_text().replace('"average"', '"early"').replace('"oracle"', '"lidar"')
+        path.write_text(re.sub(r'<Property name="(range|field_of_view|visibility)" value="[^"]*"/>', "", text))
+        frames[names] = play(path, time_limit=0.6)[1]
+    deaf, hearing = frames["none"][-1].steps["RSU"], frames["Ego"][-1].steps["RSU"]
+    assert [item.message.points is not None for item in hearing.inbox] == [True]
+    assert hearing.detections.boxes.tobytes() == deaf.detections.boxes.tobytes(), "what it reports are its own points"
+    assert places(hearing.fused.boxes) != places(deaf.fused.boxes)
+    assert len(hearing.fused) >= len(deaf.fused) > 0
 
 
 def test_own_perception_by_the_channel_is_for_those_who_hear(tmp_path: Path) -> None:
