@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.geometry import footprint_distance
+from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
@@ -65,9 +65,10 @@ def distance(
 ) -> float:
     """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
 
-    Longitudinal distances are positive ahead, lateral ones to the left, both as `a` looks; free space is at least 0 in
-    amount, and 0 where the two overlap along that axis. In the frames of lane and road the algorithm says which way of
-    several is measured. In that of the trajectory `a` looks along the one that it follows; without one ahead.
+    The straight distance is that in space. Longitudinal distances are positive ahead, lateral ones to the left, both as
+    `a` looks; free space is at least 0 in amount, and 0 where the two overlap along that axis. In the frames of lane and
+    road the algorithm says which way of several is measured. In that of the trajectory `a` looks along the one that it
+    follows; without one ahead.
     """
     if kind == "euclidianDistance":
         return _straight(stage, a, b, freespace)
@@ -93,12 +94,12 @@ def closing_speed(
     NaN where the frame gives no distance. Both keep their velocities of this view, along roads and trajectories too; a
     place does not move.
     """
-    mine, theirs = _velocity(stage, a), _velocity(stage, b) if isinstance(b, str) else (0.0, 0.0)
+    mine, theirs = _velocity(stage, a), _velocity(stage, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
     here, there = Place(stage.pose(a), stage.location(a)), _place(stage, b)
     if kind == "euclidianDistance":
-        dx, dy = there.pose.x - here.pose.x, there.pose.y - here.pose.y
-        length = math.hypot(dx, dy)
-        return ((mine[0] - theirs[0]) * dx + (mine[1] - theirs[1]) * dy) / length if length > 0.0 else 0.0
+        apart = math.dist(here.pose[:3], there.pose[:3])
+        ways = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
+        return sum((b - a) * (v - w) for a, b, v, w in ways) / apart if apart > 0.0 else 0.0
     axis = 0 if kind == "longitudinal" else 1
     now = _offsets(stage, a, here, there, frame, algorithm)[axis]
     moved = _moved(stage, here, mine), _moved(stage, there, theirs)
@@ -106,12 +107,12 @@ def closing_speed(
     return math.copysign(1.0, now) * (now - then) / INSTANT
 
 
-def _velocity(stage: Stage, name: str) -> tuple[float, float]:
-    x, y = stage.view.velocity[stage.view.row(name), :2].tolist()
-    return x, y
+def _velocity(stage: Stage, name: str) -> tuple[float, float, float]:
+    x, y, z = stage.view.velocity[stage.view.row(name)].tolist()
+    return x, y, z
 
 
-def _moved(stage: Stage, place: Place, velocity: tuple[float, float]) -> Place:
+def _moved(stage: Stage, place: Place, velocity: tuple[float, float, float]) -> Place:
     """Where somebody is an instant later."""
     x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
     location = stage.roads.locate_at(x, y, place.location) if stage.roads is not None else None
@@ -124,12 +125,11 @@ def _place(stage: Stage, target: str | Place) -> Place:
 
 def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
     if not freespace:
-        here, there = stage.pose(a), _pose(stage, b)
-        return math.hypot(there.x - here.x, there.y - here.y)
+        return math.dist(stage.pose(a)[:3], _pose(stage, b)[:3])
     if isinstance(b, str):
-        return footprint_distance(box_of(stage, a), box_of(stage, b))
+        return box_distance(box_of(stage, a), box_of(stage, b))
     point: Box = (b.pose.x, b.pose.y, b.pose.z, 0.0, 0.0, 0.0, 0.0)
-    return footprint_distance(box_of(stage, a), point)
+    return box_distance(box_of(stage, a), point)
 
 
 def _offsets(

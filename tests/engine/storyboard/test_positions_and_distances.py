@@ -187,6 +187,17 @@ def test_boxes_side_by_side_leave_no_gap_along(on_street: Any) -> None:
     assert distance(on_street, "A", "B", frame="entity", kind="longitudinal", freespace=True) == 0.0
 
 
+def test_a_straight_distance_is_one_in_space(on_street: Any) -> None:
+    """B on a bridge 8 m above the street, 6 m beside A: 10 m; boxes 2 m wide and 1.5 m high leave 4 m and 6.5 m."""
+    on_street.enter("B", Place(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0)))
+    straight = {"frame": "entity", "kind": "euclidianDistance"}
+    assert distance(on_street, "A", "B", freespace=False, **straight) == pytest.approx(10.0)
+    assert distance(on_street, "A", "B", freespace=True, **straight) == pytest.approx(math.hypot(4.0, 6.5))
+    above = Place(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0))
+    assert distance(on_street, "A", above, freespace=False, **straight) == pytest.approx(10.0)
+    assert distance(on_street, "A", above, freespace=True, **straight) == pytest.approx(math.hypot(5.0, 6.5))
+
+
 def test_in_a_bend_the_road_is_longer_than_the_sight(stage: Any, bend: Any) -> None:
     """A quarter circle of the reference line's 50 m lies between the two; both drive in lane -1, a circle of 52 m."""
     made = Stage(stage.scenario, bend, dt=0.1, seed=0, nobody=stage.view)
