@@ -111,7 +111,7 @@ class TraceHash:
         words = np.empty((len(block), 7), dtype="<u8")
         numbers = words.view("<f8")
         words[:, 0], words[:, 1] = names[fates.senders], names[fates.receivers]
-        words[:, 2] = outcomes[fates.fates]
+        words[:, 2] = outcomes[fates.outcome]
         numbers[:, 3], numbers[:, 4], numbers[:, 5], numbers[:, 6] = fates.number, fates.sent, fates.arrives, fates.size
         return words.tobytes()
 

@@ -19,7 +19,7 @@ class Fates(NamedTuple):
     """E fates of messages in columns, each as the attribute of LinkEvent with that name says.
 
     names      of stations;  senders, receivers   (E,) places in `names`
-    outcomes   (outcome, reason);  fates   (E,) places in `outcomes`
+    outcomes   (outcome, reason);  outcome   (E,) places in `outcomes`
     number, size   (E,);  sent, arrives   (E,) [s]; what is lost arrives at infinity
     """
 
@@ -27,7 +27,7 @@ class Fates(NamedTuple):
     senders: Places
     receivers: Places
     outcomes: tuple[tuple[str, str], ...]
-    fates: Places
+    outcome: Places
     number: Places
     sent: Array
     arrives: Array

@@ -18,6 +18,8 @@ SLOT = 13e-6
 """aSlotTime in 10 MHz [s]."""
 AIFS = 32e-6 + 6 * SLOT
 """SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
+FEW = 6
+"""Up to so many stations, plain numbers are faster than arrays."""
 CONTENTION_WINDOW = 15
 """aCWmin: broadcast messages wait 0 to 15 slots and are never repeated."""
 
@@ -41,6 +43,24 @@ class Csma(Access):
         return np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)
 
     def starts(self) -> Array:
+        return self._starts_of_few() if len(self.names) <= FEW else self._starts_of_many()
+
+    def _starts_of_few(self) -> Array:
+        """The same in plain numbers, one station after the other."""
+        free, slots, fixed = self.free_from.tolist(), self._slots.tolist(), self._fixed.tolist()
+        found = []
+        for row, ready in enumerate(self.ready.tolist()):
+            if ready == math.inf:
+                found.append(math.inf)
+                continue
+            if math.isnan(slots[row]) and ready < free[row] + AIFS:
+                self._draw(np.array([row]))
+                slots[row] = float(self._slots[row])
+            waited = ready if math.isnan(slots[row]) else max(ready, free[row]) + AIFS + slots[row] * SLOT
+            found.append(waited if math.isnan(fixed[row]) else fixed[row])
+        return np.array(found)
+
+    def _starts_of_many(self) -> Array:
         met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
         if met_busy.any():
             self._draw(np.flatnonzero(met_busy))

@@ -75,7 +75,7 @@ def test_columns_say_what_events_say(profile: dict[str, Any]) -> None:
             assert len(events) == len(block) > 0
             assert [fates.names[row] for row in fates.senders.tolist()] == [event.sender for event in events]
             assert [fates.names[row] for row in fates.receivers.tolist()] == [event.receiver for event in events]
-            outcomes = [fates.outcomes[code] for code in fates.fates.tolist()]
+            outcomes = [fates.outcomes[code] for code in fates.outcome.tolist()]
             assert outcomes == [(event.outcome, event.reason) for event in events]
             assert fates.number.tolist() == [event.number for event in events]
             assert fates.sent.tolist() == [event.sent for event in events]

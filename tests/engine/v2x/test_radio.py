@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
-from eidrive_scenario.v2x.radio import budget, reception
+from eidrive_scenario.v2x.radio import budget, csma, reception
 from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.channel import RadioChannel
@@ -144,6 +144,7 @@ def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
     (few, heard_few) = told()
     monkeypatch.setattr(budget, "FEW", 0)
     monkeypatch.setattr(reception, "FEW", 0)
+    monkeypatch.setattr(csma, "FEW", 0)
     (many, heard_many) = told()
     assert len(few) == len(many) > 400
     assert len({event.reason for event in few}) > 2
