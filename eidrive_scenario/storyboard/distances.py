@@ -66,9 +66,9 @@ def distance(
     """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
 
     The straight distance is that in space. Longitudinal distances are positive ahead, lateral ones to the left, both as
-    `a` looks; free space is at least 0 in amount, and 0 where the two overlap along that axis. In the frames of lane and
-    road the algorithm says which way of several is measured. In that of the trajectory `a` looks along the one that it
-    follows; without one ahead.
+    `a` looks; free space is at least 0 in amount, and 0 where the two overlap along that axis. In the frames of lane
+    and road the algorithm says which way of several is measured. In that of the trajectory `a` looks along the one that
+    it follows; without one ahead.
     """
     if kind == "euclidianDistance":
         return _straight(stage, a, b, freespace)
