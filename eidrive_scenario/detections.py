@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.records import made_often
+
 Array = NDArray[np.float64]
 
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
 
 
+@made_often
 @dataclass(frozen=True)
 class Detections:
     """Perceived objects at one instant.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from eidrive_scenario.records import made_often
+
 Vector3 = tuple[float, float, float]
 
 
@@ -51,6 +53,7 @@ class ActorSpec:
     """Body paint, red green blue in [0, 1]; by the name where None."""
 
 
+@made_often
 @dataclass(frozen=True)
 class Placement:
     """Where a scripted actor stands after the next step: reference point [m], angles [rad], speed [m/s]."""
@@ -66,6 +69,7 @@ class Placement:
     """True where the actor jumps: velocity and acceleration then follow `speed`, not the distance covered."""
 
 
+@made_often
 @dataclass(frozen=True)
 class Control:
     """Pedals and steering of a driven vehicle for the next step."""

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.records import made_often
+
 Array = NDArray[np.float64]
 
 _FEW = 16
@@ -48,6 +50,7 @@ class ActorState(NamedTuple):
     speed: float
 
 
+@made_often
 @dataclass(frozen=True)
 class WorldView:
     """All actors at time `time` [s]; one row per actor, in the order in which they entered the world.

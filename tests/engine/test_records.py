@@ -1,0 +1,76 @@
+"""Records made often: as frozen dataclasses, only quicker."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from dataclasses import FrozenInstanceError, asdict, dataclass, field, replace
+
+import pytest
+
+from eidrive_scenario.records import made_often
+
+
+@made_often
+@dataclass(frozen=True)
+class Record:
+    number: int
+    name: str = "none"
+    parts: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if self.number < 0:
+            raise ValueError("a number below 0")
+
+
+def test_fields_are_set_by_place_and_by_name_with_their_defaults() -> None:
+    assert asdict(Record(1)) == {"number": 1, "name": "none", "parts": []}
+    assert asdict(Record(2, "two", [3])) == {"number": 2, "name": "two", "parts": [3]}
+    assert Record(number=2, parts=[3], name="two") == Record(2, "two", [3])
+    assert repr(Record(1)).endswith("Record(number=1, name='none', parts=[])")
+
+
+def test_each_record_has_a_default_of_its_own() -> None:
+    first, second = Record(1), Record(1)
+    first.parts.append(5)
+    assert second.parts == []
+
+
+def test_nobody_changes_a_field() -> None:
+    record = Record(1)
+    with pytest.raises(FrozenInstanceError):
+        record.number = 2  # type: ignore[misc]
+    with pytest.raises(FrozenInstanceError):
+        del record.name
+    assert record.number == 1
+
+
+def test_what_the_class_checks_is_checked() -> None:
+    with pytest.raises(ValueError, match="below 0"):
+        Record(-1)
+    with pytest.raises(ValueError, match="below 0"):
+        replace(Record(1), number=-1)
+
+
+def test_wrong_arguments_are_refused_under_the_name_of_the_class() -> None:
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'number'"):
+        Record()  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="unexpected keyword argument 'size'"):
+        Record(1, size=2)  # type: ignore[call-arg]
+    assert list(inspect.signature(Record).parameters) == ["number", "name", "parts"]
+
+
+def test_it_can_be_copied_between_processes() -> None:
+    record = Record(4, "four", [1, 2])
+    assert pickle.loads(pickle.dumps(record)) == record
+    assert replace(record, name="vier") == Record(4, "vier", [1, 2])
+
+
+def test_a_class_with_fields_that_are_no_parameters_is_refused() -> None:
+    @dataclass(frozen=True)
+    class Derived:
+        number: int
+        twice: int = field(init=False, default=0)
+
+    with pytest.raises(TypeError, match="no parameters"):
+        made_often(Derived)
