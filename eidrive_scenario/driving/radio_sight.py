@@ -47,7 +47,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
     view = world.view()
     if count <= _FEW:
         met = world.first_met(*_ends(places, pairs))
-        if all(row in (NOTHING, view.rows[second]) for row, (_, second) in zip(met, pairs, strict=True)):
+        if all(row in (NOTHING, view.rows.get(second)) for row, (_, second) in zip(met, pairs, strict=True)):
             return SightLines(np.full(count, LOS), np.full(count, -np.inf), {})
     origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
     states, heights = np.full(count, LOS), np.full(count, -np.inf)
