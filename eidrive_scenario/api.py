@@ -59,6 +59,7 @@ from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.multi_axle import turning_wheelbase
 from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [
@@ -165,5 +166,6 @@ __all__ = [
     "route_of",
     "suggestion",
     "traffic",
+    "turning_wheelbase",
     "wrap_angle",
 ]

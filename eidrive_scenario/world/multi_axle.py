@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from eidrive_scenario.openscenario.model import Vehicle
 from eidrive_scenario.world.dynamics import Demand, SingleTrack, VehicleParameters, fiala, left_by
+from eidrive_scenario.world.specs import actor_spec
 
 
 @dataclass
@@ -57,6 +59,22 @@ class MultiAxleTrack(SingleTrack):
             self._wheels.append(_Wheels(lever, axle.front, gain, axle.max_steering, slowest))
         self._wheels[0].gain = 1.0
 
+    @property
+    def turning_wheelbase(self) -> float:
+        """Tangent of the front wheels' angle over the curvature of a slow turn, Winkler's equivalent wheelbase [m].
+
+        In it the side forces, cornering stiffness times slip, and their moments are in balance.
+        """
+        forces = lever = moment = steered = twisted = 0.0
+        for wheels in self._wheels:
+            stiffness = self._stiffness_front if wheels.front else self._stiffness_rear
+            forces += stiffness
+            lever += stiffness * wheels.lever
+            moment += stiffness * wheels.lever**2
+            steered += stiffness * wheels.gain
+            twisted += stiffness * wheels.gain * wheels.lever
+        return (forces * moment - lever * lever) / (forces * twisted - lever * steered)
+
     def advance(self, forward: float, left: float, yaw_rate: float, demand: Demand) -> tuple[float, float, float]:
         """As `SingleTrack.advance`."""
         if self.steering != demand.steering:
@@ -92,6 +110,15 @@ class MultiAxleTrack(SingleTrack):
                 angle = math.atan(wheels.gain * tangent)
                 angle = min(max(angle, -wheels.max_steering), wheels.max_steering)
                 wheels.cos, wheels.sin = math.cos(angle), math.sin(angle)
+
+
+def turning_wheelbase(vehicle: Vehicle) -> float:
+    """On which a vehicle turns at low speed [m]: from the rear to the front axle, more with further axles; 0 without
+    a front axle. Raises InputError if something in the vehicle is wrong."""
+    spec = actor_spec(vehicle.name, vehicle)
+    if spec.wheelbase <= 0.0 or not spec.extra_axles:
+        return max(spec.wheelbase, 0.0)
+    return MultiAxleTrack(VehicleParameters.of(spec), 1.0).turning_wheelbase
 
 
 def track_of(parameters: VehicleParameters, step: float) -> SingleTrack:

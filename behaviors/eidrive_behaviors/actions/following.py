@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import Layout, Pose, model, wrap_angle
+from eidrive_scenario.api import Layout, Pose, model, turning_wheelbase, wrap_angle
 
 TINY = 1e-9
 ON_PATH = 1e-3
@@ -138,7 +138,7 @@ def follows(dynamics: model.TransitionDynamics) -> bool:
 
 def largest_curvature(vehicle: model.Vehicle) -> float:
     """Of a path of the rear axle [1/m], with the front wheels turned as far as they go; inf if nothing says it."""
-    wheelbase = wheelbase_of(vehicle)
+    wheelbase = turning_wheelbase(vehicle) if vehicle.axles.additional_axle else wheelbase_of(vehicle)
     front = vehicle.axles.front_axle
     steering = abs(front.max_steering) if front is not None else 0.0
     return math.tan(min(steering, 1.5)) / wheelbase if wheelbase > 0.0 and steering > 0.0 else math.inf

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from eidrive_behaviors.actions.following import largest_curvature
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, ExtraAxle, Placement
 from eidrive_scenario.world.dynamics import GRAVITY, VehicleParameters
 from eidrive_scenario.world.meshes import actor_mesh
-from eidrive_scenario.world.multi_axle import MultiAxleTrack, track_of
+from eidrive_scenario.world.multi_axle import MultiAxleTrack, track_of, turning_wheelbase
 from eidrive_scenario.world.specs import actor_spec
 
 STEP = 0.005
@@ -50,7 +51,7 @@ def equivalent_wheelbase(spec: ActorSpec, steering: float = 0.005) -> float:
     return one - (two - one) * slow**2 / (fast**2 - slow**2)
 
 
-def xml(category: str, front: bool, *additional: float) -> model.Vehicle:
+def xml(category: str, front: bool, *additional: float, steering: float = 0.1) -> model.Vehicle:
     axle = {"position_z": 0.5, "track_width": 1.9, "wheel_diameter": 1.0}
     return model.Vehicle(
         name="semi", vehicle_category=model.VehicleCategory(category), mass=18_000.0,
@@ -61,7 +62,7 @@ def xml(category: str, front: bool, *additional: float) -> model.Vehicle:
         axles=model.Axles(
             front_axle=model.Axle(max_steering=0.7, position_x=4.8, **axle) if front else None,
             rear_axle=model.Axle(max_steering=0.0, position_x=0.0, **axle),
-            additional_axle=tuple(model.Axle(max_steering=0.1, position_x=x, **axle) for x in additional),
+            additional_axle=tuple(model.Axle(max_steering=steering, position_x=x, **axle) for x in additional),
         ),
     )  # fmt: skip
 
@@ -98,6 +99,17 @@ def test_a_tandem_turns_on_the_equivalent_wheelbase(spread: float) -> None:
     expected = p.wheelbase * (1.0 + tandem / p.wheelbase**2 * (1.0 + ratio))
     assert equivalent_wheelbase(spec) == pytest.approx(expected, rel=2e-3)
     assert equivalent_wheelbase(TRUCK) == pytest.approx(4.8, rel=2e-3)
+
+
+def test_the_turning_wheelbase_of_a_vehicle_in_a_file() -> None:
+    """What scripted vehicles keep to that follow a trajectory as they can."""
+    assert turning_wheelbase(xml("truck", True)) == 4.8
+    assert turning_wheelbase(xml("truck", True, -1.4)) == pytest.approx(4.8)  # its maxSteering is 0.1
+    assert turning_wheelbase(xml("trailer", False, -1.4)) == 0.0
+    fixed = xml("truck", True, -1.4, steering=0.0)
+    assert turning_wheelbase(fixed) == pytest.approx(5.5 * (1.0 + 0.7**2 / 5.5**2 * (1.0 + 18 * 0.9 / (14 * 0.55))))
+    assert largest_curvature(fixed) == pytest.approx(math.tan(0.7) / turning_wheelbase(fixed))
+    assert largest_curvature(xml("truck", True)) == pytest.approx(math.tan(0.7) / 4.8)
 
 
 def test_an_axle_that_steers_rolls_about_the_same_point() -> None:
