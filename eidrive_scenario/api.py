@@ -25,7 +25,7 @@ from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.storyboard.actor import Actor, is_ours
@@ -117,6 +117,7 @@ __all__ = [
     "Report",
     "RoadNetwork",
     "Route",
+    "RouteError",
     "RoutePlanner",
     "Scenario",
     "ScenarioError",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ def route_of(
     seed: int = 0,
     again: bool = False,
 ) -> Route:
-    """The way through the waypoints of a route, from `start` if given. Raises ScenarioError, RouteError.
+    """The way through the waypoints of a route, from `start` if given. Raises ScenarioError.
 
     Each waypoint's strategy chooses the way to it; of the random one the seed and the route's name decide. With `again`
     a closed route comes back to its first waypoint; from `start` a way leads there, and the closed route is its lap.
@@ -51,16 +51,28 @@ def route_of(
             )
         places.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
-    if not (again and route.closed):
+    try:
+        return _through(places, roads, costs, start, closed=again and route.closed)
+    except RouteError as error:
+        what = "round the closed" if again and route.closed else "along the"
+        message = f"no way leads {what} route {route.name!r}: {error.problems[0].message}"
+        remedy = "change its waypoints" + (', or say closed="false"' if again and route.closed else "")
+        raise ScenarioError(Problem(message, remedy, route.source, route.line)) from error
+
+
+def _through(
+    places: Sequence[LaneLocation],
+    roads: RoadNetwork,
+    costs: Sequence[Cost | None],
+    start: LaneLocation | None,
+    *,
+    closed: bool,
+) -> Route:
+    if not closed:
         if start is not None:
             return roads.route(start, places[-1], places[:-1], costs)
         return roads.route(places[0], places[-1], places[1:-1], costs[1:])
-    try:
-        lap = replace(roads.route(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
-    except RouteError as error:
-        message = f"no way leads round the closed route {route.name!r}: {error.problems[0].message}"
-        remedy = 'change its waypoints, or say closed="false"'
-        raise ScenarioError(Problem(message, remedy, route.source, route.line)) from error
+    lap = replace(roads.route(places[0], places[0], places[1:], [*costs[1:], costs[0]]), closed=True)
     if start is None or (start[:2] == places[0][:2] and abs(start.s - places[0].s) < HERE):
         return lap
     return replace(roads.route(start, places[0], costs=costs[:1]), lap=lap)

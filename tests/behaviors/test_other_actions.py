@@ -41,6 +41,21 @@ def test_a_position_to_acquire_is_a_route_from_here(scene: Any) -> None:
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [300.0, -2.0]])
 
 
+@pytest.mark.parametrize(
+    "action",
+    [
+        "<AcquirePositionAction>{}</AcquirePositionAction>",
+        '<AssignRouteAction><Route name="back" closed="false"><Waypoint routeStrategy="shortest">{}</Waypoint>'
+        '<Waypoint routeStrategy="shortest">{}</Waypoint></Route></AssignRouteAction>',
+    ],
+)
+def test_a_position_to_which_no_lanes_lead_is_told_with_its_line(scene: Any, action: str) -> None:
+    """It lies behind, in a lane of the same direction."""
+    behind, further = (f'<Position><LanePosition roadId="1" laneId="-2" s="{s}"/></Position>' for s in (50, 20))
+    with pytest.raises(ScenarioError, match=r"scene\.xosc:\d+: .*no way over the lanes from road '1' lane -"):
+        scene(0.2, ("Ego", private(f"<RoutingAction>{action.format(behind, further)}</RoutingAction>")))
+
+
 @pytest.mark.element("ActivateControllerAction")
 def test_a_controller_that_is_turned_off_leaves_the_actor_to_its_lane(scene: Any) -> None:
     off = private(

@@ -13,6 +13,7 @@ from eidrive_scenario.api import (
     EidriveError,
     Goal,
     Route,
+    RouteError,
     Stage,
     any_branch,
     generator,
@@ -69,11 +70,15 @@ class AcquirePositionAction(ActionBehaviour):
     action: model.AcquirePositionAction
 
     def update(self) -> Status:
-        """Lay the route out."""
+        """Lay the route out. Raises ScenarioError where there is none."""
         place = resolve(self.action.position, self.stage, self.actor.name)
         here = self.stage.location(self.actor.name)
         if self.stage.roads is not None and here is not None and place.location is not None:
-            follow(self, self.stage.roads.route(here, place.location))
+            try:
+                route = self.stage.roads.route(here, place.location)
+            except RouteError as error:
+                raise self.problem(f"finds {error.problems[0].message}", error.problems[0].remedy) from None
+            follow(self, route)
         elif self.actor.driven:
             goal = self.actor.goal
             self.actor.goal = replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]]))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
 
 WORDS = {"true": 1.0, "false": 0.0}
+"""What a boolean counts as."""
+NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?INF", re.ASCII)
 
 
 def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
@@ -35,10 +39,9 @@ def measured(text: str | None, rule: model.Rule, limit: str) -> tuple[Measure, .
 
 
 def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return WORDS.get(text.strip().lower())
+    """A number as XML writes it; Python's own spellings, as 1_000, are words."""
+    plain = text.strip()
+    return float(plain) if NUMBER.fullmatch(plain) else WORDS.get(plain.lower())
 
 
 class ParameterCondition(Condition):

@@ -113,7 +113,7 @@ def impossible_routes(survey: RoadSurvey) -> Iterator[Problem]:
             route_of(route, survey.roads, survey.place, again=True)  # type: ignore[arg-type]
         except InputError as error:
             for problem in error.problems:
-                yield at(route, f"route {route.name!r}: {problem.message}", problem.remedy or "change its waypoints")
+                yield at(route, problem.message, problem.remedy)
 
 
 def _routes(survey: RoadSurvey) -> Iterator[Route]:
