@@ -165,8 +165,10 @@ def _nearest_corner(
     nearest = math.inf
     for px, py in ((x + lx + wx, y + ly + wy), (x - lx + wx, y - ly + wy),
                    (x - lx - wx, y - ly - wy), (x + lx - wx, y + ly - wy)):  # fmt: skip
-        ex, ey = max(abs(px) - half_length, 0.0), max(abs(py) - half_width, 0.0)
-        nearest = min(nearest, ex * ex + ey * ey)
+        ex, ey = abs(px) - half_length, abs(py) - half_width
+        square = (ex * ex if ex > 0.0 else 0.0) + (ey * ey if ey > 0.0 else 0.0)
+        if square < nearest:
+            nearest = square
     return nearest
 
 

@@ -33,7 +33,7 @@ class MinDistance(PairCriterion):
         self._centre = self._box = math.inf
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
-        a, b = view.boxes[of].tolist(), view.boxes[to].tolist()
+        a, b = view.plain_boxes[of], view.plain_boxes[to]
         pair = {self.of, self.to}
         # Bodies that touched within the step may stand apart again at its end.
         touched = any({contact.first, contact.second} == pair for contact in view.contacts)

@@ -42,6 +42,8 @@ class AverageFusion(FusionMethod):
             return Detections(now)
         if len(present) == 1:
             only = present[0]
+            if only.time == now:
+                return only
             return Detections(now, only.boxes, only.scores, only.classes, only.velocity, only.covariance, only.tracks)
         labels = self._labels(present)
         return joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)

@@ -28,6 +28,8 @@ _AROUND: Mapping[str, Codec] = {
 _FATE = struct.Struct("<3Q4d")
 """How the fate of a message enters: sender, receiver and outcome with reason as words of 64 bits; number, sent, arrives
 [s], infinity where lost, and size [bytes]."""
+_TIME = struct.Struct("<d")
+_FLOAT = np.dtype("<f8")
 _FEW = 16
 """So many fates are faster one by one."""
 
@@ -55,10 +57,9 @@ class TraceHash:
         view = frame.view
         if view.names is not self._names:
             self._names, self._named = view.names, _packed(view.names)
-        self._sha.update(self._named)
-        self._floats(view.time)
         kinematics = (view.position, view.yaw, view.pitch, view.roll, view.velocity)
-        self._sha.update(b"".join([part.astype("<f8", copy=False).tobytes() for part in kinematics]))
+        poses = [part.astype(_FLOAT, copy=False).tobytes() for part in kinematics]
+        self._sha.update(b"".join([self._named, _TIME.pack(view.time), *poses]))
         for contact in view.contacts:
             self._texts("contact", contact.first, contact.second)
             self._floats(*contact.position, contact.impact_speed)

@@ -115,7 +115,7 @@ def few_candidates(
     sensors: Sequence[TruthSensor], own: Sequence[int], view: WorldView, unseen: Sequence[int]
 ) -> list[list[int]]:
     """The same as `candidates` in plain numbers."""
-    boxes = view.boxes.tolist()
+    boxes = view.plain_boxes
     found: list[list[int]] = []
     for sensor, station in zip(sensors, own, strict=True):
         x, y, z, *_, yaw = boxes[station]
@@ -165,7 +165,7 @@ def few_visibilities(
     sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
 ) -> list[float]:
     """The same as `visibilities` in plain numbers."""
-    boxes = view.boxes.tolist()
+    boxes = view.plain_boxes
     starts: list[Point] = []
     points: list[Point] = []
     for sensor, station, rows in zip(sensors, own, targets, strict=True):

@@ -11,6 +11,7 @@ from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.builder import Builder
 from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.external import ExternalObjects
@@ -95,12 +96,12 @@ class Storyboard:
         if self.root.state is State.COMPLETE and self.ended is None:
             self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
         commands = self.stage.commands
-        self._bring_trailers()
+        trains = self._bring_trailers()
         self._refresh(commands)
         for stand_in in self._stand_ins:
             if stand_in.actor.present and not stand_in.actor.driven:
                 stand_in.step()
-        drawn = {back.name for _, back in pairs(self.stage.actors)}
+        drawn = {back.name for _, back in trains}
         for name, actor in self.stage.actors.items():
             if not actor.present or name in drawn:
                 continue
@@ -108,7 +109,7 @@ class Storyboard:
                 commands.placements[name] = actor.motion.step(self.dt)
             elif actor.motion.jumped:
                 commands.placements[name] = actor.motion.placement()
-        for front, back in pairs(self.stage.actors):
+        for front, back in trains:
             if front.present and back.present:
                 back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
                 back.motion.jumped, back.motion.speed = front.motion.jumped, front.motion.speed
@@ -117,12 +118,17 @@ class Storyboard:
         self.stage.traffic.step(view.without(passed_over), self.dt, commands)
         return self._finished(commands)
 
-    def _bring_trailers(self) -> None:
-        """Trailers enter with what draws them, in line; in Init they are put there wherever they were placed."""
-        for front, back in pairs(self.stage.actors):
+    def _bring_trailers(self) -> list[tuple[Actor, Actor]]:
+        """Trailers enter with what draws them, in line; in Init they are put there wherever they were placed.
+
+        Who draws whom, from the front of each train to its end.
+        """
+        trains = list(pairs(self.stage.actors))
+        for front, back in trains:
             if front.present and (not back.present or self.stage.view.tick < 0):
                 back.motion.speed = front.motion.speed
                 self.stage.enter(back.name, Place(pose_behind(front, back, straight=True)))
+        return trains
 
     def _refresh(self, commands: Commands) -> None:
         """Who enters has the speed that later actions of the same tick gave it."""

@@ -135,6 +135,15 @@ class ScriptedBody(Body):
         self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
         self._resting = False
         """Whether it did not move in the last step, and came to its stand before that."""
+        self._resting_state: ActorState | None = None
+
+    @property
+    def state(self) -> ActorState:
+        if not self._resting:
+            return super().state
+        if self._resting_state is None:
+            self._resting_state = super().state
+        return self._resting_state
 
     @property
     def travel(self) -> float:
@@ -176,7 +185,7 @@ class ScriptedBody(Body):
             self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
         is_moving = self.moved or self.velocity != STILL
         self.stale = self.stale or was_moving or is_moving
-        self._resting = not is_moving and self.acceleration == STILL
+        self._resting, self._resting_state = not is_moving and self.acceleration == STILL, None
 
     def settle(self) -> None:
         """Put the rigid body where the actor is."""

@@ -83,7 +83,7 @@ class Scenery:
         if self.level or self.roads is None:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
             # Without a shape to show, pybullet loads a textured plane from a file, which takes 7 ms.
-            shown = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=0.01, **here)
+            shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **here)
             self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND, shown)
             return True
         for mesh in surface_meshes(self.roads, 4.0):

@@ -135,11 +135,19 @@ class WorldView:
         return self.boxes[:, :3]
 
     @cached_property
+    def plain_boxes(self) -> Sequence[Sequence[float]]:
+        """The rows of `boxes` in plain numbers: for looks at single actors, at which arrays are slow."""
+        if len(self.names) <= _FEW:
+            bodies = zip(self.states, self.offset.tolist(), self.size.tolist(), strict=True)
+            return [_box(*body) for body in bodies]
+        rows: list[list[float]] = self.boxes.tolist()
+        return rows
+
+    @cached_property
     def boxes(self) -> Array:
         """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
         if 0 < len(self.names) <= _FEW:
-            bodies = zip(self.states, self.offset.tolist(), self.size.tolist(), strict=True)
-            return np.array([_box(*body) for body in bodies])
+            return np.array(self.plain_boxes)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T
         centres = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
