@@ -57,7 +57,8 @@ class Book:
     lost: int = 0
     bytes_sent: int = 0
     lost_by: dict[str, int] = field(default_factory=dict)
-    fates: dict[int, list[int]] = field(default_factory=dict)
+    fates: dict[int, int] = field(default_factory=dict)
+    deliveries: dict[int, int] = field(default_factory=dict)
     """By class of distance: how many fates are known, and how many of them are deliveries."""
 
     def lose(self, reason: str, count: int = 1) -> None:
@@ -67,9 +68,12 @@ class Book:
 
     def fate(self, distance: float, delivered: bool) -> None:
         """The fate of a message over this distance [m] is known."""
-        known = self.fates.setdefault(int(distance // DISTANCE_BIN), [0, 0])
-        known[0] += 1
-        known[1] += delivered
+        self.decide(int(distance // DISTANCE_BIN), 1, int(delivered))
+
+    def decide(self, place: int, known: int, delivered: int) -> None:
+        """So many fates are known in this class of distance, and so many of them are deliveries."""
+        self.fates[place] = self.fates.get(place, 0) + known
+        self.deliveries[place] = self.deliveries.get(place, 0) + delivered
 
     def statistics(self, now: float, heard: Heard | None, busy_ratio: float | None = None) -> LinkStatistics:
         """The books as they stand; `heard` is None where nothing was yet."""
@@ -87,6 +91,8 @@ class Book:
             peak_age=None if heard is None else heard.peak_age,
             p95_age=None if heard is None else heard.p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
-            reception=tuple((DISTANCE_BIN * place, known, kept) for place, (known, kept) in sorted(self.fates.items())),
+            reception=tuple(
+                (DISTANCE_BIN * place, known, self.deliveries[place]) for place, known in sorted(self.fates.items())
+            ),
             busy_ratio=busy_ratio,
         )

@@ -62,8 +62,6 @@ class Ledger:
         fates = self._fates[senders, receivers]
         where = np.nonzero(fates.any(axis=2))
         for place, nearest, (lost, kept) in zip(*(column.tolist() for column in (*where, fates[where])), strict=True):
-            known = books[place].fates.setdefault(nearest, [0, 0])
-            known[0] += lost + kept
-            known[1] += kept
+            books[place].decide(nearest, lost + kept, kept)
         for counts in (self._sent, self._bytes, self._causes, self._fates):
             counts[...] = 0
