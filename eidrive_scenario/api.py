@@ -54,6 +54,7 @@ from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 from eidrive_scenario.storyboard.transition import Transition as ValueTransition
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
+from eidrive_scenario.v2x.link_events import FateBlock, Fates, LinkEvents
 from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
@@ -89,6 +90,8 @@ __all__ = [
     "EidriveError",
     "EntityCondition",
     "Environment",
+    "FateBlock",
+    "Fates",
     "Frame",
     "FusionMethod",
     "Goal",
@@ -100,6 +103,7 @@ __all__ = [
     "LightState",
     "LinkChannel",
     "LinkEvent",
+    "LinkEvents",
     "Measure",
     "Message",
     "Motion",
