@@ -61,7 +61,10 @@ class Speaker:
             return ()
         interval = min(interval, LONGEST)
         said: list[Message] = []
-        for kind in sorted(self._settings.messages, key=lambda kind: (self._said[kind], kind)):
+        kinds = self._settings.messages
+        if len(kinds) > 1:
+            kinds = tuple(sorted(kinds, key=lambda kind: (self._said[kind], kind)))
+        for kind in kinds:
             if etsi and interval > 0.0 and now - max(self._said.values()) < interval - EQUAL:
                 break
             if etsi:
@@ -73,7 +76,7 @@ class Speaker:
             if messages:
                 self._said[kind] = now
             said += messages
-        return tuple(self._clock.stamped(message, now) for message in said)
+        return tuple([self._clock.stamped(message, now) for message in said])
 
     def _due(
         self, kind: str, state: StationState, detections: Detections, now: float, shortest: float

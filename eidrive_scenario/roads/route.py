@@ -222,12 +222,12 @@ class Route:
         owner: list[int] = []
         places: list[float] = []
         for number, leg in enumerate(self.legs):
+            road = self.roads[leg.road]
             count = max(math.ceil(abs(leg.s_end - leg.s) / GRAIN), 1) + 1
-            for s in np.linspace(leg.s, leg.s_end, count).tolist():
-                pose = road_pose_at(self.roads[leg.road], s, self._t(leg, s))
-                rows.append(pose[:3])
-                owner.append(number)
-                places.append(s)
+            stations = np.linspace(leg.s, leg.s_end, count).tolist()
+            rows += [road_pose_at(road, s, self._t(leg, s))[:3] for s in stations]
+            owner += [number] * count
+            places += stations
         points = np.array(rows)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
         return points, along, np.array(owner, dtype=np.float64), np.array(places)

@@ -170,15 +170,29 @@ def few_visibilities(
     points: list[Point] = []
     for sensor, station, rows in zip(sensors, own, targets, strict=True):
         if rows:
-            aims = [point for row in rows for point in _few_points(boxes[row])]
-            starts += few_past_box(sensor.mounting.position(view, station), aims, boxes[station])
-            points += aims
+            origin, body = sensor.mounting.position(view, station), boxes[station]
+            for row in rows:
+                aims = _few_points(boxes[row])
+                starts += [origin] * len(aims) if _above(origin, body, boxes[row]) else few_past_box(origin, aims, body)
+                points += aims
     met = scene.first_met(starts, points)
     shares, number = [], len(SAMPLES)
     for index, row in enumerate([row for rows in targets for row in rows]):
         part = met[index * number : (index + 1) * number]
         shares.append((part.count(row) + part.count(NOTHING)) / number)
     return shares
+
+
+def _above(origin: Point, own: Sequence[float], other: Sequence[float]) -> bool:
+    """Whether all rays from an origin above the own body to another box surely leave it behind while above its top."""
+    x, y, z = origin
+    drop = z - own[2] - own[5] / 2.0
+    if drop <= 0.0:
+        return False
+    reach = math.hypot(x - own[0], y - own[1]) + math.hypot(own[3], own[4]) / 2.0
+    nearest = math.hypot(other[0] - x, other[1] - y) - math.hypot(other[3], other[4]) / 2.0
+    fall = z - other[2] + other[5] / 2.0
+    return fall * reach < drop * nearest
 
 
 def _points(boxes: Array) -> Array:

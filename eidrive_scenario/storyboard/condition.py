@@ -105,7 +105,7 @@ class EntityCondition(Condition):
 
     def holds(self, stage: Stage) -> bool:
         """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
-        self.fulfilled = tuple(name for name in self.entities if name in stage.view and self.holds_for(stage, name))
+        self.fulfilled = tuple([name for name in self.entities if name in stage.view and self.holds_for(stage, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
 
     def explain(self, stage: Stage) -> str:

@@ -170,6 +170,9 @@ class Demand(NamedTuple):
     grip_front: float
     grip_rear: float
     """Largest forces of the tyres [N]."""
+    traction_front: float
+    traction_rear: float
+    """Largest forces along the wheels [N]."""
     slope: float
     """Force of the slope along the vehicle [N]."""
 
@@ -221,6 +224,8 @@ class SingleTrack:
             direction=-1.0 if control.reverse else 1.0,
             grip_front=grip_front,
             grip_rear=grip_rear,
+            traction_front=LONGITUDINAL_SHARE * grip_front,
+            traction_rear=LONGITUDINAL_SHARE * grip_rear,
             slope=p.mass * GRAVITY * math.sin(pitch),
         )
 
@@ -260,8 +265,6 @@ class SingleTrack:
         """Forces along the wheels at the front and the rear axle, and those that need no tyre [N]."""
         p = self.parameters
         free = demand.slope - self._drag * forward * abs(forward)
-        traction_front = LONGITUDINAL_SHARE * demand.grip_front
-        traction_rear = LONGITUDINAL_SHARE * demand.grip_rear
         front = rear = 0.0
         if demand.throttle > 0.0:
             direction = demand.direction
@@ -274,15 +277,15 @@ class SingleTrack:
             if drive > to_top:
                 drive = max(to_top, 0.0)
             drive *= direction
-            front = _limited(drive * p.drive_front, traction_front)
-            rear = _limited(drive * (1.0 - p.drive_front), traction_rear)
+            front = _limited(drive * p.drive_front, demand.traction_front)
+            rear = _limited(drive * (1.0 - p.drive_front), demand.traction_rear)
         # Brakes and rolling resistance stop the vehicle and hold it; they never push it.
         to_rest = self._stop * forward + free + front + rear
         rolling = _limited(to_rest, self._rolling)
         if demand.brake > 0.0:
             brake = _limited(to_rest - rolling, demand.brake)
-            front = _limited(front - brake * p.weight_front, traction_front)
-            rear = _limited(rear - brake * (1.0 - p.weight_front), traction_rear)
+            front = _limited(front - brake * p.weight_front, demand.traction_front)
+            rear = _limited(rear - brake * (1.0 - p.weight_front), demand.traction_rear)
         return front, rear, free - rolling
 
 
