@@ -54,32 +54,29 @@ def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) 
     cos, sin = math.cos(yaw), math.sin(yaw)
     ox, oy, oz = origin
     px, py, pz = cos * (ox - x) + sin * (oy - y), cos * (oy - y) - sin * (ox - x), oz - z
-    # First the slab that the origin is farthest outside of: most rays miss the box by that.
-    places = sorted([(px, length / 2.0, 0), (py, width / 2.0, 1), (pz, height / 2.0, 2)], key=_inside)
-    slabs = [(axis, -half - place, half - place) for place, half, axis in places]
+    back, front = -length / 2.0 - px, length / 2.0 - px
+    right, left = -width / 2.0 - py, width / 2.0 - py
+    bottom, top = -height / 2.0 - pz, height / 2.0 - pz
     starts = []
     for tx, ty, tz in targets:
         dx, dy, dz = tx - ox, ty - oy, tz - oz
-        steps = (cos * dx + sin * dy, cos * dy - sin * dx, dz)
-        enter, leave = -math.inf, math.inf
-        for axis, low, high in slabs:
-            step = steps[axis] or PARALLEL
-            first, second = low / step, high / step
-            if first > second:
-                first, second = second, first
-            if first > enter:
-                enter = first
-            if second < leave:
-                leave = second
-            if enter >= leave or leave <= 0.0 or enter >= 1.0:
-                starts.append(origin)
-                break
+        step = cos * dx + sin * dy or PARALLEL
+        enter, leave = (back / step, front / step) if step > 0.0 else (front / step, back / step)
+        step = cos * dy - sin * dx or PARALLEL
+        first, last = (right / step, left / step) if step > 0.0 else (left / step, right / step)
+        if first > enter:
+            enter = first
+        if last < leave:
+            leave = last
+        step = dz or PARALLEL
+        first, last = (bottom / step, top / step) if step > 0.0 else (top / step, bottom / step)
+        if first > enter:
+            enter = first
+        if last < leave:
+            leave = last
+        if enter >= leave or leave <= 0.0 or enter >= 1.0:
+            starts.append(origin)
         else:
             share = min(leave + BEYOND_OWN_BODY, 1.0)
             starts.append((ox + share * dx, oy + share * dy, oz + share * dz))
     return starts
-
-
-def _inside(slab: tuple[float, float, int]) -> float:
-    """How far a place is inside of a slab by its half width; negative outside [m]."""
-    return slab[1] - abs(slab[0])
