@@ -242,11 +242,15 @@ class SingleTrack:
 
         side = left + to_front * yaw_rate
         rolling, slipping = abs(forward * cos + side * sin), side * cos - forward * sin
-        slip = slipping / (rolling if rolling > self._slowest_front else self._slowest_front)
-        side_front = fiala(slip, p.cornering_stiffness_front, left_by(demand.grip_front, along_front))
+        side_front = 0.0
+        if slipping:
+            slip = slipping / (rolling if rolling > self._slowest_front else self._slowest_front)
+            side_front = fiala(slip, p.cornering_stiffness_front, left_by(demand.grip_front, along_front))
         rolling, slipping = abs(forward), left - to_rear * yaw_rate
-        slip = slipping / (rolling if rolling > self._slowest_rear else self._slowest_rear)
-        side_rear = fiala(slip, p.cornering_stiffness_rear, left_by(demand.grip_rear, along_rear))
+        side_rear = 0.0
+        if slipping:
+            slip = slipping / (rolling if rolling > self._slowest_rear else self._slowest_rear)
+            side_rear = fiala(slip, p.cornering_stiffness_rear, left_by(demand.grip_rear, along_rear))
 
         across_front = along_front * sin - side_front * cos
         force = along_front * cos + side_front * sin + along_rear + free
