@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -102,7 +103,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder: Path = parser.parse_args(arguments).out
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in PICTURES.items():
-        picture().savefig(folder / f"{name}.png", dpi=130)
+        path = folder / f"{name}.png"
+        picture().savefig(path, dpi=130)
+        typer.echo(f"wrote {path}")
 
 
 if __name__ == "__main__":
