@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
@@ -20,7 +21,7 @@ BODY_FRICTION = 0.7
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
-class Body:
+class Body(ABC):
     """One actor: its state, plain numbers as they stand in the view's rows, and its rigid body in pybullet."""
 
     def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
@@ -53,13 +54,13 @@ class Body:
                           self.yaw_rate, self.speed)  # fmt: skip
 
     @property
+    @abstractmethod
     def travel(self) -> float:
         """How far any part of it goes within a tick, if nothing hits it and it keeps its velocity [m]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def settle(self) -> None:
         """Put the rigid body where the actor is."""
-        raise NotImplementedError
 
     def remove(self) -> None:
         """Take the body out of pybullet."""
