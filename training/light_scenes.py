@@ -102,8 +102,7 @@ def _scenes(task: tuple[int, str, int]) -> list[LightScene]:
         if chosen:
             break
     with World(place.roads) as world:
-        for index, house in enumerate(place.houses):
-            world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+        place.build_houses(world)
         return [_scene(world, place, spots, heads, chosen, rng) for _ in range(PER_WORLD)]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from lxml import etree
 
 from eidrive_scenario.roads import RoadNetwork, curves
+from eidrive_scenario.world import World
 from xosc.roads import make_roads
 from xosc.roads.make_roads import Crossing, LaneSpec, Street, add, add_lane, add_mark, add_road
 
@@ -47,6 +48,11 @@ class Place:
 
     roads: RoadNetwork
     houses: tuple[House, ...]
+
+    def build_houses(self, world: World) -> None:
+        """Put the houses into a world with these roads."""
+        for number, house in enumerate(self.houses):
+            world.add_building(f"house {number}", house.centre, house.size, house.yaw, house.colour)
 
 
 def random_place(rng: np.random.Generator, folder: Path) -> Place:

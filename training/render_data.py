@@ -53,8 +53,7 @@ def shots(seed: int, split: str, number: int) -> list[Shot]:
         place = random_place(rng, Path(folder))
     spots = Spots.of(place.roads)
     with World(place.roads) as world:
-        for index, house in enumerate(place.houses):
-            world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+        place.build_houses(world)
         return [shot(world, place, spots, rng) for _ in range(PER_WORLD)]
 
 

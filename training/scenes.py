@@ -76,8 +76,7 @@ def random_scenes(seed: int, split: str, worlds: int, weather: Weather, each: in
             place = random_place(rng, Path(folder))
         spots = Spots.of(place.roads)
         with World(place.roads) as world:
-            for index, house in enumerate(place.houses):
-                world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+            place.build_houses(world)
             world.set_weather(weather)
             for _ in range(each):
                 for name in list(world.names):

@@ -51,8 +51,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
         view = random_view(rng, spots)
         camera = Photographer(CameraSettings())
         with World(place.roads) as world:
-            for index, house in enumerate(place.houses):
-                world.add_building(f"house {index}", house.centre, house.size, house.yaw, house.colour)
+            place.build_houses(world)
             cast = random_traffic(rng, spots, view)
             for spec, placement in cast:
                 world.add(spec, placement)
