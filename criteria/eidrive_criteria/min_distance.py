@@ -34,10 +34,12 @@ class MinDistance(PairCriterion):
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
         a, b = view.plain_boxes[of], view.plain_boxes[to]
-        pair = {self.of, self.to}
-        # Bodies that touched within the step may stand apart again at its end.
-        touched = any({contact.first, contact.second} == pair for contact in view.contacts)
-        centre, box = math.hypot(b[0] - a[0], b[1] - a[1]), 0.0 if touched else box_distance(a, b)
+        centre = math.hypot(b[0] - a[0], b[1] - a[1])
+        box = centre - (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) / 2.0
+        if view.contacts and any({contact.first, contact.second} == {self.of, self.to} for contact in view.contacts):
+            box = 0.0  # Bodies that touched within the step may stand apart again at its end.
+        elif box <= self._box:  # Else they are not as near as they have been, however they are turned.
+            box = box_distance(a, b)
         self._centre, self._box = min(self._centre, centre), min(self._box, box)
         return centre if self._measure == "centre" else box
 

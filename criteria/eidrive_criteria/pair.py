@@ -42,7 +42,10 @@ class PairCriterion(Criterion):
 
     @abstractmethod
     def measure(self, view: WorldView, of: int, to: int) -> float:
-        """The quantity between the actors in these two rows; infinity where there is none now."""
+        """The quantity between the actors in these two rows; infinity where there is none now.
+
+        Where it is not the smallest yet, anything between that and the quantity will do.
+        """
 
     @abstractmethod
     def words(self) -> str:

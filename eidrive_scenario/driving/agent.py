@@ -187,8 +187,10 @@ class Agent:
 
     def _own_place(self, time: float) -> tuple[float, float, float]:
         """Centre and heading of the own body at the last instant up to `time`, or the earliest known."""
-        place = next((held for held in reversed(self._own_places) if held[0] <= time + TIME_TOLERANCE), None)
-        return (place or self._own_places[0])[1:]
+        for held in reversed(self._own_places):
+            if held[0] <= time + TIME_TOLERANCE:
+                return held[1:]
+        return self._own_places[0][1:]
 
     def _own_body(self, time: float) -> Array:
         """The own outline with a margin, as high as anything on it, at that time."""

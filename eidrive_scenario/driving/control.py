@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from eidrive_scenario.driving.path import LEADS_AWAY
 from eidrive_scenario.driving.pid import PID, Gains
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.geometry import wrap_angle
@@ -98,7 +99,7 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
 
     The heading turns evenly from one segment's middle to the next one's, so that the steering does not jump.
     """
-    best, nearest, place = 0, math.inf, 0.0
+    best, nearest, place, leads_away = 0, math.inf, 0.0, math.inf
     x0, y0 = points[0]
     for index, (x1, y1) in enumerate(points[1:]):
         dx, dy = x1 - x0, y1 - y0
@@ -108,7 +109,10 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
         ax, ay = ax - held * dx, ay - held * dy
         gap = ax * ax + ay * ay
         if gap < nearest:
-            best, nearest, place = index, gap - 2e-9 * math.sqrt(gap), held
+            root = math.sqrt(gap)
+            best, nearest, place, leads_away = index, gap - 2e-9 * root, held, (root + LEADS_AWAY) ** 2
+        elif gap > leads_away:
+            break
         x0, y0 = x1, y1
     heading = _heading(points, best)
     (x0, y0), (x1, y1) = points[best], points[best + 1]

@@ -18,6 +18,9 @@ APPROACH_DECELERATION = 3.0
 SMOOTHING_PASSES = 4
 """Each pass averages a point with its neighbours (1 2 1)/4; four take kinks of a polyline away and move a curve of
 radius R inwards by 1/R m² at most."""
+LEADS_AWAY = 5.0
+"""Where a path has come so much farther from a point than it was, its nearest place lies behind: what comes near again
+later is another bend, or another lap [m]."""
 
 
 class Path:
@@ -42,8 +45,11 @@ class Path:
         return len(self._x)
 
     def project(self, x: float, y: float, start: int = 0, reach: int = 30) -> int:
-        """Index of the point from which the nearest segment begins, among `reach` segments from `start` on."""
-        best, nearest = start, math.inf
+        """Index of the point from which the nearest segment begins, among `reach` segments from `start` on.
+
+        Those are left out that come after the path has led away from the point by LEADS_AWAY.
+        """
+        best, nearest, leads_away = start, math.inf, math.inf
         end = min(start + reach, len(self._x) - 1)
         for index, (x0, y0, dx, dy, square) in enumerate(self._segments[start:end], start):
             ax, ay = x - x0, y - y0
@@ -53,7 +59,10 @@ class Path:
                 ax, ay = ax - share * dx, ay - share * dy
             gap = ax * ax + ay * ay
             if gap < nearest:
-                best, nearest = index, gap - 2e-9 * math.sqrt(gap)
+                root = math.sqrt(gap)
+                best, nearest, leads_away = index, gap - 2e-9 * root, (root + LEADS_AWAY) ** 2
+            elif gap > leads_away:
+                break
         return best
 
     def distance(self, x: float, y: float, index: int) -> float:

@@ -25,6 +25,10 @@ HORIZON = 60
 """Points of a plan ahead of the vehicle."""
 LOOK_AHEAD = 300
 """Points of the lane that are followed at once where there is no destination."""
+STRIDE = 10
+"""So many of them are looked up at once where the lane allows it."""
+TURNS = 50.0
+"""A road up to this length may lead into itself within a stride [m]."""
 STRAYED = 2.5
 """A vehicle this far from the lane that it follows was moved by somebody else, and looks for its lane anew [m]."""
 BEHIND = 5
@@ -132,15 +136,13 @@ class RoutePlanner(Planner):
         """Along the lane and those that follow it, from where the last call left off; straight on where no lane is."""
         if self.roads is not None:
             self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
-            onward = None
-            while self._lane and len(self._lane) < LOOK_AHEAD:
-                onward = self.roads.advance(self._lane[-1], SPACING)
-                if onward is None:
-                    break
-                self._lane.append(onward)
+            onward = True
+            while onward and self._lane and len(self._lane) < LOOK_AHEAD:
+                more = _further(self.roads, self._lane[-1])
+                self._lane += more
+                onward = bool(more)
             if len(self._lane) > 1:
-                poses = [self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0) for place in self._lane]
-                return Path(np.array([(pose.x, pose.y) for pose in poses]), ends=onward is None)
+                return Path(self.roads.centres(self._lane), ends=not onward)
         reach = np.array([[0.0], [float(LOOK_AHEAD)]])
         return Path(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
@@ -154,6 +156,20 @@ class RoutePlanner(Planner):
         heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
         direction = self.roads.driving_direction(place.road, place.lane)
         return [place] if direction * math.cos(yaw - heading) > 0.0 else []
+
+
+def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
+    """The next STRIDE places along the lane, about SPACING apart; fewer where it ends."""
+    there = roads.advance(place, STRIDE * SPACING)
+    if there is not None and there[:2] == place[:2]:
+        road, step = roads.road(place.road), (there.s - place.s) / STRIDE
+        same = road.section_at(place.s) is road.section_at(there.s)
+        if same and road.length > TURNS and step * roads.driving_direction(place.road, place.lane) > 0.0:
+            return [*(place._replace(s=place.s + number * step) for number in range(1, STRIDE)), there]
+    places = [place]
+    while len(places) <= STRIDE and (onward := roads.advance(places[-1], SPACING)) is not None:
+        places.append(onward)
+    return places[1:]
 
 
 def _with_laps(line: Array, lap: Array) -> Path:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class AverageFusion(FusionMethod):
         self.gate = gate
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        ordered = sorted(reports, key=lambda report: report.station)
+        ordered = sorted(reports, key=lambda report: report.station) if len(reports) > 1 else reports
         present = [report.detections for report in ordered if len(report.detections)]
         if not present:
             return Detections(now)
@@ -129,23 +130,29 @@ def joined_few(reports: Sequence[Detections], labels: Sequence[int], now: float)
 
 def _usual(words: Sequence[str]) -> str:
     """The most frequent one, of equally frequent ones the first."""
-    return Counter(words).most_common(1)[0][0] if len(words) > 1 else words[0]
+    return Counter(words).most_common(1)[0][0] if len(words) > 2 else words[0]
 
 
 def _mean_box(boxes: list[list[float]]) -> list[float]:
     if len(boxes) == 1:
         return boxes[0]
-    mean = [sum(column) / len(boxes) for column in zip(*boxes, strict=True)]
+    mean = _mean(boxes)
     mean[6] = math.atan2(sum([math.sin(box[6]) for box in boxes]), sum([math.cos(box[6]) for box in boxes]))
     return mean
 
 
+def _mean(rows: list[list[float]]) -> list[float]:
+    if len(rows) == 2:
+        return [(a + b) / 2.0 for a, b in zip(*rows, strict=True)]
+    return [sum(column) / len(rows) for column in zip(*rows, strict=True)]
+
+
 def _mean_of_known(rows: list[list[float]]) -> list[float]:
     """Of the rows without NaN; NaN where all have one."""
-    known = [row for row in rows if not math.isnan(sum(row))]
+    known = [row for row in rows if not isnan(sum(row))]
     if not known:
         return [math.nan] * len(rows[0])
-    return known[0] if len(known) == 1 else [sum(column) / len(known) for column in zip(*known, strict=True)]
+    return known[0] if len(known) == 1 else _mean(known)
 
 
 def _sums(values: Array, labels: Indices, count: int) -> Array:

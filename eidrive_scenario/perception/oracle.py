@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
+
+Array = NDArray[np.float64]
 
 
 class OracleDetector(Detector):
@@ -25,8 +29,24 @@ class OracleDetector(Detector):
         return Detections(
             time=readings.time,
             boxes=truth.boxes,
-            scores=np.ones(count),
+            scores=_certain(count),
             classes=truth.categories,
             velocity=truth.velocity,
-            covariance=np.zeros((count, 2, 2)),
+            covariance=_exact(count),
         )
+
+
+@lru_cache(maxsize=64)
+def _certain(count: int) -> Array:
+    """(count,) scores of 1, to be shared."""
+    scores = np.ones(count)
+    scores.flags.writeable = False
+    return scores
+
+
+@lru_cache(maxsize=64)
+def _exact(count: int) -> Array:
+    """(count, 2, 2) covariances of 0, to be shared."""
+    covariance = np.zeros((count, 2, 2))
+    covariance.flags.writeable = False
+    return covariance

@@ -57,9 +57,8 @@ class TraceHash:
         view = frame.view
         if view.names is not self._names:
             self._names, self._named = view.names, _packed(view.names)
-        kinematics = (view.position, view.yaw, view.pitch, view.roll, view.velocity)
-        poses = [part.astype(_FLOAT, copy=False).tobytes() for part in kinematics]
-        self._sha.update(b"".join([self._named, _TIME.pack(view.time), *poses]))
+        poses = view.kinematics.astype(_FLOAT, copy=False).tobytes()
+        self._sha.update(b"".join([self._named, _TIME.pack(view.time), poses]))
         for contact in view.contacts:
             self._texts("contact", contact.first, contact.second)
             self._floats(*contact.position, contact.impact_speed)
@@ -68,7 +67,7 @@ class TraceHash:
             self._texts("change", change.path, change.kind, change.before.value, transition, change.after.value)
             self._floats(change.time)
         if frame.links:
-            self._texts("links")
+            self._sha.update(_LINKS)
             self._floats(len(frame.links))
             self._fates(frame.links)
         for name, how in _AROUND.items():
@@ -135,3 +134,6 @@ def _packed(texts: Sequence[str]) -> bytes:
     """Texts with their lengths before them, so that ('ab', 'c') differs from ('a', 'bc')."""
     encoded = [text.encode() for text in texts]
     return struct.pack(f"<{len(encoded) + 1}I", len(encoded), *map(len, encoded)) + b"".join(encoded)
+
+
+_LINKS = _packed(("links",))

@@ -224,6 +224,15 @@ class ReferenceLine:
         curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
         return curve.at(s - curve.s)
 
+    def even(self, s: float) -> tuple[float, float, float] | None:
+        """Where the curvature stays as it is at s [m]: that curvature [1/m], and from and to which s; else None."""
+        index = max(bisect_right(self.starts, s) - 1, 0)
+        curve = self.curves[index]
+        if not isinstance(curve, Arc):
+            return None
+        starts = self.starts
+        return curve.curvature, curve.s, starts[index + 1] if index + 1 < len(starts) else math.inf
+
     def bend(self, s: float) -> tuple[float, float]:
         """Curvature [1/m] and metres of path per metre of s at s [m]."""
         curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 STRIDE = 2.0
 """Longest step of the integration along a curved lane [m]."""
+LEAST_STRETCH = 0.05
+"""A lane inside the centre of a bend has no length to speak of: so many metres of path count per metre of s."""
 LOOK_AHEAD = 30.0
 """How far ahead the direction of a branch is judged where it is not a junction's connecting road [m]."""
 
@@ -167,14 +169,31 @@ def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, dire
 def _along(
     road: Road, section: LaneSection, lane: Lane, s: float, offset: float, direction: int, remaining: float
 ) -> tuple[float, float]:
-    """s after `remaining` metres of path or at the section's end, and the metres that are left (0 if none)."""
+    """s after `remaining` metres of path or at the section's end, and the metres that are left (0 if none).
+
+    On a line or arc, where the lane keeps its distance from it, exact; elsewhere by the midpoint rule.
+    """
     end = section.end if direction > 0 else section.s
     if section.index == len(road.sections) - 1 and direction > 0:
         end = road.length
+    steady = road.lane_offset.is_constant and (lane.id == 0 or lane.centre.is_constant)
     while remaining > 0.0:
         room = (end - s) * direction
         if room <= 0.0:
             return end, remaining
+        even = road.reference.even(s) if steady else None
+        if even is not None:
+            curvature, first, last = even
+            stretch = max(1.0 - curvature * (lane_t(road, section, lane, s)[0] + offset), LEAST_STRETCH)
+            reach = min(room, (last - s) if direction > 0 else (s - first))
+            if remaining < reach * stretch:
+                return s + direction * (remaining / stretch), 0.0
+            if reach > 0.0:
+                s = end if reach == room else last if direction > 0 else first
+                remaining -= reach * stretch
+                if remaining <= 1e-12:
+                    return s, 0.0
+                continue
         stretch = _stretch(road, section, lane, s, offset)
         ds = min(remaining, STRIDE) / stretch
         if ds < room or stretch != 1.0:
@@ -198,7 +217,7 @@ def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: flo
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
     across = speed * (1.0 - curvature * (t + offset))
-    return max(math.hypot(across, slope) if slope else across, 0.05)
+    return max(math.hypot(across, slope) if slope else across, LEAST_STRETCH)
 
 
 def _wrap(angle: float) -> float:

@@ -110,6 +110,14 @@ class RoadNetwork(Roads):
         """The pose at a lane's centre line plus offset; heading of the lane, along growing s. Raises PositionError."""
         return poses.lane_pose_at(self.road(road_id), lane_id, s, offset)
 
+    def centres(self, places: Sequence[LaneLocation]) -> Array:
+        """(N, 3) points of the lanes' centre lines at places [m], wherever across the lanes those are."""
+        tables = self.tables
+        road = np.array([tables.index[place.road] for place in places], dtype=np.int64)
+        s = np.array([place.s for place in places])
+        row = tables.lane_row(road, s, np.array([place.lane for place in places], dtype=np.int64))
+        return np.column_stack(tables.lane_poses(row, s, np.zeros(len(s)))[:3])
+
     def pose(self, location: LaneLocation) -> Pose:
         """The pose at a lane location; heading of the lane in its driving direction."""
         road = self.road(location.road)
@@ -214,7 +222,7 @@ class RoadNetwork(Roads):
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
         parts = [
-            Route(self.roads, find_lanes(self.graph, self.roads, a, b, cost), a, b)
+            Route(self.tables, find_lanes(self.graph, self.roads, a, b, cost), a, b)
             for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
         ]
         return parts[0] if len(parts) == 1 else joined(parts)

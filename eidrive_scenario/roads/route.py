@@ -7,13 +7,15 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from eidrive_scenario.roads.location import Array, LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model import Road
 from eidrive_scenario.roads.movement import Branch, driving_direction
-from eidrive_scenario.roads.poses import lane_pose_at, lane_t, road_pose_at
+from eidrive_scenario.roads.poses import lane_pose_at, lane_t
+from eidrive_scenario.roads.tables import RoadTables
 
 GRAIN = 0.25
 """Distance between the points by which a route's course is kept [m]."""
@@ -46,12 +48,17 @@ class Route:
     leads.
     """
 
-    roads: Mapping[str, Road] = field(repr=False)
+    tables: RoadTables = field(repr=False)
     lanes: tuple[LaneKey, ...]
     start: LaneLocation
     end: LaneLocation
     closed: bool = False
     lap: Route | None = field(default=None, repr=False)
+
+    @property
+    def roads(self) -> Mapping[str, Road]:
+        """The roads of the network by their ids."""
+        return self.tables.by_id
 
     @property
     def onward(self) -> Route | None:
@@ -212,25 +219,43 @@ class Route:
             return t
         span = min(abs(leg.s_end - leg.s), LANE_CHANGE_LENGTH)
         part = min(abs(s - leg.s) / span, 1.0) if span > 0.0 else 1.0
-        eased = part**3 * (10.0 + part * (6.0 * part - 15.0))
-        return t + eased * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
+        return t + _eased(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array, Array]:
         """Points (M, 3), distances along (M,), the leg of each (M,) and its s (M,)."""
-        rows: list[tuple[float, float, float]] = []
-        owner: list[int] = []
-        places: list[float] = []
-        for number, leg in enumerate(self.legs):
-            road = self.roads[leg.road]
-            count = max(math.ceil(abs(leg.s_end - leg.s) / GRAIN), 1) + 1
-            stations = np.linspace(leg.s, leg.s_end, count).tolist()
-            rows += [road_pose_at(road, s, self._t(leg, s))[:3] for s in stations]
-            owner += [number] * count
-            places += stations
-        points = np.array(rows)
+        legs, tables = self.legs, self.tables
+        ways = np.array([abs(leg.s_end - leg.s) for leg in legs])
+        counts = np.maximum(np.ceil(ways / GRAIN), 1.0).astype(np.int64) + 1
+        owner = np.repeat(np.arange(len(legs)), counts)
+        s = np.concatenate([np.linspace(leg.s, leg.s_end, count) for leg, count in zip(legs, counts, strict=True)])
+        row, row_end = (
+            np.array(
+                [tables.row_of(LaneKey(leg.road, leg.section, lane)) for leg, lane in zip(legs, lanes, strict=True)]
+            )
+            for lanes in ([leg.lane for leg in legs], [leg.lane_end for leg in legs])
+        )
+        t = tables.lane_t(row[owner], s)[0]
+        changes = np.flatnonzero((row != row_end)[owner])
+        if changes.size:
+            leg_of = owner[changes]
+            span = np.minimum(ways, LANE_CHANGE_LENGTH)[leg_of]
+            begin = np.array([leg.s for leg in legs])[leg_of]
+            part = np.divide(np.abs(s[changes] - begin), span, out=np.ones_like(span), where=span > 0.0)
+            t_end = tables.lane_t(row_end[leg_of], s[changes])[0]
+            t[changes] += _eased(np.minimum(part, 1.0)) * (t_end - t[changes])
+        road = tables.section_road[tables.lane_section[row]]
+        points = np.column_stack(tables.road_poses(road[owner], s, t)[:3])
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        return points, along, np.array(owner, dtype=np.float64), np.array(places)
+        return points, along, owner.astype(np.float64), s
+
+
+Share = TypeVar("Share", float, Array)
+
+
+def _eased(part: Share) -> Share:
+    """How much of a lane change is done at a share of its length: no jump of curvature at either end."""
+    return part**3 * (10.0 + part * (6.0 * part - 15.0))
 
 
 def joined(routes: Sequence[Route]) -> Route:
@@ -238,7 +263,7 @@ def joined(routes: Sequence[Route]) -> Route:
     lanes = list(routes[0].lanes)
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
-    return Route(routes[0].roads, tuple(lanes), routes[0].start, routes[-1].end)
+    return Route(routes[0].tables, tuple(lanes), routes[0].start, routes[-1].end)
 
 
 def _wrap(angle: float) -> float:

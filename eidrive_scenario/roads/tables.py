@@ -23,7 +23,8 @@ class RoadTables:
 
     def __init__(self, roads: Sequence[Road]) -> None:
         self.roads = list(roads)
-        self.ids = [road.id for road in roads]
+        self.by_id = {road.id: road for road in roads}
+        self.ids = list(self.by_id)
         self.index = {number: index for index, number in enumerate(self.ids)}
         self.length = np.array([road.length for road in roads])
         spans = [road.length for road in roads]
@@ -88,6 +89,15 @@ class RoadTables:
                 )
             row[n] = self.first_lane[section[n]] + near[0]
         return np.asarray(row, dtype=np.int64)
+
+    def row_of(self, key: LaneKey) -> int:
+        """Running number of the lane of a lane section. Raises KeyError if there is none."""
+        section = self.first_section[self.index[key.road]] + key.section
+        first = int(self.first_lane[section])
+        for row in range(first, first + int(self.left_count[section] + self.right_count[section]) + 1):
+            if self.lanes[row].id == key.lane:
+                return row
+        raise KeyError(key)
 
     def check(self, road: Integers, s: Array) -> None:
         """Raises PositionError for the first place beyond the ends of its road."""

@@ -49,7 +49,10 @@ def past_box(origins: Array, targets: Array, boxes: Array) -> Array:
 
 
 def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
-    """The same as `past_box` in plain numbers, for a few rays from one origin."""
+    """The same as `past_box` in plain numbers, for a few rays from one origin.
+
+    Targets that lie above each other are quicker where they come one after the other.
+    """
     x, y, z, length, width, height, yaw = box
     cos, sin = math.cos(yaw), math.sin(yaw)
     ox, oy, oz = origin
@@ -58,22 +61,25 @@ def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) 
     right, left = -width / 2.0 - py, width / 2.0 - py
     bottom, top = -height / 2.0 - pz, height / 2.0 - pz
     starts = []
+    dx = dy = enter_walls = leave_walls = math.nan
     for tx, ty, tz in targets:
-        dx, dy, dz = tx - ox, ty - oy, tz - oz
-        step = cos * dx + sin * dy or PARALLEL
-        enter, leave = (back / step, front / step) if step > 0.0 else (front / step, back / step)
-        step = cos * dy - sin * dx or PARALLEL
-        first, last = (right / step, left / step) if step > 0.0 else (left / step, right / step)
-        if first > enter:
-            enter = first
-        if last < leave:
-            leave = last
+        if tx - ox != dx or ty - oy != dy:
+            dx, dy = tx - ox, ty - oy
+            step = cos * dx + sin * dy or PARALLEL
+            enter_walls, leave_walls = (back / step, front / step) if step > 0.0 else (front / step, back / step)
+            step = cos * dy - sin * dx or PARALLEL
+            first, last = (right / step, left / step) if step > 0.0 else (left / step, right / step)
+            if first > enter_walls:
+                enter_walls = first
+            if last < leave_walls:
+                leave_walls = last
+        dz = tz - oz
         step = dz or PARALLEL
-        first, last = (bottom / step, top / step) if step > 0.0 else (top / step, bottom / step)
-        if first > enter:
-            enter = first
-        if last < leave:
-            leave = last
+        enter, leave = (bottom / step, top / step) if step > 0.0 else (top / step, bottom / step)
+        if enter_walls > enter:
+            enter = enter_walls
+        if leave_walls < leave:
+            leave = leave_walls
         if enter >= leave or leave <= 0.0 or enter >= 1.0:
             starts.append(origin)
         else:

@@ -42,6 +42,7 @@ class TruthSensor:
         self.name = name
         self.mounting = mounting(settings, spec, "roof")
         self.half_field = math.radians(settings.field_of_view) / 2.0
+        self.range_squared = settings.range**2
 
 
 def read_truth(
@@ -98,8 +99,8 @@ def candidates(
     boxes = view.boxes
     stations = np.asarray(own, dtype=np.intp)
     offset = boxes[None, :, :3] - boxes[stations, None, :3]
-    reach = np.array([sensor.settings.range for sensor in sensors])
-    near = np.einsum("sni,sni->sn", offset, offset) <= (reach * reach)[:, None]
+    reach = np.array([sensor.range_squared for sensor in sensors])
+    near = np.einsum("sni,sni->sn", offset, offset) <= reach[:, None]
     near[np.arange(len(stations)), stations] = False
     near[:, unseen] = False
     for index, sensor in enumerate(sensors):
@@ -118,18 +119,17 @@ def few_candidates(
     boxes = view.plain_boxes
     found: list[list[int]] = []
     for sensor, station in zip(sensors, own, strict=True):
-        x, y, z, *_, yaw = boxes[station]
-        square = sensor.settings.range**2
-        narrow = sensor.half_field < math.pi
-        cos, sin = math.cos(yaw + sensor.mounting.yaw), math.sin(yaw + sensor.mounting.yaw)
+        x, y, z, _, _, _, yaw = boxes[station]
+        square, half = sensor.range_squared, sensor.half_field
+        ahead = yaw + sensor.mounting.yaw
+        cos, sin = (math.cos(ahead), math.sin(ahead)) if half < math.pi else (1.0, 0.0)
         rows: list[int] = []
         for row, box in enumerate(boxes):
             dx, dy, dz = box[0] - x, box[1] - y, box[2] - z
             if row == station or row in unseen or dx * dx + dy * dy + dz * dz > square:
                 continue
-            if narrow and abs(math.atan2(cos * dy - sin * dx, cos * dx + sin * dy)) > sensor.half_field:
-                continue
-            rows.append(row)
+            if half >= math.pi or abs(math.atan2(cos * dy - sin * dx, cos * dx + sin * dy)) <= half:
+                rows.append(row)
         found.append(rows)
     return found
 

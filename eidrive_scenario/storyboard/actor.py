@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Motion
 from eidrive_scenario.storyboard.trajectory import Layout
-from eidrive_scenario.world.view import WorldView
+from eidrive_scenario.world.view import ActorState, WorldView
 
 STANDSTILL = 1e-3
 """An actor slower than this stands [m/s]."""
@@ -58,6 +58,7 @@ class Actor:
         self.off_road_since: float | None = None
         self.end_of_road_since: float | None = None
         self._last: tuple[float, float] | None = None
+        self._seen: ActorState | None = None
         self._found: LaneLocation | None = None
         self._found_at = -1
 
@@ -91,6 +92,9 @@ class Actor:
     def observe(self, view: WorldView, row: int) -> None:
         """Keep the histories up to date with a new view."""
         state = view.states[row]
+        if state is self._seen and not self.motion.jumped and not self.motion.end_of_road:
+            return  # it rests, and has done so before
+        self._seen = state
         x, y, speed = state.x, state.y, state.speed
         if self._last is not None and not self.motion.jumped:
             self.traveled += math.hypot(x - self._last[0], y - self._last[1])

@@ -39,4 +39,4 @@ def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose:
     road = roads.road(key.road)
     section = road.sections[key.section]
     end = section.end if direction > 0 else section.s
-    return Route(roads.roads, tuple(lanes), start, LaneLocation(key.road, key.lane, end, 0.0, 0.0))
+    return Route(roads.tables, tuple(lanes), start, LaneLocation(key.road, key.lane, end, 0.0, 0.0))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.bodies import Body
 from eidrive_scenario.world.rays import GROUND, NOTHING
-from eidrive_scenario.world.view import Contact, WorldView
+from eidrive_scenario.world.view import FEW, Contact, WorldView
 
 Array = NDArray[np.float64]
 
@@ -87,5 +87,7 @@ class Cast:
             unseen=unseen,
             unseen_by=unseen_by,
         )
-        view.__dict__.update(rows=self.rows, states=states)
+        view.__dict__.update(rows=self.rows, states=states, kinematics=table[:, 0:9])
+        if len(self.bodies) <= FEW:
+            view.__dict__["plain_boxes"] = [body.box for body in self.bodies]
         return view

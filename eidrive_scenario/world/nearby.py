@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 Thing = TypeVar("Thing")
@@ -24,16 +24,20 @@ class Nearby(Generic[Thing]):
         for cell in dict.fromkeys(cells):
             self._in_cell.setdefault(cell, []).append(thing)
 
-    def around(self, x: float, y: float, reach: float) -> Iterator[Thing]:
+    def around(self, x: float, y: float, reach: float) -> list[Thing]:
         """Those in the squares within reach of a point [m]; one may come several times."""
+        found: list[Thing] = []
         if self._in_cell:
             for cell in squares(x, y, reach):
-                yield from self._in_cell.get(cell, ())
+                if cell in self._in_cell:
+                    found += self._in_cell[cell]
+        return found
 
 
-def squares(x: float, y: float, reach: float) -> Iterator[Cell]:
+def squares(x: float, y: float, reach: float) -> list[Cell]:
     """The squares that touch the square around a point that reaches as far to each side [m]."""
-    lines = range(math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE) + 1)
-    for column in range(math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE) + 1):
-        for line in lines:
-            yield column, line
+    left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
+    low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)
+    if left == right and low == high:
+        return [(left, low)]
+    return [(column, line) for column in range(left, right + 1) for line in range(low, high + 1)]

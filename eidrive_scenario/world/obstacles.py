@@ -53,7 +53,8 @@ class Obstacles:
 
     def near(self, x: float, y: float, reach: float) -> bool:
         """Whether anything solid is within reach of a point [m]."""
-        return any(_gap(piece, x, y) <= reach for piece in self._nearby.around(x, y, reach))
+        around = self._nearby.around(x, y, reach)
+        return bool(around) and any(_gap(piece, x, y) <= reach for piece in around)
 
     def name_at(self, x: float, y: float) -> str:
         """What stands at a point at which something was touched."""

@@ -131,7 +131,7 @@ class Scenery:
         if self._obstacles is not None and self._obstacles.near(x, y, reach):
             return True
         around = self._nearby.around(x, y, reach)
-        return any((bx - x) ** 2 + (by - y) ** 2 <= (reach + radius) ** 2 for bx, by, radius in around)
+        return bool(around) and any((bx - x) ** 2 + (by - y) ** 2 <= (reach + r) ** 2 for bx, by, r in around)
 
     def _add_static(
         self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1

@@ -15,7 +15,7 @@ from eidrive_scenario.records import made_often
 
 Array = NDArray[np.float64]
 
-_FEW = 16
+FEW = 16
 """Up to this many actors, plain numbers are faster than arrays."""
 
 
@@ -96,11 +96,16 @@ class WorldView:
         return {name: row for row, name in enumerate(self.names)}
 
     @cached_property
+    def kinematics(self) -> Array:
+        """(N, 9) position, yaw, pitch, roll and velocity."""
+        angles = np.stack([self.yaw, self.pitch, self.roll], axis=1)
+        return np.concatenate([self.position, angles, self.velocity], axis=1)
+
+    @cached_property
     def states(self) -> Sequence[ActorState]:
         """Of each row how the actor stands and moves: for looks at single actors, at which arrays are slow."""
-        angles = np.stack([self.yaw, self.pitch, self.roll], axis=1)
-        motion = [self.velocity, self.acceleration, self.yaw_rate[:, None], self.speed[:, None]]
-        return [ActorState(*row) for row in np.concatenate([self.position, angles, *motion], axis=1).tolist()]
+        motion = [self.kinematics, self.acceleration, self.yaw_rate[:, None], self.speed[:, None]]
+        return [ActorState(*row) for row in np.concatenate(motion, axis=1).tolist()]
 
     def without(self, names: Collection[str]) -> WorldView:
         """The same instant without some actors."""
@@ -137,7 +142,7 @@ class WorldView:
     @cached_property
     def plain_boxes(self) -> Sequence[Sequence[float]]:
         """The rows of `boxes` in plain numbers: for looks at single actors, at which arrays are slow."""
-        if len(self.names) <= _FEW:
+        if len(self.names) <= FEW:
             bodies = zip(self.states, self.offset.tolist(), self.size.tolist(), strict=True)
             return [_box(*body) for body in bodies]
         rows: list[list[float]] = self.boxes.tolist()
@@ -146,7 +151,7 @@ class WorldView:
     @cached_property
     def boxes(self) -> Array:
         """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
-        if 0 < len(self.names) <= _FEW:
+        if 0 < len(self.names) <= FEW:
             return np.array(self.plain_boxes)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T

@@ -40,12 +40,10 @@ class CollisionCondition(EntityCondition):
     def _touched(self, stage: Stage, entity: str) -> list[str]:
         box = box_of(stage, entity)
         # Bodies that rebound within a step no longer overlap at its end: the contact that began counts too.
-        begun = {
-            name
-            for contact in stage.view.contacts
-            for name in (contact.first, contact.second)
-            if entity in (contact.first, contact.second)
-        }
+        begun: set[str] = set()
+        for contact in stage.view.contacts:
+            if entity in (contact.first, contact.second):
+                begun |= {contact.first, contact.second}
         named = [
             name
             for name in self._others(stage)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from eidrive_scenario.api import (
     Absent,
@@ -25,24 +26,35 @@ Measured = (
 """Conditions that measure a distance."""
 
 
-def frame_and_kind(element: Measured) -> tuple[str, str]:
-    """How an element of the standard asks for a distance.
+class GapCondition(QuantityCondition):
+    """A condition that measures a distance, in the coordinate system and along the axis that its element names.
 
     The `alongRoute` of 1.0 asks for the distance along the road; without it and without a word a distance is straight.
     """
-    if getattr(element, "along_route", None):
-        return "road", "longitudinal"
-    return frame_of(element.coordinate_system), kind_of(element.relative_distance_type)
 
+    element: Measured
 
-def measured(stage: Stage, entity: str, target: str | Place, element: Measured) -> float:
-    """The distance as an element of the standard asks for it [m], signed; NaN where there is none."""
-    frame, kind = frame_and_kind(element)
-    how = element.routing_algorithm
-    try:
-        return distance(stage, entity, target, frame=frame, kind=kind, freespace=element.freespace, algorithm=how)
-    except Absent:
-        return math.nan
+    def __init__(self, element: Measured, entities: Sequence[str], rule: str = "any") -> None:
+        super().__init__(element, entities, rule)
+        along = bool(getattr(element, "along_route", None))
+        self.frame = "road" if along else frame_of(element.coordinate_system)
+        self.kind = "longitudinal" if along else kind_of(element.relative_distance_type)
+
+    def gap(self, stage: Stage, entity: str, target: str | Place) -> float:
+        """The distance [m], signed; NaN where there is none."""
+        element = self.element
+        try:
+            return distance(
+                stage,
+                entity,
+                target,
+                frame=self.frame,
+                kind=self.kind,
+                freespace=element.freespace,
+                algorithm=element.routing_algorithm,
+            )
+        except Absent:
+            return math.nan
 
 
 def place_of(stage: Stage, position: model.Position, entity: str) -> Place | None:
@@ -53,7 +65,7 @@ def place_of(stage: Stage, position: model.Position, entity: str) -> Place | Non
         return None
 
 
-class DistanceCondition(QuantityCondition):
+class DistanceCondition(GapCondition):
     """Distance to a position [m]; positions relative to entities move with them."""
 
     element: model.DistanceCondition
@@ -66,10 +78,10 @@ class DistanceCondition(QuantityCondition):
     def quantity(self, stage: Stage, entity: str) -> float:
         """The amount of the distance."""
         place = place_of(stage, self.element.position, entity)
-        return math.nan if place is None else abs(measured(stage, entity, place, self.element))
+        return math.nan if place is None else abs(self.gap(stage, entity, place))
 
 
-class RelativeDistanceCondition(QuantityCondition):
+class RelativeDistanceCondition(GapCondition):
     """Distance to another entity [m]."""
 
     element: model.RelativeDistanceCondition
@@ -77,7 +89,7 @@ class RelativeDistanceCondition(QuantityCondition):
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The amount of the distance."""
-        return abs(measured(stage, entity, self.element.entity_ref, self.element))
+        return abs(self.gap(stage, entity, self.element.entity_ref))
 
     def what(self) -> str:
         """Which distance, and to whom."""

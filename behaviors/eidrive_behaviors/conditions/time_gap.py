@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from eidrive_behaviors.conditions.distance import frame_and_kind, measured, place_of
-from eidrive_scenario.api import Place, QuantityCondition, Stage, closing_speed, model
+from eidrive_behaviors.conditions.distance import GapCondition, place_of
+from eidrive_scenario.api import Place, Stage, closing_speed, model
 
 STANDING = 1e-6
 
 
-class TimeHeadwayCondition(QuantityCondition):
+class TimeHeadwayCondition(GapCondition):
     """Distance to another entity over the own speed [s]; that of a standing entity is without end."""
 
     element: model.TimeHeadwayCondition
@@ -22,11 +22,11 @@ class TimeHeadwayCondition(QuantityCondition):
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The headway."""
-        speed, gap = abs(stage.speed(entity)), abs(measured(stage, entity, self.element.entity_ref, self.element))
+        speed, gap = abs(stage.speed(entity)), abs(self.gap(stage, entity, self.element.entity_ref))
         return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
 
 
-class TimeToCollisionCondition(QuantityCondition):
+class TimeToCollisionCondition(GapCondition):
     """Distance to an entity or a position over the speed of approach [s]; where they do not approach there is none.
 
     The speed is that in which the distance shrinks, by the same coordinate system and along the same axis.
@@ -45,9 +45,8 @@ class TimeToCollisionCondition(QuantityCondition):
         to = self._towards(stage, entity)
         if to is None:
             return math.nan
-        gap = measured(stage, entity, to, self.element)
-        frame, kind = frame_and_kind(self.element)
-        closing = closing_speed(stage, entity, to, frame=frame, kind=kind, algorithm=self.element.routing_algorithm)
+        gap, how = self.gap(stage, entity, to), self.element.routing_algorithm
+        closing = closing_speed(stage, entity, to, frame=self.frame, kind=self.kind, algorithm=how)
         return abs(gap) / closing if closing > STANDING else math.nan
 
     def _towards(self, stage: Stage, entity: str) -> str | Place | None:
