@@ -35,12 +35,15 @@ class Steering(NamedTuple):
     heading  angle to the lane's direction after the step [rad]; None follows from the motion
     slows    True: the way sideways is part of the distance that the speed covers
     way      distance of the step [m], where it is that of the speed at which the offset was chosen
+    rate     how fast the offset grows at the end of the step [m/s], where that is known: the heading is then that of
+             this instant, else that of the step as a whole
     """
 
     offset: float
     heading: float | None = None
     slows: bool = True
     way: float | None = None
+    rate: float | None = None
 
 
 class Motion:
@@ -146,27 +149,28 @@ class Motion:
         elif distance == 0.0 and steering is None:
             pass
         elif self.location is not None and (carried is not None or not self._crosses):
-            self._along_lane(distance, steering)
+            self._along_lane(distance, steering, dt)
         else:
             self._freely(distance)
         x, y, z, h, p, r = self.pose
-        return Placement(x, y, z, h, p, r, self.speed)
+        across = distance == 0.0 or target is not None or carried is not None
+        return Placement(x, y, z, h, p, r, self.speed, False, across)
 
     def placement(self) -> Placement:
         """Where it is now."""
         x, y, z, h, p, r = self.pose
         return Placement(x, y, z, h, p, r, self.speed, True)
 
-    def _along_lane(self, distance: float, steering: Steering | None) -> None:
+    def _along_lane(self, distance: float, steering: Steering | None, dt: float) -> None:
         assert self.roads is not None
         assert self.location is not None
-        here, left = self.location, 0.0
+        here, left, total = self.location, 0.0, distance
         way = self.roads.driving_direction(here.road, here.lane)
         if steering is not None:
             left = steering.offset - here.offset * way
             here = here._replace(offset=steering.offset * way, t=here.t + left * way)
             if steering.way is not None:
-                distance = math.copysign(steering.way, distance)
+                distance = total = math.copysign(steering.way, distance)
             if steering.slows:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         if distance != 0.0:
@@ -179,7 +183,9 @@ class Motion:
             self._begin_lap(here, there)
             here = there
         if steering is not None:
-            self.heading = wrap_angle((0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance))
+            self.heading = wrap_angle(
+                (0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance, total, dt)
+            )
         self.location = here
         pose = self.pose_on(here, self.heading)
         self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
@@ -194,9 +200,14 @@ class Motion:
         if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
             self.route = lap
 
-    def _turn(self, steering: Steering, left: float, distance: float) -> float:
+    def _turn(self, steering: Steering, left: float, distance: float, total: float, dt: float) -> float:
+        """The angle to the lane where `distance` along it and `left` make up a step of `total` metres in dt seconds."""
         if steering.heading is not None:
             return steering.heading
+        if steering.rate is not None:
+            left = steering.rate * dt
+            if steering.slows:
+                distance = math.copysign(math.sqrt(max(0.0, total * total - left * left)), total)
         if distance == 0.0 or left == 0.0:
             return 0.0
         return math.atan(left * self.direction / distance)

@@ -72,3 +72,16 @@ class Transition:
         elif self.shape is DynamicsShape.SINUSOIDAL:
             u = 0.5 * (1.0 - math.cos(math.pi * u))
         return self.start + (self.target - self.start) * u
+
+    @property
+    def slope(self) -> float:
+        """How fast the value changes with the parameter where that stands; 0 before the first step and at the end."""
+        if self.done or self.progress <= 0.0:
+            return 0.0
+        u = self.progress / self.extent
+        steep = 1.0
+        if self.shape is DynamicsShape.CUBIC:
+            steep = 6.0 * u * (1.0 - u)
+        elif self.shape is DynamicsShape.SINUSOIDAL:
+            steep = 0.5 * math.pi * math.sin(math.pi * u)
+        return (self.target - self.start) * steep / self.extent

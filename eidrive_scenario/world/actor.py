@@ -67,6 +67,9 @@ class Placement:
     speed: float = 0.0
     teleport: bool = False
     """True where the actor jumps: velocity and acceleration then follow `speed`, not the distance covered."""
+    across: bool = True
+    """False where it goes where it points, so that the velocity is the speed along the heading; else the distance
+    covered in the step says how fast it moves across."""
 
 
 @made_often

@@ -162,7 +162,7 @@ class ScriptedBody(Body):
     def place(self, placement: Placement) -> None:
         """Be there at the end of the step, with a velocity out of the given speed and the distance covered.
 
-        Along the heading the velocity is the given speed; across, it follows from the distance.
+        Along the heading the velocity is the given speed; across, it follows from the distance where there is any.
         """
         p = placement
         if self._resting and p.speed == 0.0 and self._from == (p.x, p.y, p.z, p.yaw, p.pitch, p.roll):
@@ -179,10 +179,12 @@ class ScriptedBody(Body):
             self.acceleration, self.yaw_rate = STILL, 0.0
         else:
             dt = self._dt
-            vx, vy, vz = (self.x - x) / dt, (self.y - y) / dt, (self.z - z) / dt
-            fx, fy, fz = self._along_heading(1.0)
-            excess = placement.speed - (vx * fx + vy * fy + vz * fz)
-            self._accelerate_to((vx + excess * fx, vy + excess * fy, vz + excess * fz))
+            if placement.across:
+                vx, vy, vz = (self.x - x) / dt, (self.y - y) / dt, (self.z - z) / dt
+                fx, fy, fz = self._along_heading(1.0)
+                excess = placement.speed - (vx * fx + vy * fy + vz * fz)
+                along = vx + excess * fx, vy + excess * fy, vz + excess * fz
+            self._accelerate_to(along)
             self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
         is_moving = self.moved or self.velocity != STILL
         self.stale = self.stale or was_moving or is_moving

@@ -37,7 +37,7 @@ class KinematicWorld:
         for name, after in placements.items():
             before = self.placements[name]
             velocity = tuple((b - a) / self.dt for a, b in zip(_position(before), _position(after), strict=True))
-            if after.teleport:
+            if after.teleport or not after.across:
                 velocity = _along(after)
             old = self._velocity[name]
             self._acceleration[name] = tuple((b - a) / self.dt for a, b in zip(old, velocity, strict=True))

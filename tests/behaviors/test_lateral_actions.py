@@ -49,6 +49,21 @@ def test_the_slanted_way_is_as_long_as_the_speed_says(scene: Any) -> None:
     assert placement.yaw == pytest.approx(-math.asin(1 / 20))
 
 
+@pytest.mark.parametrize("dimension", ["time", "distance"])
+def test_the_heading_is_that_of_the_instant(scene: Any, dimension: str) -> None:
+    """4 m sinusoidally in 4 s are π/2 · sin(πt/4) m/s sideways; over 80 m of it, π/40 · sin(πs/80) to the right."""
+    played = scene(3, ("Ego", change(lane(-2), "sinusoidal", dimension, 4 if dimension == "time" else 80)))
+    for time in (0.5, 1.0, 2.0, 2.5):
+        row = played.at(time)
+        if dimension == "time":
+            assert row.yaw == pytest.approx(-math.asin(math.pi / 2.0 * math.sin(math.pi * time / 4.0) / 20.0))
+        else:
+            assert row.yaw == pytest.approx(
+                -math.atan(math.pi / 40.0 * math.sin(math.pi * (row.x - 100.0) / 80.0)), abs=1e-5
+            )
+        assert not row.across
+
+
 def test_a_distance_is_measured_along_the_lane(scene: Any) -> None:
     played = scene(4, ("Ego", change(lane(-2), "linear", "distance", 50)))
     row = next(p for tick in played.rows if (p := tick["Ego"]).x > 124.0)

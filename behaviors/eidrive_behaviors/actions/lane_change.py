@@ -100,13 +100,15 @@ class LaneChangeAction(ActionBehaviour):
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
             return Status.RUNNING
         wanted = self._next(way)
+        rate: float | None = self._rate(way)
         if self._tracker is not None:
-            wanted = self._followed(self._tracker, wanted)
+            followed = self._followed(self._tracker, wanted)
+            wanted, rate = followed, rate if followed == wanted else None
         if abs(wanted - self._offset) > way:
-            wanted = self._offset + math.copysign(way, wanted - self._offset)
+            wanted, rate = self._offset + math.copysign(way, wanted - self._offset), None
         self._offset = wanted
         arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
-        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way))
+        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def _next(self, way: float) -> float:
@@ -118,6 +120,13 @@ class LaneChangeAction(ActionBehaviour):
         along = math.sqrt(max(0.0, way * way - sideways * sideways))
         transition.progress = before
         return transition.advance(along)
+
+    def _rate(self, way: float) -> float:
+        """How fast the offset grows at the end of a step of this way [m/s]."""
+        slope = self._transition.slope
+        if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+            return slope
+        return way / self.stage.dt * slope / math.hypot(1.0, slope)
 
     def _followed(self, tracker: Tracker, wanted: float) -> float:
         vehicle, speed = self.actor.entity, self.actor.motion.speed

@@ -48,7 +48,8 @@ class LaneOffsetAction(ActionBehaviour):
         offset = transition.advance(self.stage.dt)
         done = transition.done
         standing = abs(self.actor.motion.speed) < STANDING
-        self.actor.motion.steer(Steering(offset, 0.0 if done or standing else None, slows=False))
+        heading = 0.0 if done or standing else None
+        self.actor.motion.steer(Steering(offset, heading, slows=False, rate=transition.slope))
         return Status.SUCCESS if done and not self.action.continuous else Status.RUNNING
 
     def _shape(self) -> model.DynamicsShape:

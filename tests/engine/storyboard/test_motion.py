@@ -67,6 +67,7 @@ def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend
     assert placement.x == pytest.approx(52.0 * math.sin(angle), abs=1e-6)
     assert placement.y == pytest.approx(50.0 - 52.0 * math.cos(angle), abs=1e-6)
     assert placement.yaw == pytest.approx(angle)
+    assert not placement.across, "it goes where it points, although the chord of a step points elsewhere"
 
 
 def test_it_stops_where_the_road_ends(street: Any) -> None:

@@ -52,3 +52,14 @@ def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
     step = Transition(DynamicsShape.STEP, 0.0, 20.0, 1.0)
     step.limit_rate(10.0)
     assert step.extent == 0.0
+
+
+@pytest.mark.parametrize("shape", [DynamicsShape.LINEAR, DynamicsShape.CUBIC, DynamicsShape.SINUSOIDAL])
+def test_the_slope_is_the_derivative_of_the_value(shape: Any) -> None:
+    for place in (0.4, 1.0, 2.0, 3.7):
+        before, here, after = (Transition(shape, 10.0, 20.0, 4.0) for _ in range(3))
+        numeric = (after.advance(place + 1e-5) - before.advance(place - 1e-5)) / 2e-5
+        here.advance(place)
+        assert here.slope == pytest.approx(numeric, abs=1e-6)
+    assert here.advance(4.0) == 20.0
+    assert here.slope == 0.0

@@ -39,6 +39,18 @@ def test_velocity_follows_speed_and_displacement(world: World, car: CarFactory) 
     assert view.acceleration[0] == pytest.approx((8.0, 20.0, 0.0))
 
 
+def test_who_goes_where_it_points_has_the_tangent_for_its_velocity(world: World, car: CarFactory) -> None:
+    """Round a circle of 50 m at 10 m/s: 0.2 rad/s, 2 m/s² to the middle; the chord of a step lags by half of it."""
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    for number in (1, 2):
+        angle = 0.01 * number
+        x, y = 50.0 * math.sin(angle), 50.0 * (1.0 - math.cos(angle))
+        world.step({"A": Placement(x, y, yaw=angle, speed=10.0, across=False)}, {})
+        view = world.view()
+        assert view.velocity[0] == pytest.approx((10.0 * math.cos(angle), 10.0 * math.sin(angle), 0.0))
+        assert np.hypot(*view.acceleration[0, :2]) == pytest.approx(2.0, rel=1e-4)
+
+
 def test_yaw_rate_wraps(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, yaw=math.pi - 0.01))
     world.step({"A": Placement(0.0, 0.0, yaw=-math.pi + 0.01)}, {})
