@@ -224,14 +224,15 @@ class ReferenceLine:
         curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
         return curve.at(s - curve.s)
 
-    def even(self, s: float) -> tuple[float, float, float] | None:
-        """Where the curvature stays as it is at s [m]: that curvature [1/m], and from and to which s; else None."""
-        index = max(bisect_right(self.starts, s) - 1, 0)
-        curve = self.curves[index]
-        if not isinstance(curve, Arc):
-            return None
+    def ahead(self, s: float, direction: int) -> tuple[Curve, float]:
+        """The curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
         starts = self.starts
-        return curve.curvature, curve.s, starts[index + 1] if index + 1 < len(starts) else math.inf
+        index = max(bisect_right(starts, s) - 1, 0)
+        if direction > 0:
+            return self.curves[index], starts[index + 1] if index + 1 < len(starts) else math.inf
+        if s == starts[index] and index > 0:
+            index -= 1
+        return self.curves[index], starts[index] if index > 0 else -math.inf
 
     def bend(self, s: float) -> tuple[float, float]:
         """Curvature [1/m] and metres of path per metre of s at s [m]."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from eidrive_scenario.roads.curves import Arc
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
@@ -181,32 +182,26 @@ def _along(
         room = (end - s) * direction
         if room <= 0.0:
             return end, remaining
-        even = road.reference.even(s) if steady else None
-        if even is not None:
-            curvature, first, last = even
-            stretch = max(1.0 - curvature * (lane_t(road, section, lane, s)[0] + offset), LEAST_STRETCH)
-            reach = min(room, (last - s) if direction > 0 else (s - first))
-            if remaining < reach * stretch:
-                return s + direction * (remaining / stretch), 0.0
-            if reach > 0.0:
-                s = end if reach == room else last if direction > 0 else first
-                remaining -= reach * stretch
-                if remaining <= 1e-12:
-                    return s, 0.0
-                continue
-        stretch = _stretch(road, section, lane, s, offset)
-        ds = min(remaining, STRIDE) / stretch
-        if ds < room or stretch != 1.0:
-            stretch = _stretch(road, section, lane, s + 0.5 * direction * min(ds, room), offset)
+        curve, limit = road.reference.ahead(s, direction)
+        reach = min(room, (limit - s) * direction)
+        if steady and isinstance(curve, Arc):
+            t = lane_t(road, section, lane, s)[0] + offset
+            stretch = max(1.0 - curve.curvature * t, LEAST_STRETCH)
+            ds = remaining / stretch
+        else:
+            stretch = _stretch(road, section, lane, s, offset)
             ds = min(remaining, STRIDE) / stretch
-        if ds < room:
+            if ds < reach or stretch != 1.0:
+                stretch = _stretch(road, section, lane, s + 0.5 * direction * min(ds, reach), offset)
+                ds = min(remaining, STRIDE) / stretch
+        if ds < reach:
             s += direction * ds
             remaining -= ds * stretch
             if remaining < 1e-12:
                 return s, 0.0
         else:
-            remaining -= room * stretch
-            s = end
+            s = end if reach == room else limit
+            remaining -= reach * stretch
             if remaining <= 1e-12:
                 return s, 0.0
     return s, 0.0

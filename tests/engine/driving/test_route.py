@@ -9,6 +9,7 @@ import pytest
 from scenariogeneration import xodr
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.path import Path
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
@@ -112,6 +113,27 @@ def test_without_a_goal_it_follows_its_lane_to_the_end_of_the_road(car: ActorSpe
     assert distance_from_lane(path.points).max() < 0.06
 
 
+@pytest.mark.parametrize("radius", [3.5, 6.0, 20.0])
+def test_round_a_ring_that_leads_into_itself_it_goes_on_and_on(car: ActorSpec, radius: float) -> None:
+    length = 2.0 * math.pi * radius
+    ring = f"""<OpenDRIVE><header revMajor="1" revMinor="7"/><road id="1" length="{length!r}" junction="-1"><link>
+      <predecessor elementType="road" elementId="1" contactPoint="end"/>
+      <successor elementType="road" elementId="1" contactPoint="start"/></link><planView>
+      <geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="{1 / radius!r}"/></geometry></planView>
+      <lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>
+      <predecessor id="-1"/><successor id="-1"/></link><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>
+      </laneSection></lanes></road></OpenDRIVE>"""
+    route = planner(car, RoadNetwork.parse(ring), target_speed=3.0)
+    start = RoadNetwork.parse(ring).lane_pose_at("1", -1, 0.75 * length)
+    route.plan(ego(start.x, start.y, start.h), NOTHING, None, 0.0)
+    assert route._path is not None
+    points = route._path.points
+    assert len(points) > 250
+    np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 1] - radius), radius + 1.5, atol=0.3)
+    angles = np.unwrap(np.arctan2(points[:, 1] - radius, points[:, 0]))
+    assert np.diff(angles).min() > 0.0, "always forward"
+
+
 def test_oncoming_traffic_follows_the_other_lane_the_other_way(car: ActorSpec, roads: RoadNetwork) -> None:
     plan = planner(car, roads, target_speed=5.0).plan(ego(50.0, 1.75, math.pi), NOTHING, None, 0.0)
     assert plan.points[0] == pytest.approx((50.0, 1.75), abs=1e-6)
@@ -150,6 +172,25 @@ def test_waypoints_off_the_road_are_joined_directly(car: ActorSpec, roads: RoadN
         assert path.points[0] == pytest.approx((0.0, -40.0))
         assert path.points[-1] == pytest.approx((40.0, -50.0))
         assert np.hypot(*(path.points - [20.0, -40.0]).T).min() < 1.0
+
+
+@pytest.mark.parametrize("goal", [Goal(waypoints=np.zeros((1, 3))), Goal(path=np.zeros((2, 3)))])
+def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadNetwork, goal: Goal) -> None:
+    here = ego(0.0, 0.0, yaw=2.0)
+    for network in (None, roads):
+        plan = planner(car, network, target_speed=10.0).plan(here, NOTHING, goal, 0.0)
+        control = Controller(car, 0.05).control(here, plan)
+        assert (control.throttle, control.brake > 0.0) == (0.0, True)
+
+
+def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) -> None:
+    """4.5 m ahead and back: the fifth metre's point lies where the fourth's does."""
+    route = planner(car, None, target_speed=10.0)
+    goal = Goal(path=np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+    for x in (0.0, 3.9, 4.2, 3.0):
+        plan = route.plan(ego(x, 0.0, speed=2.0), NOTHING, goal, 0.0)
+        assert np.hypot(*np.diff(plan.points, axis=0).T).min() > 0.1
+        assert math.isfinite(Controller(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
 
 
 def test_speeds(car: ActorSpec) -> None:

@@ -82,6 +82,37 @@ def test_distance_counts_on_the_lane_not_on_the_reference_line(road: Text, map_o
     assert 30.0 - inner.s == pytest.approx(10.0 * 20.0 / 18.25)
 
 
+def test_far_at_once_is_as_far_as_in_small_steps(road: Text, map_of: Text) -> None:
+    """Line, arc, line, spiral, arc; on the lanes, beside them, and where a lane widens; with the traffic and back."""
+    parts = [("line", 30.0, ""), ("arc", 25.0, 'curvature="0.04"'), ("line", 10.0, ""),
+             ("spiral", 20.0, 'curvStart="0" curvEnd="-0.05"'), ("arc", 35.0, 'curvature="-0.05"')]  # fmt: skip
+    x = y = heading = s = 0.0
+    geometry = ""
+    for kind, length, numbers in parts:
+        record = f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{heading!r}" length="{length!r}">'
+        geometry += f"{record}<{kind} {numbers}/></geometry>"
+        s += length
+        end = RoadNetwork.parse(map_of(road("r", length=s, geometry=geometry))).road_pose_at("r", s)
+        x, y, heading = end.x, end.y, end.h
+    lanes = section(0, lane(-1) + lane(-2, width='a="2" b="0.02" c="0" d="0"'), lane(1))
+    network = RoadNetwork.parse(map_of(road("r", length=s, geometry=geometry, lanes=lanes)))
+    for number, start, offset in ((-1, 2.0, 0.0), (-1, 2.0, 1.1), (-2, 2.0, 0.0), (1, 118.0, -0.7)):
+        here = network.location("r", number, start, offset)
+        there = network.advance(here, 100.0)
+        step = here
+        for _ in range(2000):
+            moved = network.advance(step, 0.05)
+            assert moved is not None
+            step = moved
+        assert there is not None
+        assert there.s == pytest.approx(step.s, abs=0.01), (
+            "where lanes widen and curvature grows, strides are not exact"
+        )
+        back = network.advance(there, -100.0)
+        assert back is not None
+        assert back.s == pytest.approx(start, abs=0.01)
+
+
 def test_lanes_are_renumbered_from_section_to_section(road: Text, map_of: Text) -> None:
     lanes = section(0, lane(-1, '<successor id="-2"/>')) + section(40, lane(-1) + lane(-2, '<predecessor id="-1"/>'))
     network = RoadNetwork.parse(map_of(road("r", lanes=lanes)))
