@@ -37,8 +37,8 @@ NOT_MET = {
         "point that is not its reference point; the positions agree"
     ),
     "esmini__lane-change_clothoid_spline_based_trajectory": (
-        "we are right: the way is the actor's speed times the time; in the last 0.2 s of each curve esmini's car, whose "
-        "speed is 8.33 m/s, covers 1.26 m in 0.1 s, and then waits for the end (root mean square 0.06 m)"
+        "we are right: the way is the actor's speed times the time; in the last 0.2 s of each curve esmini's car, at "
+        "8.33 m/s, covers 1.26 m in 0.1 s, and then waits for the end (root mean square 0.06 m)"
     ),
     "esmini__parking_demo": (
         "we are right as far as we see: time 0 is one instant, which esmini plays twice, and lights are switched on "
