@@ -144,6 +144,8 @@ class _Loader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "a key is a single word", key.start_mark)
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(None, None, f"{key.value!r} stands here twice", key.start_mark)
             seen.add(key.value)
@@ -162,6 +164,10 @@ def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:
         place = (line or 1) + mark.line if mark is not None else line
         what = getattr(error, "problem", None) or str(error)
         raise SettingError(Problem(f"not valid YAML: {what}", "check the syntax there", source, place)) from error
+    except ValueError as error:  # what looks like a date and is none
+        raise SettingError(Problem(f"not valid YAML: {error}", "put it in quotes", source, line)) from error
+    except RecursionError as error:
+        raise SettingError(Problem("not valid YAML: nested too deeply", "close the brackets", source, line)) from error
 
 
 def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:

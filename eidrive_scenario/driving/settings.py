@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
-import yaml
 from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
@@ -20,7 +19,7 @@ from eidrive_scenario.sensing.settings import (
     SensorSettings,
     TruthSettings,
 )
-from eidrive_scenario.settings import Settings, parse_settings
+from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 from eidrive_scenario.v2x.clock import StationClock
 
 MODULE = "eidrive"
@@ -261,9 +260,10 @@ def agent_settings(controller: Controller) -> AgentSettings:
             continue
         lines[entry.name] = entry.line
         try:
-            data[entry.name] = entry.value if entry.name in _TEXTS else yaml.safe_load(entry.value)
-        except yaml.YAMLError:
-            message = f"property {entry.name!r} is {entry.value!r}, which is not valid YAML"
+            data[entry.name] = entry.value if entry.name in _TEXTS else load_yaml(entry.value, source=source)
+        except SettingError as error:
+            what = error.problems[0].message
+            message = f"property {entry.name!r} is {entry.value!r}, which is {what}"
             problems.append(Problem(message, "check brackets, commas and quotes", source, entry.line))
     for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
         known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]

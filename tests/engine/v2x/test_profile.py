@@ -77,10 +77,13 @@ WRONG = [
     ("{model: compsed}", "unknown channel model 'compsed'; did you mean 'composed'?"),
     ("[1, {2: 3}]", "a channel profile is a mapping"),
     ("{a: [}", "not valid YAML"),
+    ("{[a]: 1}", "not valid YAML: a key is a single word"),
+    ("{name: 2001-13-45}", "not valid YAML: month must be in 1..12"),
+    ("{a: " + "[" * 3000, "not valid YAML: nested too deeply"),
 ]
 
 
-@pytest.mark.parametrize(("source", "message"), WRONG, ids=[row[0] for row in WRONG])
+@pytest.mark.parametrize(("source", "message"), WRONG, ids=[row[0][:60] for row in WRONG])
 def test_a_wrong_profile_says_where_and_what_would_be_right(source: str, message: str) -> None:
     with pytest.raises(SettingError) as caught:
         load_profile(source, [LIBRARY], origin="scenario.xosc", line=12)
