@@ -37,6 +37,10 @@ def declared_settings(
             controllers[name] = controller
     for name, settings in found.items():
         problems.extend(_unknown_senders(name, settings, controllers))
+        if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
+            message = f"{name!r} has no wheels for planner {settings.planner!r}"
+            line = _line(controllers[name], "planner")
+            problems.append(Problem(message, "remove the property 'planner'", controllers[name].source, line))
     for sender in cooperate or ():
         if sender not in controllers:
             problems.append(Problem(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
@@ -59,7 +63,11 @@ def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any
 
 
 def _drives(scenario: Scenario, name: str, settings: AgentSettings) -> bool:
-    return settings.planner != NO_PLANNER and actor_spec(name, scenario.entities[name]).wheelbase > 0.0
+    return settings.planner != NO_PLANNER and _has_wheels(scenario, name)
+
+
+def _has_wheels(scenario: Scenario, name: str) -> bool:
+    return actor_spec(name, scenario.entities[name]).wheelbase > 0.0
 
 
 def declared_detectors(

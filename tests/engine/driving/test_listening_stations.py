@@ -145,6 +145,13 @@ def test_a_sender_that_is_no_station_is_told_by_line(tmp_path: Path) -> None:
         play(wrong)
 
 
+def test_a_planner_without_wheels_is_told_by_line_before_the_run(tmp_path: Path) -> None:
+    wrong = told(tmp_path, planner="route")
+    line = wrong.read_text()[: wrong.read_text().index('value="route"')].count("\n") + 1
+    with pytest.raises(InputError, match=re.escape(f"{wrong}:{line}: 'RSU' has no wheels for planner 'route'")):
+        play(wrong)
+
+
 @pytest.mark.parametrize(("names", "hears"), [(None, False), ("none", False), ("all", True), ("Ego", True)])
 def test_who_listens_without_wheels(names: str | None, hears: bool) -> None:
     given = {} if names is None else {"cooperates_with": names}
