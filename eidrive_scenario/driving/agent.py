@@ -79,9 +79,10 @@ class Agent:
         self._usual_lifetime = settings.lifetime(complete=True)
         self._lifetimes: dict[str, float] = {}
         """How long the reports of each station count [s]."""
-        self._own_places: deque[tuple[float, float, float, float]] = deque(
+        self._own_places: deque[tuple[float, float, float, float, float]] = deque(
             maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
         )
+        """Time [s], centre of the body and height of its reference point [m], heading [rad]."""
 
     def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
         """One tick at `now` [s]."""
@@ -120,10 +121,10 @@ class Agent:
         )
 
     def _remember_place(self, ego: EgoState) -> None:
-        x, y, _ = ego.position.tolist()
+        x, y, z = ego.position.tolist()
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, _ = self.spec.offset
-        self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, ego.yaw))
+        self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
     def _listen(self, inbox: Sequence[Received], now: float) -> None:
         """Keep the newest report of each sender that counts, and forget the old ones."""
@@ -131,7 +132,7 @@ class Agent:
             message = self._clock.understood(received.message, now)
             sender = message.sender
             if sender == self.name:
-                if not self.own_perception:
+                if not self.own_perception or message.kind == "cam":
                     continue
             elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
                 continue
@@ -175,7 +176,7 @@ class Agent:
         """
         if not len(detections):
             return detections
-        x, y, yaw = self._own_place(detections.time)
+        x, y, _, yaw = self._own_place(detections.time)
         cos, sin = math.cos(yaw), math.sin(yaw)
         half_length, half_width = self.spec.size[0] / 2.0 + OWN_MARGIN, self.spec.size[1] / 2.0 + OWN_MARGIN
         others = [
@@ -185,18 +186,18 @@ class Agent:
         ]
         return detections if len(others) == len(detections) else detections.subset(others)
 
-    def _own_place(self, time: float) -> tuple[float, float, float]:
-        """Centre and heading of the own body at the last instant up to `time`, or the earliest known."""
+    def _own_place(self, time: float) -> tuple[float, float, float, float]:
+        """Centre, height and heading of the own body at the last instant up to `time`, or the earliest known."""
         for held in reversed(self._own_places):
             if held[0] <= time + TIME_TOLERANCE:
                 return held[1:]
         return self._own_places[0][1:]
 
     def _own_body(self, time: float) -> Array:
-        """The own outline with a margin, as high as anything on it, at that time."""
-        x, y, yaw = self._own_place(time)
+        """(7,) box of the own outline with a margin, as high as anything on it, at that time."""
+        x, y, z, yaw = self._own_place(time)
         length, width, height = self.spec.size
-        return np.array([x, y, 0.0, length + OWN_MARGIN, width + OWN_MARGIN, 4.0 * height, yaw])
+        return np.array([x, y, z, length + OWN_MARGIN, width + OWN_MARGIN, 4.0 * height, yaw])
 
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:

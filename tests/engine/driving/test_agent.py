@@ -122,6 +122,15 @@ def test_own_perception_through_the_channel_is_delayed_like_the_others(car: Acto
         assert known(step) == ([] if tick < 6 else [OPEN, HIDDEN])
 
 
+def test_what_a_station_says_of_itself_is_no_object_to_it(car: ActorSpec) -> None:
+    """With own perception on the channel its awareness messages come back to it as well."""
+    talk = Conversation(car, "{model: composed, own_perception: true}", messages="cpm, cam")
+    for _ in range(4):
+        step = talk.step({"Ego": (OPEN,)})["Ego"]
+    assert {received.message.kind for received in step.inbox if received.message.sender == "Ego"} == {"cpm", "cam"}
+    assert known(step) == [OPEN]
+
+
 def test_a_report_is_forgotten_when_it_is_a_second_old(car: ActorSpec) -> None:
     talk = Conversation(car, "{model: composed}")
     talk.step({"RSU": (HIDDEN,)})

@@ -55,12 +55,13 @@ def car(x: float, y: float, sides: str, length: float = 4.5) -> np.ndarray:
     return points + np.array([x, y, 0.0])
 
 
-def readings(time: float, at: tuple[float, float, float], *objects: np.ndarray) -> Readings:
-    """A station at x, y, yaw whose LiDAR gets these points of the world, and those of the ground."""
+def readings(time: float, at: tuple[float, float, float], *objects: np.ndarray, height: float = 0.0) -> Readings:
+    """A station at x, y, yaw whose LiDAR gets these points of the world, and those of the ground; all at a height."""
     sensor = pose(*at)
     points = (np.concatenate([ground(), *objects]) - sensor[:3, 3]) @ sensor[:3, :3]
+    sensor[2, 3] += height
     lidar = LidarReading(points, np.ones(len(points)), sensor)
-    ego = EgoState(time, np.array([at[0], at[1], 0.0]), at[2], 0.0, 0.0, 0.0, 0.0, 0.0)
+    ego = EgoState(time, np.array([at[0], at[1], height]), at[2], 0.0, 0.0, 0.0, 0.0, 0.0)
     return Readings(time, ego, lidars={"lidar": lidar})
 
 
@@ -112,12 +113,13 @@ def test_both_sides_of_a_car_give_a_better_box_than_either() -> None:
     assert both.boxes[0, 3] == pytest.approx(5.4, abs=0.1)
 
 
-def test_the_own_body_in_the_points_of_others_is_no_obstacle() -> None:
-    """The ego drives at 15 m/s, and the cloud is 0.3 s old."""
+@pytest.mark.parametrize("height", [0.0, 60.0, -20.0])
+def test_the_own_body_in_the_points_of_others_is_no_obstacle(height: float) -> None:
+    """The ego drives at 15 m/s, and the cloud is 0.3 s old; roads lie at any height."""
     ego, rsu = agent(EGO), agent(RSU)
-    here = [readings(0.05 * tick, (0.75 * tick, 0.0, 0.0)) for tick in range(8)]
+    here = [readings(0.05 * tick, (0.75 * tick, 0.0, 0.0), height=height) for tick in range(8)]
     body = car(EGO.offset[0], 0.0, "fblr")
-    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body), (), 0.0, None).outbox[0]
+    told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body, height=height), (), 0.0, None).outbox[0]
     for tick, given in enumerate(here[:-1]):
         ego.act(given, (), 0.05 * tick, None)
     assert len(ego.act(here[-1], [Received(told, 0.35)], 0.35, None).fused) == 0
