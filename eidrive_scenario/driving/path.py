@@ -29,9 +29,9 @@ class Path:
     def __init__(self, line: Array, *, ends: bool) -> None:
         """From a polyline (K, 2). With `ends` its last point is where to stop; else the path goes on beyond it.
 
-        Raises ValueError if the line has no length.
+        Raises ValueError if the line has no length, or leads back to its start within SPACING.
         """
-        self.points = _smooth(_resample(line))
+        self.points = _apart(_smooth(_resample(line)))
         self.ends = ends
         self.limits = self._speed_limits()
         self._x: list[float] = self.points[:, 0].tolist()
@@ -96,14 +96,19 @@ def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: fl
 
 def _resample(line: Array) -> Array:
     """(M, 2) points at equal distances of about SPACING along a polyline (K, 2), its ends included."""
-    line = np.asarray(line, dtype=float)[:, :2]
-    step = np.hypot(*np.diff(line, axis=0).T)
-    line = line[np.concatenate([[True], step > 1e-6])]
+    line = _apart(np.asarray(line, dtype=float)[:, :2])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    if len(line) < 2:
-        raise ValueError("a path needs two different points")
     stations = np.linspace(0.0, along[-1], max(2, round(along[-1] / SPACING) + 1))
     return np.stack([np.interp(stations, along, line[:, 0]), np.interp(stations, along, line[:, 1])], axis=1)
+
+
+def _apart(points: Array) -> Array:
+    """The points (M, 2) without those that lie where the one before does: a line may turn back between two of them."""
+    step = np.hypot(*np.diff(points, axis=0).T)
+    kept: Array = points[np.concatenate([[True], step > 1e-6])]
+    if len(kept) < 2:
+        raise ValueError("a path needs two different points")
+    return kept
 
 
 def _smooth(points: Array) -> Array:

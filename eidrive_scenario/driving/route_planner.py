@@ -114,12 +114,20 @@ class RoutePlanner(Planner):
     def _laid_out(
         self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
     ) -> Path:
+        line: Array | None = None
         if path is not None and len(path) > 1:
-            return Path(path[:, :2], ends=True) if lap is None else _with_laps(path, lap)
-        if waypoints is not None and len(waypoints):
+            if lap is not None:
+                return _with_laps(path, lap)
+            line = path[:, :2]
+        elif waypoints is not None and len(waypoints):
             line = self._by_road(x, y, waypoints)
-            return Path(_curve(x, y, yaw, waypoints) if line is None else line, ends=True)
-        return self._lane_ahead(x, y, yaw)
+            line = _curve(x, y, yaw, waypoints) if line is None else line
+        if line is None:
+            return self._lane_ahead(x, y, yaw)
+        try:
+            return Path(line, ends=True)
+        except ValueError:  # the destination is here
+            return Path(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
 
     def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
         """The route through all waypoints, None if one of them or the vehicle itself is on no road."""
