@@ -65,6 +65,7 @@ class SignalStops:
         self._served &= names
         self._too_late &= names
         self._stopping &= names
+        self._standing_since = {name: since for name, since in self._standing_since.items() if name in names}
         return found
 
     def limits(self, stop: Stop, part: slice) -> Array:

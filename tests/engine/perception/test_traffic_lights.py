@@ -13,7 +13,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.signal_stops import WAIT
+from eidrive_scenario.driving.signal_stops import BEFORE_LINE, WAIT, SignalStops
 from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
 from eidrive_scenario.recording.frame import Frame
@@ -222,6 +222,18 @@ def test_a_car_stops_at_a_stop_sign_waits_and_goes_on() -> None:
     assert np.count_nonzero(standing) * 0.05 == pytest.approx(WAIT, abs=0.6)
     assert fronts[-1] > 110.0
     drive.world.close()
+
+
+def test_a_wait_that_was_cut_short_does_not_count_at_the_next_visit() -> None:
+    stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
+    stops.follow(EAST)
+    stops.signals.see([SignalReading("stop", "")])
+    at_line = 100.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
+    assert stops.next(at_line, 0.0, 0.0) is not None
+    assert stops.next(at_line, 0.0, WAIT - 0.1) is not None
+    assert stops.next(150.0, 5.0, 20.0) is None, "pushed on"
+    assert stops.next(at_line, 0.0, 60.0) is not None
+    assert stops.next(at_line, 0.0, 60.0 + WAIT) is None
 
 
 SCENARIO = """<OpenSCENARIO>
