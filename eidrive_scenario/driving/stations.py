@@ -160,6 +160,7 @@ class Stations:
         A message that nobody listens to takes its time on the air all the same.
         """
         if self._channel is None:
+            self.links = ()
             return
         outbox = []
         for sender, step in steps.items():

@@ -277,6 +277,22 @@ def test_asn1_modules_say_how_large_messages_are(tmp_path: Path) -> None:
         assert size == 100 + -(-(48 + 16 + 8 + 31 + 32 + 9 + (7 if count else 0) + 94 * count) // 8)
 
 
+def test_without_a_channel_nothing_is_told_of_links(tmp_path: Path) -> None:
+    """At 0.5 s the storyboard takes the channel away: no fate of a message is told once more after that."""
+    off = """<Event name="SwitchOff" priority="parallel"><Action name="Off"><UserDefinedAction>
+        <CustomCommandAction type="eidrive.channel">none</CustomCommandAction></UserDefinedAction></Action>
+        <StartTrigger><ConditionGroup><Condition name="Later" delay="0" conditionEdge="none"><ByValueCondition>
+        <SimulationTimeCondition value="0.5" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+        </StartTrigger></Event>"""
+    start = '<Event name="EgoSetsOff"'
+    kept = Kept()
+    path = edited(tmp_path, (start, off + start))
+    run_file(path, seed=1, settings=RunSettings(time_limit=1.0), observers=[kept])
+    told = [link.sent for frame in kept.frames for link in frame.links]
+    assert len(told) == len(set(told)) > 5
+    assert max(told) <= 0.5 + 1e-9
+
+
 @pytest.mark.parametrize(
     ("properties", "words"),
     [
