@@ -5,26 +5,29 @@ The rules look at a scenario as far as it could be read, so a field may be missi
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
     CatalogReference,
+    Clothoid,
+    ClothoidSpline,
     Condition,
     DynamicsDimension,
     Element,
     LongitudinalDistanceAction,
     Nurbs,
     OpenScenario,
+    Polyline,
     RelativeLanePosition,
     Timing,
     TransitionDynamics,
 )
 from eidrive_scenario.openscenario.names import check_names
+from eidrive_scenario.openscenario.numbers import unusable
 from eidrive_scenario.openscenario.scalars import Version
-from eidrive_scenario.openscenario.schema import rules
 
 
 def check_rules(
@@ -35,20 +38,10 @@ def check_rules(
     flawed = {(problem.source, problem.line) for problem in findings.problems}
     for element in elements:
         check = _CHECKS.get(type(element))
-        message = _no_number(element, version) or (check(element) if check else "")
+        message = unusable(element, version) or (check(element) if check else "")
         if message and (element.source, element.line) not in flawed:
             findings.error(message, source=element.source, line=element.line)
     check_names(root, elements, version, entries, findings)
-
-
-def _no_number(element: Element, version: Version) -> str:
-    """The schema counts NaN among the numbers; no attribute of the standard can mean it."""
-    for name, value in vars(element).items():
-        if isinstance(value, float) and math.isnan(value):
-            known = rules(type(element), version).attributes.items()
-            spelling = next((spelling for spelling, rule in known if rule.field == name), name)
-            return f"{spelling} of {type(element).__name__} is NaN; give a number"
-    return ""
 
 
 def _distance(action: LongitudinalDistanceAction) -> str:
@@ -63,12 +56,39 @@ def _lane_position(position: RelativeLanePosition) -> str:
 
 def _nurbs(curve: Nurbs) -> str:
     order: int | None = curve.order
-    points, knots = len(curve.control_point or ()), len(curve.knot or ())
-    if order is None or (points >= order and knots == points + order):
+    points, knots = len(curve.control_point or ()), [knot.value for knot in curve.knot or ()]
+    if order is None or None in knots:
         return ""
+    if order < 2:
+        return f"Nurbs has the order {order}; it has to be at least 2, of which straight lines are"
     if points < order:
         return f"Nurbs of order {order} has {points} control points; it has to have at least {order}"
-    return f"Nurbs has {knots} knots; {points} control points of order {order} want {points + order}"
+    if len(knots) != points + order:
+        return f"Nurbs has {len(knots)} knots; {points} control points of order {order} want {points + order}"
+    if any(after < before for before, after in pairwise(knots)):
+        return "Nurbs has knots that descend; each has to be at least the one before"
+    if knots[order - 1] == knots[points]:
+        return f"Nurbs has no extent: its knots {order} to {points + 1} are all {knots[points]:g}"
+    return _clock([point.time for point in curve.control_point])
+
+
+def _polyline(line: Polyline) -> str:
+    return _clock([vertex.time for vertex in line.vertex or ()])
+
+
+def _clothoid(curve: Clothoid) -> str:
+    return _clock([curve.start_time, curve.stop_time])
+
+
+def _clothoid_spline(curve: ClothoidSpline) -> str:
+    return _clock([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
+
+
+def _clock(times: Sequence[float | None]) -> str:
+    for before, after in pairwise([time for time in times if time is not None]):
+        if after < before:
+            return f"a trajectory goes back in time, from {before:g} s to {after:g} s; times have to ascend"
+    return ""
 
 
 def _delay(condition: Condition) -> str:
@@ -92,9 +112,12 @@ def _timing(timing: Timing) -> str:
 
 
 _CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
+    Clothoid: _clothoid,
+    ClothoidSpline: _clothoid_spline,
     Condition: _delay,
     LongitudinalDistanceAction: _distance,
     Nurbs: _nurbs,
+    Polyline: _polyline,
     RelativeLanePosition: _lane_position,
     Timing: _timing,
     TransitionDynamics: _transition,

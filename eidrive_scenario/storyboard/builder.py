@@ -51,7 +51,7 @@ Place = tuple[str, ...]
 
 
 class Cast(NamedTuple):
-    """Who acts in a maneuver group: by name, which of them form selections, and whom its act selects."""
+    """Who acts in a maneuver group: by name, each once, which of them form selections, and whom its act selects."""
 
     actors: Sequence[str]
     selections: Sequence[Sequence[str]]
@@ -116,14 +116,13 @@ class Builder:
     def _group(self, group: model.ManeuverGroup, above: Place, triggering: TriggeringEntities) -> ManeuverGroupElement:
         path = (*above, group.name)
         members = [self._entities(ref.entity_ref) for ref in group.actors.entity_ref]
+        actors = list(dict.fromkeys(name for names in members for name in names))
         selected = triggering if group.actors.select_triggering_entities else None
-        cast = Cast(
-            [name for names in members for name in names], [names for names in members if len(names) > 1], selected
-        )
+        cast = Cast(actors, [names for names in members if len(names) > 1], selected)
         maneuvers = list(group.maneuver)
         for reference in group.catalog_reference:
             try:
-                maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver))
+                maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver, group))
             except ScenarioError as error:
                 self._problems += error.problems
         children = [self._maneuver(maneuver, path, cast) for maneuver in maneuvers]

@@ -132,7 +132,7 @@ def _relative_lane(frame: model.RelativeLanePosition, stage: Stage, actor: str |
 def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place:
     roads = _roads(frame, stage)
     within = frame.in_route_position.chosen()
-    route = frame.route_ref.route or stage.catalog_entry(frame.route_ref.catalog_reference, model.Route)
+    route = frame.route_ref.route or stage.catalog_entry(frame.route_ref.catalog_reference, model.Route, frame)
     path = route_of(route, roads, lambda position: resolve(position, stage, actor), seed=stage.seed)
     if isinstance(within, model.PositionOfCurrentEntity):
         here = _origin(within, stage)
@@ -151,7 +151,7 @@ def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place
 def _trajectory(frame: model.TrajectoryPosition, stage: Stage, actor: str | None) -> Place:
     trajectory = frame.trajectory_ref.trajectory
     if trajectory is None:
-        trajectory = stage.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory)
+        trajectory = stage.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
     at = lay_out(trajectory, lambda position: resolve(position, stage, actor).pose).at(frame.s)
     offset = frame.t or 0.0
     x, y = at.x - offset * math.sin(at.h), at.y + offset * math.cos(at.h)

@@ -191,10 +191,16 @@ class Stage:
                 occupant.displace(holder, f"{name} left the world")
                 self.release(holder)
 
-    def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E]) -> E:
-        """The entry that a catalog reference means, with its parameters. Raises ScenarioError if it is no `kind`."""
+    def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E], within: model.Element) -> E:
+        """The entry that a catalog reference `within` an element means, with its parameters.
+
+        Raises ScenarioError if it is no `kind`, or if there is none.
+        """
         if reference is None:
-            raise ScenarioError(Problem(f"a {kind.__name__} is missing", "give it in place or by a CatalogReference"))
+            message = f"{type(within).__name__} has no {kind.__name__}"
+            raise ScenarioError(
+                Problem(message, "give it in place or by a CatalogReference", within.source, within.line)
+            )
         entry = self.scenario.resolved(reference)
         if not isinstance(entry, kind):
             raise ScenarioError(

@@ -19,6 +19,8 @@ from eidrive_scenario.storyboard.nurbs import Nurbs, along_the_curve
 
 SPACING = 0.1
 """Distance between the points at which curved shapes are laid out [m]."""
+MOST_POINTS = 20_000
+"""On curves of more than 2 km the points are further apart."""
 ROUNDING = 2.0
 """How far from a corner of a polyline the heading begins to turn [m]."""
 
@@ -227,7 +229,7 @@ def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve
 
 def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:
     """Points of a curve whose curvature goes linearly from `first` to `last`; midpoint rule on short steps."""
-    count = max(1, math.ceil(length / SPACING))
+    count = min(max(1, math.ceil(length / SPACING)), MOST_POINTS)
     step = length / count
     s, poses, x, y = [0.0], [start], start.x, start.y
     for number in range(count):
@@ -253,7 +255,7 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     control = [(resolve(point.position), weight) for point, weight in zip(shape.control_point, weights, strict=True)]
     curve = Nurbs(shape.order, [knot.value for knot in shape.knot], control)
     rough = sum(math.hypot(b.x - a.x, b.y - a.y) for (a, _), (b, _) in pairwise(control))
-    count = max(2, math.ceil(rough / SPACING))
+    count = min(max(2, math.ceil(rough / SPACING)), MOST_POINTS)
     poses = curve.sampled(count)
     given = any(has_heading(point.position) for point in shape.control_point)
     if not given:

@@ -13,6 +13,10 @@ LATITUDE = 48.0
 """Where the sun's height is reckoned from a time of day alone [degrees]; the clock then shows the sun's time."""
 LEAST_FRICTION = 1e-3
 """The standard allows a road without any friction; tyres need a little."""
+HURRICANE = 100.0
+"""Wind that is stronger blows as strong as this [m/s]."""
+CLEAR = 1e6
+"""A visual range beyond this is as this [m]; the standard allows an infinite one."""
 HEAVY_RAIN = 50.0
 """What a share of 1 means in files of OpenSCENARIO 1.0, whose precipitation has no unit [mm/h]."""
 FULL_SUN = 1.0
@@ -38,8 +42,8 @@ def weather_of(environment: Environment, time: float = 0.0) -> Weather:
         "name": environment.name,
         "friction": min(max(environment.friction, LEAST_FRICTION), 2.0),
         "wind_direction": _degrees(environment.wind_direction),
-        "wind_speed": environment.wind_speed,
-        "visual_range": max(environment.fog_range, 1.0) if environment.fog_range is not None else None,
+        "wind_speed": min(environment.wind_speed, HURRICANE) if environment.wind_speed is not None else None,
+        "visual_range": min(max(environment.fog_range, 1.0), CLEAR) if environment.fog_range is not None else None,
         "cloud_cover": _CLOUDS.get(environment.clouds or ""),
         "wetness": _WETNESS.get(environment.wetness or ""),
     }

@@ -88,7 +88,7 @@ class AssignControllerAction(ActionBehaviour):
         if holder.controller is not None:
             return holder.controller
         if holder.catalog_reference is not None:
-            return self.stage.catalog_entry(holder.catalog_reference, model.Controller)
+            return self.stage.catalog_entry(holder.catalog_reference, model.Controller, self.action)
         return None
 
     def describe(self) -> str:

@@ -23,7 +23,7 @@ class EnvironmentAction(ActionBehaviour):
     def _environment(self) -> model.Environment:
         if self.action.environment is not None:
             return self.action.environment
-        return self.stage.catalog_entry(self.action.catalog_reference, model.Environment)
+        return self.stage.catalog_entry(self.action.catalog_reference, model.Environment, self.action)
 
     def describe(self) -> str:
         """Which one."""

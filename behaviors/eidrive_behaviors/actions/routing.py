@@ -40,7 +40,7 @@ class AssignRouteAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Lay the route out, from where the actor is if there is a way from there."""
-        route = self.action.route or self.stage.catalog_entry(self.action.catalog_reference, model.Route)
+        route = self.action.route or self.stage.catalog_entry(self.action.catalog_reference, model.Route, self.action)
         here = self.stage.location(self.actor.name) if self.actor.present else None
         roads, seed = self.stage.roads, self.stage.seed
 

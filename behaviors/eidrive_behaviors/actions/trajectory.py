@@ -175,7 +175,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             if self.action.trajectory_ref.trajectory is not None:
                 return self.action.trajectory_ref.trajectory
             reference = self.action.trajectory_ref.catalog_reference
-        return self.stage.catalog_entry(reference, model.Trajectory)
+        return self.stage.catalog_entry(reference, model.Trajectory, self.action)
 
     def describe(self) -> str:
         """Which one."""

@@ -20,6 +20,29 @@ TIMED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory nam
 <Vertex time="1"><Position><WorldPosition x="9" y="0"/></Position></Vertex></Polyline></Shape></Trajectory>
 </TrajectoryRef><TimeReference><Timing domainAbsoluteRelative="relative" scale="{scale}" offset="0"/></TimeReference>
 <TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+TELEPORT = '<TeleportAction><Position><WorldPosition x="{x}" y="0"/></Position></TeleportAction>'
+LIMITED = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="false" freespace="false"
+ distance="5"><DynamicConstraints maxAcceleration="{limit}"/></LongitudinalDistanceAction></LongitudinalAction>"""
+SHAPED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false"><Shape>{shape}
+</Shape></Trajectory></TrajectoryRef><TimeReference><None/></TimeReference>
+<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+ENDLESS = '<SimulationTimeCondition rule="greaterThan" value="INF"/>'
+HERE = '<Position><WorldPosition x="0" y="0"/></Position>'
+CLOTHOID = f"""<Clothoid curvature="0" curvaturePrime="0" length="{{length}}" startTime="2" stopTime="{{stop}}">{HERE}
+</Clothoid>"""
+POLYLINE = f"""<Polyline><Vertex time="0">{HERE}</Vertex><Vertex time="3">{HERE}</Vertex>
+<Vertex time="2">{HERE}</Vertex>
+</Polyline>"""
+SPLINE = """<ClothoidSpline timeEnd="3">
+<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="5" timeStart="4"/>
+</ClothoidSpline>"""
+
+
+def curve(order: int, points: int, knots: str, more: str = "") -> str:
+    """Follow a Nurbs."""
+    control = f"<ControlPoint {more}>{HERE}</ControlPoint>" * points
+    knot = "".join(f'<Knot value="{value}"/>' for value in knots.split())
+    return SHAPED.format(shape=f'<Nurbs order="{order}">{control}{knot}</Nurbs>')
 
 
 @pytest.mark.parametrize(
@@ -82,6 +105,19 @@ def test_numbers_as_the_schema_has_them(scenario_xml: Build, story_xml: Text, wr
         (PROFILE.format(dimension="time", extent=1, speed="NaN"), "value of AbsoluteTargetSpeed is NaN"),
         (PROFILE.format(dimension="time", extent="-1", speed=5), "a transition cannot take -1 s"),
         (PROFILE.format(dimension="distance", extent="-20", speed=5), "a transition cannot take -20 m"),
+        (PROFILE.format(dimension="time", extent="INF", speed=5), "value of TransitionDynamics is INF"),
+        (PROFILE.format(dimension="time", extent=1, speed="INF"), "value of AbsoluteTargetSpeed is INF"),
+        (PROFILE.format(dimension="time", extent=1, speed="-1e300"), "value of AbsoluteTargetSpeed is -1e\\+300"),
+        (TELEPORT.format(x="-INF"), "x of WorldPosition is -INF"),
+        (LIMITED.format(limit="-1"), "maxAcceleration of DynamicConstraints is -1; give a number that is not negative"),
+        (SHAPED.format(shape=CLOTHOID.format(length=0, stop=5)), "length of Clothoid is 0; give a number above 0"),
+        (SHAPED.format(shape=CLOTHOID.format(length=9, stop=1)), "a trajectory goes back in time, from 2 s to 1 s"),
+        (SHAPED.format(shape=POLYLINE), "a trajectory goes back in time, from 3 s to 2 s"),
+        (SHAPED.format(shape=SPLINE), "a trajectory goes back in time, from 4 s to 3 s"),
+        (curve(1, 2, "0 1 2"), "Nurbs has the order 1; it has to be at least 2"),
+        (curve(2, 2, "0 0 1 0.5"), "Nurbs has knots that descend"),
+        (curve(2, 2, "0 1 1 1"), "Nurbs has no extent: its knots 2 to 3 are all 1"),
+        (curve(2, 2, "0 0 1 1", 'weight="0"'), "weight of ControlPoint is 0; give a number above 0"),
         (TIMED.format(scale=0), "Timing has the scale 0"),
         (TIMED.format(scale=-2), "Timing has the scale -2"),
     ],
@@ -93,6 +129,12 @@ def test_numbers_that_mean_nothing_are_refused(
     path.write_bytes(scenario_xml(story=story_xml(action=action)))
     with pytest.raises(ScenarioError, match=rf"scene\.xosc:\d+: {message}"):
         load_scenario(path)
+
+
+def test_a_rate_and_a_limit_may_be_infinite(scenario_xml: Build, story_xml: Text) -> None:
+    for action in (PROFILE.format(dimension="rate", extent="INF", speed=5), LIMITED.format(limit="INF")):
+        load_scenario(scenario_xml(story=story_xml(action=action)))
+    load_scenario(scenario_xml(story=story_xml(condition=ENDLESS)))
 
 
 def test_the_sign_of_a_rate_does_not_matter(scenario_xml: Build, story_xml: Text) -> None:

@@ -1,0 +1,67 @@
+"""Scenarios that the standard allows and nobody would write: played to the end, or refused by file and line."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from street_scene import everywhere, private
+
+from eidrive_scenario.errors import InputError
+
+GROUPS = """<EntitySelection name="all"><Members><ByType objectType="vehicle"/></Members></EntitySelection>"""
+PROFILE = private(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>'
+    '<SpeedActionTarget><AbsoluteTargetSpeed value="5"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+)
+FOLLOW = """<RoutingAction><FollowTrajectoryAction>{trajectory}<TimeReference><None/></TimeReference>
+  <TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+CLOTHOID = """<TrajectoryRef><Trajectory name="way" closed="false"><Shape><Clothoid curvature="0" curvaturePrime="0"
+  length="{length}"><Position><LanePosition roadId="1" laneId="-1" s="100"/></Position></Clothoid></Shape></Trajectory>
+  </TrajectoryRef>"""
+
+
+def assert_everybody_is_somewhere(played: Any) -> None:
+    for frame in played.frames:
+        view = frame.view
+        for quantity in (view.position, view.yaw, view.pitch, view.roll, view.speed, view.velocity, view.acceleration):
+            assert np.isfinite(quantity).all()
+
+
+@pytest.mark.parametrize("actors", [("Ego", "Ego"), ("Ego", "all"), ("all", "all")])
+def test_who_is_named_twice_acts_once(run: Any, actors: tuple[str, str]) -> None:
+    played = run(3, ('"/><EntityRef entityRef="'.join(actors), PROFILE), driven=False, more=GROUPS)
+    assert played.of("Ego", "speed")[-1] == 5
+    assert played.of("Ego", "speed")[20] == pytest.approx(12.5)
+
+
+def test_a_trajectory_that_is_nowhere_is_refused_by_its_line(run: Any) -> None:
+    with pytest.raises(
+        InputError, match=r"scene\.xosc:\d+: FollowTrajectoryAction has no Trajectory; give it in place"
+    ):
+        run(1, ("Ego", private(FOLLOW.format(trajectory=""))), driven=False)
+
+
+def test_a_trajectory_of_a_thousand_kilometres_is_begun(run: Any) -> None:
+    played = run(1, ("Ego", private(FOLLOW.format(trajectory=CLOTHOID.format(length=1e6)))), driven=False)
+    assert played.x("Ego")[-1] == pytest.approx(120.0)
+
+
+WEATHER = """<EnvironmentAction><Environment name="storm"><Weather><Wind direction="0" speed="{wind}"/>
+  <Fog visualRange="{fog}"/></Weather></Environment></EnvironmentAction>"""
+
+
+def test_air_without_end_and_wind_without_example(run: Any) -> None:
+    """An infinite visual range is the standard's word for no fog."""
+    played = run(0.2, ("Ego", everywhere(WEATHER.format(wind=300, fog="INF"))), driven=False)
+    environment = played.frames[-1].environment
+    assert environment is not None
+    assert environment.fog_range == math.inf
+    assert_everybody_is_somewhere(played)
+
+
+def test_a_negative_wind_is_refused(run: Any) -> None:
+    with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; give a number that is not negative"):
+        run(0.2, ("Ego", everywhere(WEATHER.format(wind=-1, fog=100))), driven=False)
