@@ -54,7 +54,12 @@ class Movement:
         self._links = links
 
     def advance(
-        self, location: LaneLocation, distance: float, route: Route | None = None, choose: Choose | None = None
+        self,
+        location: LaneLocation,
+        distance: float,
+        route: Route | None = None,
+        choose: Choose | None = None,
+        visit: int = 0,
     ) -> LaneLocation | None:
         """The place `distance` metres further in the lane's driving direction (back where negative), or None.
 
@@ -75,7 +80,7 @@ class Movement:
             inside = section.index == len(road.sections) - 1 if direction > 0 else True
             if remaining <= 0.0 and (inside or s < section.end):
                 break
-            following = self._next(road, section, lane, direction, with_traffic, offset, route, choose)
+            following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
             if following is None and remaining <= 0.0:
                 break
             if following is None:
@@ -85,6 +90,8 @@ class Movement:
                 offset = -offset
             offset += shift
             direction = heading_on
+            if route is not None and key.road != road.id:
+                visit = route.visit(key.road, visit)
             road = self._roads[key.road]
             section = road.sections[key.section]
             lane = section.lanes[key.lane]
@@ -102,6 +109,7 @@ class Movement:
         offset: float,
         route: Route | None,
         choose: Choose | None,
+        visit: int,
     ) -> tuple[LaneKey, int, float] | None:
         key = LaneKey(road.id, section.index, lane.id)
         found = self.branches(key, direction, with_traffic)
@@ -112,7 +120,7 @@ class Movement:
             return found[0].lane, found[0].direction, 0.0
         chosen: Branch | None = None
         if route is not None:
-            chosen = route.pick(found)
+            chosen = route.pick(found, road.id, visit)
         if chosen is None and choose is not None:
             chosen = choose(found)
         if chosen is None:

@@ -199,13 +199,14 @@ class RoadNetwork(Roads):
         *,
         route: Route | None = None,
         choose: Choose | None = None,
+        visit: int = 0,
     ) -> LaneLocation | None:
         """The place `distance` metres further along the lane in its driving direction (back where negative).
 
         Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
-        taken. None where the lane ends.
+        taken. None where the lane ends. `visit` says where on a route that comes by several times (`Route.visit`).
         """
-        return self.movement.advance(location, distance, route, choose)
+        return self.movement.advance(location, distance, route, choose, visit)
 
     def route(
         self,

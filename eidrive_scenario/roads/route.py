@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
 from typing import TypeVar
 
 import numpy as np
@@ -192,23 +193,46 @@ class Route:
                 best = min(best, (gap, place, left))
         return best[1], float(best[2])
 
-    def pick(self, branches: Sequence[Branch]) -> Branch | None:
-        """The branch that the route takes; None if it takes none of them."""
-        for branch in branches:
-            if branch.lane in self._lane_set:
-                return branch
-        for branch in branches:
-            if branch.lane.road in self._road_set:
-                return branch
-        return None if self.lap is None else self.lap.pick(branches)
+    def pick(self, branches: Sequence[Branch], road: str, visit: int = 0) -> Branch | None:
+        """The branch that the route takes where it leaves a road; None if it takes none of them.
+
+        `visit` is the number of the road among those of the route, as `visit` gives it: a route may come by twice.
+        """
+        for number in self._later(visit):
+            if self._visits[number][0] == road and (following := self._following(number)) is not None:
+                there = [branch for branch in branches if branch.lane.road == following[0]]
+                for branch in there:
+                    if branch.lane in following[1]:
+                        return branch
+                if there:
+                    return there[0]
+        for exact in (True, False):
+            for name, lanes in self._visits:
+                for branch in branches:
+                    if branch.lane in lanes or (not exact and branch.lane.road == name):
+                        return branch
+        return None if self.lap is None else self.lap.pick(branches, road)
+
+    def visit(self, road: str, visit: int = 0) -> int:
+        """Which road of the route that is, counted from 0, for who came by the one numbered `visit` before."""
+        return next((number for number in self._later(visit) if self._visits[number][0] == road), visit)
+
+    def _later(self, visit: int) -> Iterator[int]:
+        """The roads from a visit on, and on a closed route those before it after all others."""
+        yield from range(visit, len(self._visits))
+        if self.closed:
+            yield from range(min(visit, len(self._visits)))
+
+    def _following(self, visit: int) -> tuple[str, frozenset[LaneKey]] | None:
+        """The road after a visit and its lanes."""
+        if visit + 1 < len(self._visits):
+            return self._visits[visit + 1]
+        return self._visits[0] if self.closed else None
 
     @cached_property
-    def _lane_set(self) -> frozenset[LaneKey]:
-        return frozenset(self.lanes)
-
-    @cached_property
-    def _road_set(self) -> frozenset[str]:
-        return frozenset(key.road for key in self.lanes)
+    def _visits(self) -> list[tuple[str, frozenset[LaneKey]]]:
+        """The roads in the order in which the route comes by, each with its lanes there."""
+        return [(road, frozenset(keys)) for road, keys in groupby(self.lanes, key=lambda key: key.road)]
 
     def _t(self, leg: Leg, s: float) -> float:
         """t of the route's course on a leg; a lane change eases in and out with no jump of curvature."""

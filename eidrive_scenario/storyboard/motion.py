@@ -58,7 +58,8 @@ class Motion:
         self.location: LaneLocation | None = None
         self.heading = 0.0
         self.speed = 0.0
-        self.route: Route | None = None
+        self._route: Route | None = None
+        self._visit = 0
         self.choose: Choose | None = None
         """Picks a branch at forks that the route leaves open; None takes the straightest."""
         self.end_of_road = False
@@ -71,6 +72,20 @@ class Motion:
         self._teleport = False
         self.jumped = False
         """True from a teleport until the view that shows it."""
+
+    @property
+    def route(self) -> Route | None:
+        """The way it takes at forks."""
+        return self._route
+
+    @route.setter
+    def route(self, route: Route | None) -> None:
+        self._route, self._visit = route, 0
+
+    def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
+        """The place so many metres further along the lane [m], by the way that it takes; None where the lane ends."""
+        assert self.roads is not None
+        return self.roads.advance(place, distance, route=self._route, choose=self.choose, visit=self._visit)
 
     def put(self, place: Place) -> None:
         """Place it there at once; its speed stays. The next view shows it there, so the step that begins is used up."""
@@ -174,12 +189,14 @@ class Motion:
             if steering.slows:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         if distance != 0.0:
-            there = self.roads.advance(here, distance * self.direction, route=self.route, choose=self.choose)
+            there = self.ahead(here, distance * self.direction)
             if there is None:
                 there = self._last_place(here, distance * self.direction * way)
                 if self.end_of_road:
                     self.speed = 0.0
                 self.end_of_road = True
+            if self._route is not None and there.road != here.road:
+                self._visit = self._route.visit(there.road, self._visit)
             self._begin_lap(here, there)
             here = there
         if steering is not None:

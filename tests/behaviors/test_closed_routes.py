@@ -67,6 +67,21 @@ def test_a_closed_route_is_driven_again_and_again(run: Any, start: tuple[int, fl
     assert position[:2] == pytest.approx((50.0 + rest, -2.0), abs=0.1)
 
 
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_route_takes_another_branch_when_it_comes_by_again(run: Any, driven: bool) -> None:
+    """From road 1, s 50, round by road 2 and out by road 3: after 35 s at 20 m/s a lap and the rest of 700 m.
+
+    Who drives itself slows down in the half circles, and is on road 3 by then.
+    """
+    watched = played(run, 35.0, assign("false", (1, 60.0), (2, 30.0), (3, 800.0)), driven=driven)
+    position = watched.frames[-1].view.position[0]
+    if driven:
+        assert position[1] == pytest.approx(-2.0, abs=0.5)
+        assert position[0] > 100.0 + 20.0 * math.pi
+        return
+    assert position[:2] == pytest.approx((50.0 + 35.0 * 20.0 - LAP, -2.0), abs=0.1)
+
+
 def test_an_open_one_ends(run: Any) -> None:
     """From road 1, s 50, to s 70: at the fork the straightest way leads out."""
     watched = played(run, 10.0, assign("false", (1, 60.0), (1, 70.0)), driven=False)

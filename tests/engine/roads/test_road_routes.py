@@ -126,3 +126,57 @@ def test_places_along_a_route(crossing: RoadNetwork) -> None:
     assert math.sin(pose.h) == pytest.approx(-1.0)
     place = route.location_at(10.0)
     assert (place.road, place.lane, place.s) == pytest.approx(("3", 3, 15.0))
+
+
+def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
+    """Road a ends at a junction, from where b leads round to the start of a, and c leads out; all of 100 m."""
+    lane = (
+        '<laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">'
+        '<link><predecessor id="-1"/><successor id="-1"/></link>'
+        '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
+    )
+
+    def link(tag: str, kind: str, number: str) -> str:
+        contact = "" if kind == "junction" else f'contactPoint="{"end" if tag == "predecessor" else "start"}"'
+        return f'<{tag} elementType="{kind}" elementId="{number}" {contact}/>'
+
+    def one(number: str, before: str, after: str, junction: str = "-1") -> str:
+        return road(number, lanes=lane, link=before + after, junction=junction)
+
+    ways = "".join(
+        f'<connection id="{n}" incomingRoad="a" connectingRoad="to_{n}" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection>'
+        for n in ("c", "b")
+    )
+    return RoadNetwork.parse(
+        map_of(
+            one("a", link("predecessor", "road", "b"), link("successor", "junction", "J")),
+            one("to_b", link("predecessor", "road", "a"), link("successor", "road", "b"), "J"),
+            one("to_c", link("predecessor", "road", "a"), link("successor", "road", "c"), "J"),
+            one("b", link("predecessor", "junction", "J"), link("successor", "road", "a")),
+            one("c", link("predecessor", "junction", "J"), ""),
+            rest=f'<junction id="J" name="">{ways}</junction>',
+        )
+    )
+
+
+def test_a_route_that_comes_by_twice_takes_each_time_its_own_branch(road: Text, map_of: Text) -> None:
+    network = round_and_out(road, map_of)
+    start, end = network.location("a", -1, 10.0), network.location("c", -1, 50.0)
+    route = network.route(start, end, via=[network.location("b", -1, 50.0)])
+    assert [key.road for key in route.lanes] == ["a", "to_b", "b", "a", "to_c", "c"]
+    arrived = network.advance(start, 530.0, route=route)
+    assert arrived is not None
+    assert arrived.road == "c"
+    assert arrived.s == pytest.approx(40.0)
+    # In steps, as somebody drives it who remembers where on the route that is.
+    place: LaneLocation | None = start
+    visit, passed = 0, ["a"]
+    while place is not None and len(passed) < 6:
+        place = network.advance(place, 7.0, route=route, visit=visit)
+        assert place is not None
+        if place.road != passed[-1]:
+            visit = route.visit(place.road, visit)
+            passed.append(place.road)
+    assert passed == ["a", "to_b", "b", "a", "to_c", "c"]
+    assert visit == 5
