@@ -74,7 +74,6 @@ class StopLines:
         """The lines at which cars have to stop, those left out that would have to brake too hard."""
         none = np.zeros(len(cars))
         lines = find_leaders(self._lanes, cars.plan, cars.progress + cars.front, none, self.closed())
-        with np.errstate(divide="ignore"):
-            late = (cars.speed > 0.0) & (cars.speed**2 / (2.0 * np.maximum(lines.gap, 0.0)) > TOO_LATE)
+        late = cars.speed**2 > 2.0 * TOO_LATE * np.maximum(lines.gap, 0.0)
         binding = (lines.gap >= 0.0) & ~late & ~cars.walks
         return Leaders(np.where(binding, np.maximum(lines.gap - STOP_LINE, 1e-3), np.inf), lines.speed)

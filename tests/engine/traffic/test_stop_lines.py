@@ -106,6 +106,30 @@ def test_who_would_have_to_brake_too_hard_passes(street: Street, car: Car, dista
     assert (place.x < 200.0 - FRONT) is stops
 
 
+def test_a_car_that_stands_on_the_line_is_not_held_by_it(car: Car) -> None:
+    """The line lies half a metre into the second road; the car stands before that one, its front beyond the line."""
+    lane = (
+        '<lane id="-1" type="driving"><link><{kind} id="-1"/></link>'
+        '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+    )
+    road = (
+        '<road id="{id}" length="100" junction="-1"><link><{kind} elementType="road" elementId="{other}" '
+        'contactPoint="{end}"/></link><planView><geometry s="0" x="{x}" y="0" hdg="0" length="100"><line/></geometry>'
+        '</planView><lanes><laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
+        "</lanes>{extra}</road>"
+    )
+    first = road.format(id=1, kind="successor", other=2, end="start", x=0, lane=lane.format(kind="successor"), extra="")
+    second = road.format(
+        id=2, kind="predecessor", other=1, end="end", x=100, lane=lane.format(kind="predecessor"), extra=light(0.5)
+    )
+    roads = RoadNetwork.parse(f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{first}{second}</OpenDRIVE>')
+    fleet = Fleet(roads, must_stop=Lights())
+    fleet.add(car("me"), roads.location("1", -1, 98.0))
+    for _ in range(100):
+        place = fleet.step(None, 0.05)["me"]
+    assert place.x > 102.0
+
+
 def test_a_light_on_a_connecting_road_holds_cars_before_the_junction(library_roads: RoadNetwork, car: Car) -> None:
     lights = Lights()
     fleet = Fleet(library_roads, must_stop=lights)
