@@ -8,6 +8,7 @@ from functools import cache
 from typing import Generic, TypeVar
 
 import numpy as np
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.library import library_path
@@ -44,11 +45,11 @@ class DriverSettings(Settings):
     """
 
     module: str = MODULE
-    time_gap: float | None = None
-    standstill_gap: float | None = None
-    acceleration: float | None = None
-    deceleration: float | None = None
-    speed_factor: float = 1.0
+    time_gap: NonNegativeFloat | None = None
+    standstill_gap: NonNegativeFloat | None = None
+    acceleration: PositiveFloat | None = None
+    deceleration: PositiveFloat | None = None
+    speed_factor: PositiveFloat = 1.0
 
     def driver(self, usual: IntelligentDriver) -> IntelligentDriver:
         """The usual driver with these parameters."""
@@ -157,7 +158,8 @@ class Mixture:
         properties = {entry.name: entry.value for entry in controller.properties.property}
         if properties.get("module") != MODULE:
             return DriverSettings()
-        return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line)
+        lines = {entry.name: entry.line for entry in controller.properties.property}
+        return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line, lines=lines)
 
     def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> Weighted[T]:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
 from eidrive_scenario.randomness import generator
@@ -53,6 +54,30 @@ def test_categories_have_their_shares() -> None:
     found = drawn(definition({VehicleCategory.CAR: 3.0, VehicleCategory.VAN: 1.0}))
     assert 65 <= found["van"] <= 135
     assert "truck" not in found
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("acceleration", "0"), ("deceleration", "-2"), ("time_gap", "nan"), ("speed_factor", "0")]
+)
+def test_drivers_that_cannot_be_are_told_by_line(name: str, value: str) -> None:
+    entries = (("module", "eidrive.traffic", 3), (name, value, 4))
+    properties = tuple(model.Property(name=key, value=text, line=line) for key, text, line in entries)
+    controller = model.Controller(
+        name="driver", line=2, source="a.xosc", properties=model.Properties(property=properties)
+    )
+    entry = model.ControllerDistributionEntry(weight=1.0, controller=controller)
+    categories = model.VehicleCategoryDistribution(
+        vehicle_category_distribution_entry=(
+            model.VehicleCategoryDistributionEntry(category=VehicleCategory.CAR, weight=1.0),
+        )
+    )
+    element = model.TrafficDefinition(
+        name="mix",
+        vehicle_category_distribution=categories,
+        controller_distribution=model.ControllerDistribution(controller_distribution_entry=(entry,)),
+    )
+    with pytest.raises(SettingError, match=f"a.xosc:4: setting '{name}' is '{value}'"):
+        Mixture(SimpleNamespace(), element, None)  # type: ignore[arg-type]
 
 
 def test_dimensions_are_those_of_the_catalog() -> None:
