@@ -43,11 +43,14 @@ class ContactTracker:
             return ()
         begun: list[Contact] = []
         near = {(first.name, second.name): (first, second) for first, second in _near_pairs(bodies)}
+        moved = {body.name for body in bodies if body.moved} if self._touching else set()
         for pair in [pair for pair in self._touching if pair not in touches]:
             if pair in near:
                 first, second = near[pair]
                 if box_distance(first.box, second.box) <= PARTED:
                     continue
+            elif moved.isdisjoint(pair):
+                continue
             del self._touching[pair]
         for pair, (first, second) in near.items():
             if pair in self._touching or pair in touches or not overlap(first.box, second.box):

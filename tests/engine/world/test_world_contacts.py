@@ -59,6 +59,17 @@ def test_parting_and_meeting_again_counts_twice(world: World, car: CarFactory) -
     assert counts == [1, 0, 0, 1]
 
 
+def test_bodies_that_rest_upon_each_other_still_touch(world: World, car: CarFactory) -> None:
+    """They stand still for a while in between, and then one moves on inside the other."""
+    world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
+    world.add(car("B"), Placement(20.0, 0.0))
+    assert len(approach(world, 33, 10.0, 0.0)) == 1
+    here = world.view().position[0, 0]
+    for step in (0.0, 0.0, 0.1, 0.0, 0.2):
+        world.step({"A": Placement(here + step, 0.0)}, {})
+        assert world.view().contacts == ()
+
+
 def test_many_actors_by_the_sweep(world: World, car: CarFactory) -> None:
     for index in range(40):
         world.add(car(f"P{index}"), Placement(8.0 * index, 0.0))
