@@ -187,7 +187,7 @@ class Simulation:
             spec = commands.bodies.get(name) or actor_spec(name, self.scenario.entities[name])
             self.world.add(spec, placement)
             self.stations.join(spec)
-        for name in self.stations.drivers:
+        for name in sorted(self.stations.drivers):
             self.world.set_driven(name, name in commands.driven)
         self.stations.goals = commands.goals
         self.world.show(commands.signals, commands.appearances)

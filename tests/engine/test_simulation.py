@@ -13,6 +13,7 @@ from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed, run_file
+from eidrive_scenario.world import World
 
 ONE = "coop/scenario_1"
 
@@ -34,6 +35,29 @@ class Frames:
 def play(name: str = ONE, seed: int = 1, *observers: Frames, channel: str | None = None, **more: object) -> RunResult:
     settings = RunSettings(channel=channel, **more)  # type: ignore[arg-type]
     return run_file(resolve_scenario(name), seed=seed, settings=settings, observers=observers)
+
+
+def test_vehicles_take_the_wheel_in_the_order_of_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The order of bodies in pybullet hangs on it, and that of a set differs from process to process."""
+    names = [f"Car{number}" for number in range(8)]
+    source = resolve_scenario(ONE)
+    text = source.read_text().replace('"../', f'"{source.parent.parent}/')
+    start, end = text.index('<ScenarioObject name="Ego">'), text.index('<ScenarioObject name="Incoming">')
+    more = "".join(text[start:end].replace('name="Ego"', f'name="{name}"') for name in names)
+    init = "".join(
+        f'<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>'
+        f'<WorldPosition x="{20 * number}" y="90"/></Position></TeleportAction></PrivateAction></Private>'
+        for number, name in enumerate(names)
+    )
+    text = (
+        text[:start] + more + text[start:].replace('<Private entityRef="Ego">', init + '<Private entityRef="Ego">', 1)
+    )
+    path = tmp_path / "many.xosc"
+    path.write_text(text)
+    asked: list[str] = []
+    monkeypatch.setattr(World, "set_driven", lambda self, name, driven: asked.append(name))
+    Simulation(load_scenario(path)).close()
+    assert asked == sorted([*names, "Ego"])
 
 
 def edited(old: str, new: str, tmp_path: Path) -> Path:
