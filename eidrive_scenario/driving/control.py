@@ -49,7 +49,7 @@ class Controller:
         steering = self._steer(ego, plan)
         if plan.braking is not None:
             self._speed.reset()
-            return Control(0.0, min(plan.braking / self.spec.max_deceleration, 1.0), steering)
+            return Control(0.0, _pedal(plan.braking, self.spec.max_deceleration), steering)
         return self._pedals(self._accelerate(ego, plan), steering)
 
     def parked(self) -> Control:
@@ -66,8 +66,8 @@ class Controller:
 
     def _pedals(self, acceleration: float, steering: float) -> Control:
         if acceleration >= 0.0:
-            return Control(min(acceleration / self.spec.max_acceleration, 1.0), 0.0, steering)
-        return Control(0.0, min(-acceleration / self.spec.max_deceleration, 1.0), steering)
+            return Control(_pedal(acceleration, self.spec.max_acceleration), 0.0, steering)
+        return Control(0.0, _pedal(-acceleration, self.spec.max_deceleration), steering)
 
     def _steer(self, ego: EgoState, plan: Plan) -> float:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)
@@ -76,6 +76,11 @@ class Controller:
         turn = math.atan2(-CROSS_TRACK_GAIN * left, SOFTENING + max(ego.speed, 0.0))
         self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
         return self._steering
+
+
+def _pedal(wanted: float, most: float) -> float:
+    """How far to press a pedal for an acceleration [m/s²], which gives `most` [m/s²] where it is pressed down."""
+    return wanted / most if wanted < most else 1.0
 
 
 def _speed_here(ego: EgoState, plan: Plan) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from eidrive_scenario.driving.step import Goal, Plan
 from eidrive_scenario.world.actor import ActorSpec
 
 NOTHING = Detections(0.0)
+STRAIGHT = np.column_stack([np.arange(3.0), np.zeros(3)])
 
 
 def test_pid_by_hand() -> None:
@@ -146,6 +148,15 @@ def test_braking_to_a_stand_takes_the_time_and_way_of_that_deceleration(car: Act
         ego.drive(controller.control(ego.state(), Plan(points, np.full(60, 8.0), "", braking=5.0)))
     assert 1.5 <= ego.time < 1.61
     assert 6.0 < ego.x < 6.4
+
+
+@pytest.mark.parametrize(
+    "plan", [Plan(STRAIGHT, np.zeros(3), "stop", braking=5.0), Plan(STRAIGHT, np.full(3, 9.0), "go")]
+)
+def test_a_vehicle_without_brakes_or_drive_has_pedals_all_the_same(car: ActorSpec, vehicle: Any, plan: Plan) -> None:
+    weak = replace(car, max_acceleration=0.0, max_deceleration=0.0)
+    control = Controller(weak, 0.05).control(vehicle(speed=5.0).state(), plan)
+    assert max(control.throttle, control.brake) == 1.0
 
 
 def test_parked(car: ActorSpec) -> None:
