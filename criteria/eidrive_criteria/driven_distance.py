@@ -32,15 +32,20 @@ class DrivenDistance(Criterion):
         self._settings = settings
         self.subjects = (settings.of,)
         self._distance = 0.0
+        self._seen = False
         self._last: tuple[float, float] | None = None
+        """Time and speed [s, m/s] in the frame before; None where the actor was not in the world."""
         self._late = False
 
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row, by = view.rows.get(self._settings.of), self._settings.by
         self._late = by is not None and view.time > by + 1e-9
+        if row is None:
+            self._last = None
         if row is None or self._late:
             return
+        self._seen = True
         time, speed = view.time, abs(float(view.speed[row]))
         if self._last is not None:
             before, speed_before = self._last
@@ -48,8 +53,7 @@ class DrivenDistance(Criterion):
         self._last = time, speed
 
     def verdict(self) -> Verdict:
-        of, limit = self._settings.of, self._settings.at_least
-        seen = self._last is not None
+        of, limit, seen = self._settings.of, self._settings.at_least, self._seen
         return Verdict(
             name=self.name,
             passed=seen and self._distance >= limit,
@@ -63,4 +67,4 @@ class DrivenDistance(Criterion):
 
     def metrics(self) -> Mapping[str, float]:
         """The length of the way [m]."""
-        return {f"driven_distance.{self._settings.of}": self._distance} if self._last is not None else {}
+        return {f"driven_distance.{self._settings.of}": self._distance} if self._seen else {}

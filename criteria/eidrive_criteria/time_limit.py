@@ -26,13 +26,16 @@ class TimeLimit(Criterion):
         super().__init__(settings)
         self._within = settings.within
         self._time = 0.0
+        self._violated: float | None = None
 
     def observe(self, frame: Frame) -> None:
         self._time = frame.view.time
+        # Time is tick * dt: its rounding must not fail a run that ends exactly on the limit.
+        if self._violated is None and self._time > self._within + 1e-9:
+            self._violated = self._time
 
     def verdict(self) -> Verdict:
-        # Time is tick * dt: its rounding must not fail a run that ends exactly on the limit.
-        passed = self._time <= self._within + 1e-9
+        passed = self._violated is None
         verb = "lasted" if passed else "had not ended by itself after"
         return Verdict(
             name=self.name,
@@ -40,7 +43,7 @@ class TimeLimit(Criterion):
             value=self._time,
             limit=self._within,
             unit="s",
-            first_violation=None if passed else self._time,
+            first_violation=self._violated,
             reason=f"the run {verb} {self._time:.2f} s",
             fatal=self.fatal,
         )

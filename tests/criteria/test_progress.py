@@ -49,6 +49,17 @@ def test_a_jump_is_no_way_driven(frame: Any, car: Any) -> None:
     assert (verdict.passed, verdict.value) == (False, 0.0)
 
 
+def test_what_is_away_drives_no_way(frame: Any, car: Any) -> None:
+    """It drives 5 m, is out of the world for 8 s, and drives 10 m more."""
+    judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=20))
+    times, away = [0.0, 1.0, 2.0, 9.0, 10.0, 12.0], {"Other": car(0)}
+    frames = [frame(time, away if 1.0 < time < 10.0 else {"Ego": car(0, speed=5.0)}) for time in times]
+    (verdict,) = judge(frames, [judged])
+    assert (verdict.passed, verdict.value) == (False, pytest.approx(15.0))
+    (verdict,) = judge([frame(13.0, away)], [judged])
+    assert verdict.value == pytest.approx(15.0)
+
+
 def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
     judged = MaxSpeed(MaxSpeedSettings(of="Ego", at_most=6))
     frames = [*driving(frame, car), frame(5.0, {"Ego": car(0, speed=-7.0)})]

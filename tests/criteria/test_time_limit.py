@@ -16,6 +16,12 @@ def test_it_passes_up_to_the_limit(frame: Any, car: Any, end: float, passed: boo
     assert verdict.first_violation == (None if passed else end)
 
 
+def test_a_run_that_goes_on_was_too_long_from_the_limit_on(frame: Any, car: Any) -> None:
+    frames = [frame(time, {"Ego": car(0)}) for time in (19.0, 21.0, 25.0)]
+    (verdict,) = judge(frames, [TimeLimit(TimeLimitSettings(within=20, fatal=False))])
+    assert (verdict.value, verdict.first_violation) == (25.0, 21.0)
+
+
 def test_it_ends_the_run_unless_told_otherwise() -> None:
     assert TimeLimit(TimeLimitSettings(within=1)).verdict().fatal
     assert not TimeLimit(TimeLimitSettings(within=1, fatal=False)).verdict().fatal
