@@ -22,7 +22,7 @@ class RunSettings:
 
     channel         profile name or file; 'none' is no cooperation
     detector        for all stations
-    cooperate       the senders whom driven stations hear; () is nobody
+    cooperate       the senders whom listening stations hear; () is nobody
     parameters      values for parameters of the scenario; an Assignment knows the file and line that gave the value
     dt              step [s]
     controllers     who stands in for controllers of other tools, by the controller's name; without an entry its entity

@@ -74,7 +74,7 @@ class Hearings:
         where: list[int] = []
         for receiver, entries in self._waiting:
             known = self._codes.setdefault(receiver, {})
-            for sender in {entry[1] for entry in entries} - known.keys():
+            for sender in sorted({entry[1] for entry in entries} - known.keys()):
                 known[sender] = self._count
                 self._count += 1
             where += [known[entry[1]] for entry in entries]
