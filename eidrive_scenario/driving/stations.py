@@ -146,12 +146,15 @@ class Stations:
     def controls(
         self, steps: Mapping[str, AgentStep], overrides: Mapping[str, Overrides] | None = None
     ) -> dict[str, Control]:
-        """The pedals and steering that the agents chose, but for those that the scenario holds."""
+        """The pedals and steering that the agents chose, but for those that the scenario holds.
+
+        Who has left the world in this step has none any more.
+        """
         held = overrides or {}
         return {
             name: self._held[name].apply(step.control, held.get(name, {}))
             for name, step in steps.items()
-            if step.control is not None
+            if step.control is not None and name in self._held
         }
 
     def send(self, steps: Mapping[str, AgentStep], now: float) -> None:

@@ -14,6 +14,8 @@ from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.stage import Absent, Stage
 
+MOTION = Domain.LONGITUDINAL | Domain.LATERAL
+
 
 class ActionBehaviour(py_trees.behaviour.Behaviour):
     """One action for one actor (none for global actions).
@@ -47,6 +49,11 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def controls(self) -> Domain:
         """The domains of this action as it is configured."""
         return self.domains
+
+    @property
+    def performer_missing(self) -> bool:
+        """Whether it would move an actor that is not in the world."""
+        return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present
 
     @property
     def resource(self) -> str:

@@ -173,6 +173,10 @@ class StoryboardElement(StoryElement):
                 init.tick_once()
                 init = None
             self.decide()
+            if seen == len(progress.changes):
+                waiting, self.stage.waiting = self.stage.waiting, []
+                for action in waiting:
+                    action.give_up()
 
     def settle(self) -> None:
         """End with the last story, if nothing else would end the storyboard."""

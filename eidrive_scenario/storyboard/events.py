@@ -85,6 +85,8 @@ class ActionElement(StoryElement):
         self.running: list[ActionBehaviour] = []
         self._there: list[ActionBehaviour] = []
         """Those that the step which goes on brings to their goal; they hold their domains until they are there."""
+        self._waiting: dict[Holder, tuple[ActionBehaviour, Absent]] = {}
+        """Those that start at this instant, but for somebody who is not in the world, and may be when all is done."""
         self._decided_at: int | None = None
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
@@ -103,7 +105,7 @@ class ActionElement(StoryElement):
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
         self.stand_by()
         self._tried_at, self._decided_at = self.stage.progress.tick, None
-        self._there = []
+        self._there, self._waiting = [], {}
         self.executions += 1
         self._change(Transition.START, State.RUNNING, why)
         for behaviour in self.running:
@@ -132,6 +134,7 @@ class ActionElement(StoryElement):
                 held.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
         self._there = [other for other in self._there if other is not behaviour]
+        self._waiting.pop(behaviour, None)
         if not self.running and self.state is State.RUNNING:
             self._change(Transition.STOP, State.COMPLETE, why)
 
@@ -140,7 +143,7 @@ class ActionElement(StoryElement):
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
             self.stage.release(behaviour)
-        self.running, self._there = [], []
+        self.running, self._there, self._waiting = [], [], {}
         self._change(Transition.STOP, State.COMPLETE, why)
         self.status = Status.INVALID
 
@@ -156,20 +159,39 @@ class ActionElement(StoryElement):
         now = self.stage.progress.tick
         if self._decided_at != now:
             self._decided_at = now
-            done: list[ActionBehaviour] = []
-            for behaviour in tuple(self.running):
-                self._let_decide(behaviour)
-                if behaviour.status in (Status.SUCCESS, Status.FAILURE):
-                    (done if behaviour.immediate else self._there).append(behaviour)
-            self.stage.arriving = self.stage.arriving or bool(self._there)
-            self._let_go(done)
+            self._decide(self.running)
+        elif self._waiting:
+            self._decide([behaviour for behaviour, _ in self._waiting.values()])
         if self.state is State.COMPLETE:
             self.status = Status.SUCCESS
 
+    def _decide(self, behaviours: Sequence[ActionBehaviour]) -> None:
+        done: list[ActionBehaviour] = []
+        for behaviour in tuple(behaviours):
+            self._let_decide(behaviour)
+            if behaviour.status in (Status.SUCCESS, Status.FAILURE):
+                (done if behaviour.immediate else self._there).append(behaviour)
+        self.stage.arriving = self.stage.arriving or bool(self._there)
+        self._let_go(done)
+
     def _let_decide(self, behaviour: ActionBehaviour) -> None:
+        self._waiting.pop(behaviour, None)
         try:
+            if behaviour.status is not Status.RUNNING and behaviour.performer_missing:
+                raise Absent(behaviour.actor_name)
             behaviour.tick_once()
         except Absent as who:
+            if self._tried_at == self.stage.progress.tick:
+                behaviour.stop(Status.INVALID)
+                self._waiting[behaviour] = behaviour, who
+                self.stage.waiting.append(self)
+            else:
+                self.displace(behaviour, behaviour.give_up(who))
+
+    def give_up(self) -> None:
+        """Stop what waited in vain for somebody to enter the world at this instant."""
+        waiting, self._waiting = self._waiting, {}
+        for behaviour, who in waiting.values():
             self.displace(behaviour, behaviour.give_up(who))
 
     def _let_go(self, done: Sequence[ActionBehaviour]) -> None:

@@ -45,6 +45,13 @@ class Occupant(Protocol):
         """Let go of the domain."""
 
 
+class Waiting(Protocol):
+    """Whoever waits for an entity until all is done at an instant."""
+
+    def give_up(self) -> None:
+        """Nobody came."""
+
+
 class Holder(Protocol):
     """A behaviour that holds domains."""
 
@@ -116,6 +123,8 @@ class Stage:
         )
         self.arriving = False
         """Whether the step that goes on brings an action to its goal."""
+        self.waiting: list[Waiting] = []
+        """Whose actions have started at this instant for somebody who is not in the world so far."""
         self.fixed_places: dict[int, tuple[model.Position, Place]] = {}
         """What positions mean that do not move, by `id` of the position."""
         self._holders: list[tuple[str, Domain, Occupant, Holder]] = []

@@ -73,3 +73,61 @@ def test_who_is_deleted_and_added_at_one_instant_is_moved(run: Any) -> None:
     both = (("Ego", DELETE, after(0.475)), ("Ego", back, after(0.475)))
     x = run(1, *both, others=others, driven=False).x("Other")
     assert x[10:13] == pytest.approx([155.0, 300.0, 300.5])
+
+
+SPEED_UP = private(
+    '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="1"/>'
+    '<SpeedActionTarget><AbsoluteTargetSpeed value="20"/></SpeedActionTarget></SpeedAction></LongitudinalAction>'
+)
+TO_THE_SIDE = private(
+    '<LateralAction><LaneOffsetAction continuous="false"><LaneOffsetActionDynamics maxLateralAcc="1" '
+    'dynamicsShape="linear"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget>'
+    "</LaneOffsetAction></LateralAction>"
+)
+PROFILE = private(
+    '<LongitudinalAction><SpeedProfileAction followingMode="position"><SpeedProfileEntry speed="20" time="1"/>'
+    "</SpeedProfileAction></LongitudinalAction>"
+)
+TOGETHER = private(
+    '<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
+    '</TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="400"/></TargetPosition>'
+    "</SynchronizeAction>"
+)
+BACK = everywhere(
+    '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
+    "</Position></AddEntityAction></EntityAction>"
+)
+
+
+@pytest.mark.parametrize(
+    "action", [SPEED_UP, TO_THE_SIDE, PROFILE, TOGETHER], ids=["speed", "offset", "profile", "meet"]
+)
+def test_who_is_not_in_the_world_does_nothing(scene: Any, action: str) -> None:
+    played = scene(3, ("Ego", DELETE, after(0.45)), ("Other", action, after(0.95)), ("Ego", BACK, after(2.05)))
+    assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]
+    assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is not in the world"
+    assert (played.at(2.2, "Other").x, played.at(2.2, "Other").y) == (300.0, -2.0)
+    assert played.at(3.0, "Other").speed == 10.0
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["enters first", "acts first"])
+@pytest.mark.parametrize("action", [SPEED_UP, TO_THE_SIDE], ids=["speed", "offset"])
+def test_who_enters_at_the_instant_of_his_action_does_it(scene: Any, order: tuple[int, int], action: str) -> None:
+    """Triggers that hold at one instant have no order, nor have their actions."""
+    both = (("Ego", BACK, after(0.95)), ("Other", action, after(0.95)))
+    played = scene(4, ("Ego", DELETE, after(0.45)), *(both[number] for number in order))
+    ended = [name for _, name in transitions(played, f"action {1 + order.index(1)}")]
+    assert ended == ["START", "END"]
+    there = played.at(4.0, "Other")
+    assert (there.speed, there.y) == ((20.0, -2.0) if action == SPEED_UP else (10.0, -1.0))
+
+
+def test_an_ego_that_drives_itself_may_be_deleted(run: Any) -> None:
+    delete = everywhere('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
+    add = BACK.replace('"Other"', '"Ego"')
+    played = run(2, ("Ego", delete, after(0.475)), ("Ego", add, after(0.975)), others={"Other": (-2, 150.0, 10.0)})
+    there = ["Ego" in frame.view for frame in played.frames]
+    assert there.index(False) == 11
+    assert there[21:] == [True] * 20
+    view = played.frames[21].view
+    assert 300.0 <= view.position[view.rows["Ego"], 0] < 301.1, "its engine moves it on in the step in which it enters"

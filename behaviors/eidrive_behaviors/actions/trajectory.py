@@ -49,6 +49,11 @@ class FollowTrajectoryAction(ActionBehaviour):
         """The way alone, or the speed too."""
         return Domain.LATERAL if self._timing is None else Domain.LATERAL | Domain.LONGITUDINAL
 
+    @property
+    def performer_missing(self) -> bool:
+        """Never: who is not in the world appears on the trajectory."""
+        return False
+
     def initialise(self) -> None:
         """Lay the trajectory out; positions relative to entities mean where those are now."""
         self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)

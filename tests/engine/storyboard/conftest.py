@@ -90,6 +90,11 @@ class Task(ActionBehaviour):
     def controls(self) -> Domain:
         return self._domain
 
+    @property
+    def performer_missing(self) -> bool:
+        """Never: nobody is placed where elements are tested alone."""
+        return False
+
     def initialise(self) -> None:
         self.starts += 1
         self._left = self.ticks
