@@ -23,6 +23,8 @@ STANDING = 0.1
 """Slower than this a vehicle has stopped [m/s]."""
 AT_LINE = 2.0
 """It has done so for the sign if its front is this near to where it should be [m]."""
+ANOTHER = 5.0
+"""A stop line that lies this much farther ahead than it did is that of another visit, on another lap [m]."""
 WAIT = 3.0
 """How long a vehicle stands at a stop sign: EI-Drive's 60 ticks of 0.05 s [s]."""
 
@@ -44,6 +46,8 @@ class SignalStops:
         self._too_late: set[str] = set()
         self._standing_since: dict[str, float] = {}
         self._served: set[str] = set()
+        self._distances: dict[str, float] = {}
+        """How far ahead the next stop line of each signal was last [m]."""
         self._along = np.zeros(1)
 
     def follow(self, path: Array) -> None:
@@ -54,19 +58,27 @@ class SignalStops:
     def next(self, along: float, speed: float, now: float) -> Stop | None:
         """The stop ahead of a vehicle whose reference point is `along` the path, None where nothing stops it."""
         found: Stop | None = None
-        ahead = list(self.signals.ahead(along))
-        for signal in ahead:
+        ahead: dict[str, SignalAhead] = {}
+        for signal in self.signals.ahead(along):
+            ahead.setdefault(signal.signal, signal)
+        for name, before in self._distances.items():
+            if name not in ahead or ahead[name].distance > before + ANOTHER:
+                self._forget(name)
+        self._distances = {name: signal.distance for name, signal in ahead.items()}
+        for signal in ahead.values():
             left = signal.distance - self._front - BEFORE_LINE
             holds = self._light_holds if signal.kind == "light" else self._sign_holds
             if holds(signal, left, speed, now) and found is None:
                 what = "traffic light" if signal.kind == "light" else "stop sign"
                 found = Stop(along + max(left, 0.0), f"stop at {what} {signal.signal}")
-        names = {signal.signal for signal in ahead}
-        self._served &= names
-        self._too_late &= names
-        self._stopping &= names
-        self._standing_since = {name: since for name, since in self._standing_since.items() if name in names}
         return found
+
+    def _forget(self, name: str) -> None:
+        """The vehicle has left a signal behind, whatever it did there."""
+        self._stopping.discard(name)
+        self._too_late.discard(name)
+        self._served.discard(name)
+        self._standing_since.pop(name, None)
 
     def limits(self, stop: Stop, part: slice) -> Array:
         """The speeds at points of the path with which the vehicle comes to a stand there [m/s]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -121,21 +122,23 @@ def _along(lines: Sequence[StopLine], path: Array) -> Iterator[tuple[float, Stop
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
     for line in lines:
-        index, share, gap = _nearest(path, step, length, line.x, line.y)
-        if gap > ON_PATH:
-            continue
-        ahead = step[index] / length[index]
-        if ahead[0] * math.cos(line.heading) + ahead[1] * math.sin(line.heading) < SAME_WAY:
-            continue
-        if line.beyond is not None and _nearest(path, step, length, *line.beyond)[2] > ON_PATH:
-            continue
-        yield float(start[index] + share * length[index]), line
+        beyond = [index for index, _ in _passes(path, step, length, *line.beyond)] if line.beyond is not None else []
+        passes = [*_passes(path, step, length, line.x, line.y), (len(step), 0.0)]
+        for (index, share), (end, _) in pairwise(passes):
+            ahead = step[index] / length[index]
+            if ahead[0] * math.cos(line.heading) + ahead[1] * math.sin(line.heading) < SAME_WAY:
+                continue
+            if line.beyond is not None and not any(index <= later < end for later in beyond):
+                continue
+            yield float(start[index] + share * length[index]), line
 
 
-def _nearest(path: Array, step: Array, length: Array, x: float, y: float) -> tuple[int, float, float]:
-    """The segment of a path nearest to a point, where along it [share], and how far away [m]."""
+def _passes(path: Array, step: Array, length: Array, x: float, y: float) -> Iterator[tuple[int, float]]:
+    """Where a path comes by a point, each time: the segment nearest to it, and the place on that [share]."""
     dx, dy = x - path[:-1, 0], y - path[:-1, 1]
     share = np.clip((dx * step[:, 0] + dy * step[:, 1]) / length**2, 0.0, 1.0)
     gap = np.hypot(dx - share * step[:, 0], dy - share * step[:, 1])
-    index = int(np.argmin(gap))
-    return index, float(share[index]), float(gap[index])
+    changes = np.flatnonzero(np.diff(gap <= ON_PATH, prepend=False, append=False))
+    for first, last in changes.reshape(-1, 2).tolist():
+        index = first + int(np.argmin(gap[first:last]))
+        yield index, float(share[index])

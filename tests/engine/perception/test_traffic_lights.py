@@ -236,6 +236,38 @@ def test_a_wait_that_was_cut_short_does_not_count_at_the_next_visit() -> None:
     assert stops.next(at_line, 0.0, 60.0 + WAIT) is None
 
 
+ROUND = np.concatenate(
+    [
+        np.column_stack([np.arange(40.0, 160.0), np.full(120, -1.75)]),
+        np.column_stack([np.full(40, 160.0), np.arange(-1.75, -41.75, -1.0)]),
+        np.column_stack([np.arange(160.0, 40.0, -1.0), np.full(120, -41.75)]),
+        np.column_stack([np.full(41, 40.0), np.arange(-41.75, -0.75)]),
+    ]
+)
+"""A lap of 320 m that takes the street from x = 40 m to 160 m."""
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.37, 0.77])
+def test_a_signal_is_ahead_on_every_lap(offset: float) -> None:
+    path = np.concatenate([[[40.0 - offset, -1.75]], ROUND[1:], ROUND[1:]])
+    assert [place for _, place in names(street(light("east", 120.0)), path)] == pytest.approx(
+        [80.0 + offset, 400.0 + offset], abs=0.01
+    )
+
+
+def test_a_stop_sign_holds_on_every_lap() -> None:
+    """The wait of the first lap does not count on the second."""
+    stops = SignalStops(street(stop_sign("stop", 100.0)), CAR)
+    stops.follow(np.concatenate([ROUND, ROUND[1:]]))
+    stops.signals.see([SignalReading("stop", "")])
+    at_line = 60.0 - CAR.offset[0] - CAR.size[0] / 2.0 - BEFORE_LINE
+    for lap, now in ((0.0, 0.0), (320.0, 60.0)):
+        assert stops.next(lap + at_line - 20.0, 8.0, now) is not None
+        assert stops.next(lap + at_line, 0.0, now + 3.0) is not None
+        assert stops.next(lap + at_line, 0.0, now + 3.0 + WAIT) is None
+        assert stops.next(lap + at_line + 2.0, 2.0, now + 8.0) is None
+
+
 SCENARIO = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" description="" author=""/><CatalogLocations/>
 <RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
