@@ -49,15 +49,20 @@ class ForeignNetwork(ImageNetwork):
         blank = np.zeros((input_size[1], input_size[0], 3), dtype=np.uint8)
         outputs = self._outputs(blank)
         self._layout: Layout = layout or self._told_by_shape(outputs)
-        try:
-            self._candidates(outputs)
-        except (ValueError, IndexError) as error:
-            shapes = ", ".join(str(output.shape) for output in outputs)
-            message = f"weights {str(path)!r} give {shapes}, which is not {self._layout!r} for {len(classes)} classes"
-            raise SettingError(Problem(message, f"layouts: {LAYOUTS}")) from error
+        self._fitting(outputs)
 
     def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
-        return self._candidates(self._outputs(picture))
+        """Raises SettingError if the network gives now what does not fit its layout and classes."""
+        return self._fitting(self._outputs(picture))
+
+    def _fitting(self, outputs: list[Floats]) -> Candidates:
+        try:
+            return self._candidates(outputs)
+        except (ValueError, IndexError) as error:
+            given = ", ".join(str(output.shape) for output in outputs)
+            fits = f"{self._layout!r} for {len(self.classes)} classes"
+            message = f"weights {str(self._path)!r} give {given}, which is not {fits}: {error}"
+            raise SettingError(Problem(message, f"layouts: {LAYOUTS}")) from error
 
     def _outputs(self, picture: NDArray[np.uint8]) -> list[Floats]:
         pixels = np.ascontiguousarray(picture.transpose(2, 0, 1)[None], dtype=np.float32) / np.float32(255.0)
@@ -100,6 +105,7 @@ class ForeignNetwork(ImageNetwork):
                 boxes, shares = shares, boxes
         elif self._layout == "detections":
             table = outputs[0].reshape(-1, _sides(outputs[0], -1, 6))
+            table = table[table[:, 4] >= self.confidence]  # others may be mere padding
             boxes, shares = table[:, :4], np.zeros((len(table), count), dtype=np.float32)
             numbers = table[:, 5].astype(np.int64)
             if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:

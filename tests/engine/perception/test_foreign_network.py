@@ -121,7 +121,7 @@ class Fixed(ForeignNetwork):
         self._layout = self._told_by_shape(outputs)
 
     def found(self) -> list[tuple[list[float], float, int]]:
-        candidates = self._candidates(self.outputs)
+        candidates = self._fitting(self.outputs)
         rows = zip(candidates.boxes, candidates.scores, candidates.classes, strict=True)
         return [
             ([round(v, 4) for v in box.tolist()], round(float(score), 4), int(number)) for box, score, number in rows
@@ -139,6 +139,17 @@ def test_each_layout_says_the_same() -> None:
     table = np.array([[8.0, 17.0, 12.0, 23.0, 0.8, 1.0]], dtype=np.float32)
     for outputs in ([yolov5], [yolov8], [corners, shares], [shares, corners], [table]):
         assert Fixed(outputs, classes).found() == expected
+
+
+def test_rows_that_pad_a_list_of_detections_are_no_boxes() -> None:
+    """Exported suppression fills up with scores of 0 and the class -1; any other class beyond the table is a mistake."""
+    row, padding = [8.0, 17.0, 12.0, 23.0, 0.8, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
+    classes = ("car", "truck", "bus")
+    network = Fixed([np.array([row, padding], dtype=np.float32)], classes)
+    assert network.found() == [([8.0, 17.0, 12.0, 23.0], 0.8, 1)]
+    network.outputs = [np.array([[*row[:5], 9.0]], dtype=np.float32)]
+    with pytest.raises(SettingError, match=r"own\.onnx' give \(1, 6\), .*: a class number is beyond the classes"):
+        network.found()
 
 
 def test_a_layout_that_the_shape_leaves_open_must_be_said() -> None:
