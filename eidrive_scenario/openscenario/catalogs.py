@@ -17,6 +17,7 @@ from eidrive_scenario.openscenario.parsing import Document, line_of, open_docume
 from eidrive_scenario.openscenario.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.scalars import Version
 from eidrive_scenario.openscenario.schema import rules
+from eidrive_scenario.openscenario.slips import without_slips
 
 
 @dataclass(frozen=True)
@@ -200,6 +201,7 @@ def _read(path: Path, findings: Findings) -> CatalogFile | None:
     version = version_of(document, findings, older=VERSIONS[0])
     if version is None:
         return None
+    catalog = without_slips(catalog, document.name, version, findings)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
     return CatalogFile(catalog.get("name", path.stem), document, version, entries)
 

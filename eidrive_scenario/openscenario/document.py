@@ -14,6 +14,7 @@ from eidrive_scenario.openscenario.parameters import Assignment, Parameter
 from eidrive_scenario.openscenario.parsing import Document, Source, line_of, open_document
 from eidrive_scenario.openscenario.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.scalars import Version
+from eidrive_scenario.openscenario.slips import without_slips
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 ROOTS = ("OpenSCENARIO", "OpenScenario")
@@ -50,7 +51,8 @@ def read_root(
     if version is None:
         return None
     reader = Reader(document.name, version, findings)
-    root = cast(OpenScenario, reader.read(document.root, OpenScenario, assignments))
+    tree = without_slips(document.root, document.name, version, findings)
+    root = cast(OpenScenario, reader.read(tree, OpenScenario, assignments))
     declared = reader.declared if root.parameter_declarations else None
     return ReadDocument(root, version, tuple(reader.references), declared.parameters if declared else {})
 

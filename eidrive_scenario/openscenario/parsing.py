@@ -91,15 +91,28 @@ def _as_written(root: ElementTree.Element, name: str) -> bytes:
     """The text of a tree that knows no lines.
 
     It has one element a line after the XML declaration, as write_xml of scenariogeneration sets it: the line of a
-    message is the line that the element would have in such a file.
+    message is the line that the element would have in such a file. Attributes that are None are left out.
     """
     indented = copy.deepcopy(root)
     try:
+        for node in indented.iter():
+            _texts_only(node, name)
         ElementTree.indent(indented)
         text: bytes = ElementTree.tostring(indented, "utf-8", xml_declaration=True)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ScenarioError(Problem(f"cannot be written as XML: {error}", "give texts only", name)) from error
     return text
+
+
+def _texts_only(node: ElementTree.Element, name: str) -> None:
+    """Takes the attributes away that are None. Raises ScenarioError for others that are no text."""
+    attributes: list[tuple[str, Any]] = list(node.items())
+    for attribute, value in attributes:
+        if value is None:
+            del node.attrib[attribute]
+        elif not isinstance(value, str):
+            what = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
+            raise ScenarioError(Problem(what, "give a text, as XML has nothing else", name))
 
 
 def parse(content: bytes, name: str) -> etree._Element:

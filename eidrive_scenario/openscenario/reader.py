@@ -130,7 +130,10 @@ class Reader:
             if error.message:
                 self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
         except ValueError as error:
-            self._error(f"{name} of {node.tag} is {text!r}, which is not {rule.scalar.name}", str(error), node)
+            if text == "None" and not rule.required:
+                self._written_none(name, node)
+            else:
+                self._error(f"{name} of {node.tag} is {text!r}, which is not {rule.scalar.name}", str(error), node)
         if rule.deprecated:
             self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
         if isinstance(value, Enumeration) and rule.scalar.is_deprecated(value):
@@ -242,6 +245,11 @@ class Reader:
         kinds = tuple(child.cls for child in known.children.values() if child.cls in entries)
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(FoundReference(reference, kinds) for reference in references)
+
+    def _written_none(self, name: str, node: etree._Element) -> None:
+        """Python programs write None for what is missing; scenariogeneration 0.16 does so in LaneOffsetActions."""
+        message = f"{name} of {node.tag} is 'None', as Python writes what is missing; it is taken as missing"
+        self.findings.warn(message, "leave it out", source=self.source, line=line_of(node))
 
     def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
         self.findings.warn(f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node))

@@ -10,7 +10,7 @@ from lxml import etree
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.matching import Automaton
 from eidrive_scenario.openscenario.scalars import Version, availability
-from eidrive_scenario.openscenario.schema import Rules
+from eidrive_scenario.openscenario.schema import Rules, rules
 
 Report = Callable[[str, str, etree._Element], None]
 """Takes what is wrong, the remedy, and the element where it is."""
@@ -41,6 +41,9 @@ def _instead(node: etree._Element, name: str, known: Rules, version: Version) ->
     usage = known.other_children.get(name)
     if usage:
         return availability(usage, version)
+    around = [tag for tag, rule in known.children.items() if name in rules(rule.cls, version).children]
+    if around:
+        return f"{name} stands in {' or '.join(around)}, which may stand here"
     return suggestion(name, known.children) if known.children else f"{node.tag} holds no elements"
 
 

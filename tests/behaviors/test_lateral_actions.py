@@ -231,3 +231,14 @@ def test_a_trajectory_takes_the_lateral_domain_and_leaves_the_speed_to_others(sc
     played = scene(2, ("Ego", trajectory(CORNER, "<None/>")), ("Ego", step, later), ("Ego", change(lane(-2)), later))
     assert played.at(0.3).speed == 5.0
     assert played.when("action 0", "completeState") == pytest.approx(0.2)
+
+
+@pytest.mark.element("LateralDistanceAction")
+def test_a_distance_in_the_own_frame_does_not_make_the_actor_swing(scene: Any) -> None:
+    """Both drive beside each other; 2.5 m between cars of 2 m: middles 4.5 m apart, at once and then for good."""
+    action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="2.5" freespace="true"
+      continuous="true" coordinateSystem="entity" displacement="rightToReferencedEntity"/>
+      </LateralAction></PrivateAction>"""
+    played = scene(5, ("Ego", action), ego=(-1, 100.0, 20.0), other=(1, 100.0, -20.0))
+    assert [row["Ego"].y for row in played.rows[1:]] == pytest.approx([played.at(0.0, "Other").y - 4.5] * 50)
+    assert [row["Ego"].yaw for row in played.rows[2:]] == pytest.approx([0.0] * 49, abs=1e-6)

@@ -217,3 +217,18 @@ def test_two_arrive_together(scene: Any) -> None:
     assert end == pytest.approx(25.0, abs=0.15)
     assert played.at(25.0).x == pytest.approx(600.0, abs=1.0)
     assert played.at(end + 0.1).speed == 22.0
+
+
+@pytest.mark.element("SynchronizeAction")
+def test_who_is_early_by_far_arrives_together_all_the_same(scene: Any) -> None:
+    """Other needs (350 - 150) / 10 = 20 s; Ego has 100 m for that: braking evenly from 20 m/s it would be there after
+    6.7 s, and would have to come back."""
+    position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster>{position.format(-1, 350)[10:-11]}</TargetPositionMaster>
+      <TargetPosition>{position.format(-1, 200)[10:-11]}</TargetPosition></SynchronizeAction></PrivateAction>"""
+    played = scene(25, ("Ego", action), dt=0.05)
+    assert played.when("action 0", "completeState") == pytest.approx(20.0, abs=0.1)
+    assert played.at(20.0).x == pytest.approx(200.0, abs=0.5)
+    assert min(row["Ego"].speed for row in played.rows) >= 0.0
+    assert played.at(20.0).speed == pytest.approx(100.0 / 20.0, abs=0.1), "the mean speed"

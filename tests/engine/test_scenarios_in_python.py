@@ -126,10 +126,38 @@ def test_a_mistake_has_the_line_that_the_file_would_have(cut_in: Build, tmp_path
     assert "Taget" in path.read_text(encoding="utf-8").splitlines()[(in_file.line or 0) - 1]
 
 
+def test_what_the_library_itself_gets_wrong_is_played_as_it_is_meant(cut_in: Build, tmp_path: Path) -> None:
+    """Version 0.16 writes the state of a light before the light, and a limit that is not given as 'None'."""
+    scenario = cut_in()
+    for action in (
+        xosc.LightStateAction(xosc.VehicleLightType.brakeLights, xosc.LightMode.on),
+        xosc.AbsoluteLaneOffsetAction(0.5, xosc.DynamicsShapes.step, continuous=False),
+    ):
+        scenario.storyboard.init.add_init_action("Ego", action)
+    path = tmp_path / "offset.xosc"
+    scenario.write_xml(str(path))
+    runs = [run_file(scenario), run_file(path)]
+    assert runs[0].trace_hash == runs[1].trace_hash
+    for run in runs:
+        assert ["LightType" in warning for warning in run.warnings] == [True, False]
+        assert ["is 'None', as Python writes" in warning for warning in run.warnings] == [False, True]
+
+
+def test_attributes_that_are_none_are_not_there(cut_in: Build) -> None:
+    """An AngleCondition without a coordinate system is in the entity's; the library cannot write such a file."""
+    scenario = cut_in()
+    angle = xosc.AngleCondition(0.0, 0.1, xosc.AngleType.heading)
+    scenario.storyboard.stoptrigger = xosc.EntityTrigger(
+        "ahead", 0, xosc.ConditionEdge.none, angle, "Ego", triggeringpoint="stop"
+    )
+    run = run_file(scenario)
+    assert (run.end, run.simulated_s) == ("stop trigger", 0.0)
+
+
 def test_what_is_no_scenario_is_refused() -> None:
     with pytest.raises(ScenarioError, match="<int>: this is neither a path nor XML; give a path, bytes"):
         load_scenario(5)  # type: ignore[arg-type]
-    with pytest.raises(ScenarioError, match="<Element>: cannot be written as XML: cannot serialize 5"):
+    with pytest.raises(ScenarioError, match="<Element>: version of OpenSCENARIO is 5 of the type int; give a text"):
         load_scenario(ElementTree.Element("OpenSCENARIO", {"version": 5}))  # type: ignore[dict-item]
     with pytest.raises(ScenarioError, match="<Element>:2: the root element is Catalog, not OpenSCENARIO"):
         load_scenario(ElementTree.Element("Catalog"))

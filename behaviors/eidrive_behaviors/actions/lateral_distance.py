@@ -18,8 +18,10 @@ class LateralDistanceAction(ActionBehaviour):
 
     Without a limit of acceleration the actor goes sideways as fast as `maxSpeed` lets it, without any at once. With
     one it follows like a critically damped spring with the stiffness of LongitudinalDistanceAction, 0.4 times the
-    limit. Free space is that between the flanks of both, as if they stood along the lane. The standard leaves the
-    course of the distance open; esmini's actions on distances have such a spring.
+    limit. Free space is that between the flanks of both, as if they stood along the lane. In the entity's frame the
+    distance is across the lane too, at the place of the actor: its own axis turns with the very motion that the
+    distance commands, and would make it swing. The standard leaves the course of the distance open; esmini's actions on
+    distances have such a spring.
     """
 
     domains = Domain.LATERAL
@@ -75,11 +77,16 @@ class LateralDistanceAction(ActionBehaviour):
     def _beside(self) -> float:
         """How far the other's middle is to the left of the own one [m]."""
         frame = frame_of(self.action.coordinate_system)
-        beside = distance(
-            self.stage, self.actor.name, self.action.entity_ref, frame=frame, kind="lateral", freespace=False
-        )
-        mine, theirs = self._boxes()
-        return beside + theirs.center.y - mine.center.y
+        me, other = self.actor.name, self.action.entity_ref
+        here, roads = self.actor.motion.location, self.stage.roads
+        if frame == "entity" and here is not None and roads is not None:
+            lane = roads.pose(here).h + (0.0 if self.actor.motion.direction > 0 else math.pi)
+            mine, theirs = self.stage.pose(me), self.stage.pose(other)
+            beside = (theirs.y - mine.y) * math.cos(lane) - (theirs.x - mine.x) * math.sin(lane)
+        else:
+            beside = distance(self.stage, me, other, frame=frame, kind="lateral", freespace=False)
+        my_box, their_box = self._boxes()
+        return beside + their_box.center.y - my_box.center.y
 
     def _wanted(self) -> float:
         """How far apart the middles of the two shall be [m]."""

@@ -33,7 +33,8 @@ class SynchronizeAction(ActionBehaviour):
     a² t²/2 + a ((v0 + v1) t - 2 s) - (v1 - v0)²/2 = 0, newly solved in each step as the master's arrival changes; in
     the last phase the speed lies on the line that ends in v1. Where the middle speed would be negative the actor stops
     and waits. While the master stands, so that it arrives never, the actor stands too. Without a final speed the
-    acceleration is constant. A steady state at the end shortens way and time.
+    acceleration is constant; an actor that is so fast that it would have to come back takes the mean speed of that
+    instant as its final speed. A steady state at the end shortens way and time.
     """
 
     domains = Domain.LONGITUDINAL
@@ -44,6 +45,8 @@ class SynchronizeAction(ActionBehaviour):
         self._phase = Phase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
+        self._mean: float | None = None
+        """Speed at which to arrive where none is asked for and a constant deceleration would lead back [m/s]."""
 
     def update(self) -> Status:
         """The speed for the step."""
@@ -64,11 +67,13 @@ class SynchronizeAction(ActionBehaviour):
                 motion.speed = final
             return Status.SUCCESS
         way = max(way - mine, TINY)
-        if final is None:
-            if math.isfinite(time):
-                motion.speed += 2.0 * (way / time - motion.speed) / time * dt
-        else:
+        if final is None and self._mean is None and math.isfinite(time) and motion.speed > 2.0 * way / time:
+            self._mean = way / time
+        final = self._mean if final is None else final
+        if final is not None:
             motion.speed = self._next(way, time, final, dt)
+        elif math.isfinite(time):
+            motion.speed += 2.0 * (way / time - motion.speed) / time * dt
         return Status.RUNNING
 
     def _next(self, way: float, time: float, final: float, dt: float) -> float:

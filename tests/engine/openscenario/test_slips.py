@@ -1,0 +1,94 @@
+"""What programs write that the schema refuses, and that can mean one thing only: read, with a warning."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from lxml import etree
+
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.openscenario import Scenario, load_scenario
+from eidrive_scenario.openscenario.model import LightMode, LightStateAction, Phase, Sun
+
+Build = Callable[..., bytes]
+Kind = TypeVar("Kind")
+
+LIGHT = """<Private entityRef="Ego"><PrivateAction><AppearanceAction><LightStateAction transitionTime="0">
+<LightState mode="on"/>
+<LightType><VehicleLight vehicleLightType="brakeLights"/></LightType></LightStateAction></AppearanceAction>
+</PrivateAction></Private>"""
+CONTROLLER = """<TrafficSignals><TrafficSignalController name="C"><Phase name="go" duration="2">
+<TrafficeSignalGroupState state="green"/></Phase></TrafficSignalController></TrafficSignals>"""
+ENVIRONMENT = """<Environment name="e"><Weather>
+<Sun azimuth="0" elevation="1" {word}="1000"/></Weather></Environment>"""
+SUNNY = f"<GlobalAction><EnvironmentAction>{ENVIRONMENT}</EnvironmentAction></GlobalAction>"
+OFFSET = """<Private entityRef="Ego"><PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
+<LaneOffsetActionDynamics maxLateralAcc="None" dynamicsShape="{shape}"/>
+<LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
+</PrivateAction></Private>"""
+BARE = """<GlobalAction><Environment name="e"/></GlobalAction>"""
+
+
+def only(scenario: Scenario, kind: type[Kind]) -> Kind:
+    return next(one for one in scenario.document.walk() if isinstance(one, kind))
+
+
+def test_a_light_may_stand_behind_its_state(scenario_xml: Build) -> None:
+    scenario = load_scenario(scenario_xml(init=LIGHT))
+    action = only(scenario, LightStateAction)
+    assert action.light_state.mode is LightMode.ON
+    assert action.light_type.vehicle_light is not None
+    (warning,) = scenario.warnings
+    assert "LightState stands before LightType in LightStateAction; put LightType first" in str(warning)
+    assert action.line == warning.line
+
+
+def test_the_tree_that_was_given_stays_as_it_is(scenario_xml: Build) -> None:
+    root = etree.fromstring(scenario_xml(init=LIGHT))
+    before = etree.tostring(root)
+    load_scenario(root)
+    assert etree.tostring(root) == before
+
+
+def test_the_misspelt_group_state_of_older_versions(scenario_xml: Build) -> None:
+    scenario = load_scenario(scenario_xml(road=CONTROLLER))
+    assert only(scenario, Phase).traffic_signal_group_state is not None
+    assert "write TrafficSignalGroupState" in str(scenario.warnings[0])
+    assert load_scenario(scenario_xml(minor=2, road=CONTROLLER)).warnings == ()
+
+
+def test_an_illuminance_before_it_was_called_so(scenario_xml: Build) -> None:
+    scenario = load_scenario(scenario_xml(minor=2, init=SUNNY.format(word="illuminance")))
+    assert only(scenario, Sun).intensity == 1000.0
+    assert "raise revMinor to 3" in str(scenario.warnings[0])
+    both = SUNNY.format(word='intensity="1" illuminance')
+    with pytest.raises(ScenarioError, match="Sun has no attribute 'illuminance'; OpenSCENARIO has it"):
+        load_scenario(scenario_xml(minor=2, init=both))
+
+
+def test_a_catalog_too(scenario_xml: Build, tmp_path: Path) -> None:
+    (tmp_path / "skies.xosc").write_text(
+        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-31T12:00:00" description="" author=""/>\n'
+        f'<Catalog name="skies">{ENVIRONMENT.format(word="illuminance")}</Catalog></OpenSCENARIO>'
+    )
+    place = f'<EnvironmentCatalog><Directory path="{tmp_path}"/></EnvironmentCatalog>'
+    reference = '<CatalogReference catalogName="skies" entryName="e"/>'
+    action = f"<GlobalAction><EnvironmentAction>{reference}</EnvironmentAction></GlobalAction>"
+    scenario = load_scenario(scenario_xml(catalogs=place, init=action))
+    (entry,) = scenario.entries.values()
+    assert next(one.intensity for one in entry.walk() if isinstance(one, Sun)) == 1000.0
+    (warning,) = [one for one in scenario.warnings if "illuminance" in one.message]
+    assert (warning.source, warning.line) == (str(tmp_path / "skies.xosc"), 3)
+
+
+def test_none_is_what_is_missing_where_it_may_be_missing(scenario_xml: Build) -> None:
+    scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="linear")))
+    assert "maxLateralAcc of LaneOffsetActionDynamics is 'None', as Python writes" in str(scenario.warnings[0])
+    with pytest.raises(ScenarioError, match="continuous of LaneOffsetAction is 'None', which is not"):
+        load_scenario(scenario_xml(init=OFFSET.format(continuous="None", shape="linear")))
+
+
+def test_what_stands_one_level_too_high_is_told_where_it_belongs(scenario_xml: Build) -> None:
+    with pytest.raises(ScenarioError, match="Environment in GlobalAction; Environment stands in EnvironmentAction"):
+        load_scenario(scenario_xml(init=BARE))
