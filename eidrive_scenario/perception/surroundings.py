@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.ground import is_level
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -32,9 +33,7 @@ class Surroundings:
         self.margin = margin
         self._roads = roads
         self._mask: NDArray[np.int8] | None = None
-        self._level = roads is None or all(
-            road.elevation.is_zero and road.superelevation.is_zero for road in roads.roads.values()
-        )
+        self._level = is_level(roads)
         if roads is not None:
             x0, y0, x1, y1 = roads.bounds()
             width, height = x1 - x0 + 2.0 * BEYOND, y1 - y0 + 2.0 * BEYOND

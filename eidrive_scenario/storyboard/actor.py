@@ -77,11 +77,6 @@ class Actor:
         """True where its own controller drives it."""
         return self.lateral and self.longitudinal and self._has_ours
 
-    @property
-    def drives(self) -> bool:
-        """True for an entity with wheels and an engine: its Performance binds scripted speeds too."""
-        return isinstance(self.entity, model.Vehicle)
-
     def limits(self) -> tuple[float, float, float]:
         """Largest speed [m/s], acceleration and deceleration [m/s²]; infinite where the entity states none."""
         if isinstance(self.entity, model.Vehicle):

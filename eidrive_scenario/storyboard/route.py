@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
@@ -88,9 +86,3 @@ def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cos
     if strategy is model.RouteStrategy.RANDOM:
         return by_chance(roads, generator(seed, "route", route.name, number))
     return None
-
-
-def waypoints_of(route: Route, spacing: float = 2.0) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """(M, 3) points along a route [m]."""
-    points: np.ndarray[tuple[int, int], np.dtype[np.float64]] = route.polyline(spacing)
-    return points

@@ -55,7 +55,6 @@ class ConditionHistory:
     asked: int = 0
     first_asked: float = math.nan
     last_asked: float = math.nan
-    true_at_first: bool = False
     true: Times = field(default_factory=Times)
     edges: Times = field(default_factory=Times)
     counted: Times = field(default_factory=Times)
@@ -74,7 +73,7 @@ class ConditionHistory:
         self._evaluations = self.monitor.evaluations
         time, value = stage.time, bool(self.monitor.value)
         if not self.asked:
-            self.first_asked, self.true_at_first = time, value
+            self.first_asked = time
         self.asked += 1
         self.last_asked = time
         self.true.note(value, time)

@@ -25,8 +25,6 @@ from eidrive_scenario.api import (
 
 RANDOM_WAY = 5000.0
 """Length of the way that a vehicle which drives itself gets for a random route [m]."""
-ARRIVED = 2.0
-"""A vehicle that drives itself has arrived when it is this near to its destination [m]."""
 
 
 class AssignRouteAction(ActionBehaviour):

@@ -77,15 +77,6 @@ def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
     return description, network
 
 
-def card_of(path: Path) -> dict[str, Any]:
-    """What the card beside the weights says; empty without one."""
-    try:
-        card: dict[str, Any] = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return card
-
-
 def _described(data: dict[str, Any]) -> Description:
     anchors = data["anchors"]
     width, height = data["input_size"]

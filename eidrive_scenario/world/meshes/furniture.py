@@ -8,7 +8,6 @@ from functools import lru_cache
 from eidrive_scenario.world.meshes.solids import Array, Mesh, ball, box, cylinder, tapered_box
 
 CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
-LAMP_COLOURS = ("red", "yellow", "green")
 
 
 @lru_cache(maxsize=512)

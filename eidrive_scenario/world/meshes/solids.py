@@ -93,14 +93,6 @@ def bevelled_box(centre: Point, size: Point, bevel: float) -> Array:
     return loft([ring(-length, bevel), ring(bevel - length, 0.0), ring(length - bevel, 0.0), ring(length, bevel)])
 
 
-def side_prism(profile: Sequence[Point], y0: float, y1: float) -> Array:
-    """An outline (x, z), convex or star-shaped about its mean and counter-clockwise seen from the right (y < 0),
-    pulled from y0 to y1."""
-    outline = np.asarray(profile, dtype=float)
-    near = np.column_stack([outline[:, 0], np.full(len(outline), y0), outline[:, 1]])
-    return loft([near, moved(near, (0.0, y1 - y0, 0.0))])
-
-
 def loft(rings: Sequence[Array] | Array) -> Array:
     """A skin over rings (S, M, 3), closed by a fan at each end.
 
