@@ -142,7 +142,7 @@ def test_each_layout_says_the_same() -> None:
 
 
 def test_rows_that_pad_a_list_of_detections_are_no_boxes() -> None:
-    """Exported suppression fills up with scores of 0 and the class -1; any other class beyond the table is a mistake."""
+    """Exported suppression fills up with scores of 0 and class -1; any other class beyond the table is a mistake."""
     row, padding = [8.0, 17.0, 12.0, 23.0, 0.8, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
     classes = ("car", "truck", "bus")
     network = Fixed([np.array([row, padding], dtype=np.float32)], classes)
