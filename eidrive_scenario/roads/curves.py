@@ -245,10 +245,13 @@ class CurveTable:
 
     def __init__(self, lines: Sequence[ReferenceLine]) -> None:
         self.base: Array = spread([line.length for line in lines])
-        curves = [curve for line in lines for curve in line.curves]
-        owner = np.repeat(np.arange(len(lines)), [len(line.curves) for line in lines])
+        # A curve that starts beyond its own road would shadow the next one's: it is never reached.
+        reached = [[curve for curve in line.curves if curve.s <= line.length] or line.curves[:1] for line in lines]
+        curves = [curve for group in reached for curve in group]
+        owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
         self._starts = np.array([curve.s for curve in curves])
-        self._keys = self.base[owner] + self._starts
+        first = np.diff(owner, prepend=-1) > 0
+        self._keys = self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0))
         self._x, self._y, self._h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
         self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
         self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])

@@ -18,6 +18,10 @@ APART = 0.24
 """Distance between the lines of a double line, centre to centre [m]."""
 STRIPE = 0.5
 """Width of a crosswalk's stripes and of the gaps between them [m]."""
+MOST_STRIPES = 500
+"""Of one crosswalk."""
+FINEST = 0.01
+"""Dashes and gaps that together are shorter than this look like a solid line [m]."""
 PAINTED = ("solid", "broken", "solid solid", "solid broken", "broken solid", "broken broken", "botts dots")
 CURVED = 0.01
 """Curvature above which a dash is bent [1/m]."""
@@ -50,8 +54,9 @@ def _mark_strips(
 ) -> Iterator[Strip]:
     kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
     for offset, width, dash, gap, phase in _lines(lane, mark):
-        if dash > 0.0 and gap > 0.0:
-            starts = np.arange(start + phase, end, dash + gap)
+        period = dash + gap
+        if dash > 0.0 and gap > 0.0 and period > FINEST:
+            starts = np.arange(start + (phase if phase >= 0.0 else phase % period), end, period)
             if not starts.size:
                 continue
             bent = any(abs(road.reference.at(float(s)).curvature) > CURVED for s in (start, 0.5 * (start + end), end))
@@ -105,7 +110,7 @@ def _stripes(outline: Array) -> Iterator[tuple[str, Array]]:
         return
     sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
     a, b, c, d = np.roll(corners, -int(np.argmax(sides)), axis=0)
-    count = max(round(float(sides.max()) / (2.0 * STRIPE)), 1)
+    count = min(max(round(float(sides.max()) / (2.0 * STRIPE)), 1), MOST_STRIPES)
     for i in range(count):
         low, high = (i + 0.25) / count, (i + 0.75) / count
         yield "marking_white", np.array([a + low * (b - a), a + high * (b - a), d + high * (c - d), d + low * (c - d)])

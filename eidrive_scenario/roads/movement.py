@@ -10,15 +10,13 @@ from eidrive_scenario.roads.curves import Arc
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
-from eidrive_scenario.roads.poses import lane_at, lane_t
+from eidrive_scenario.roads.poses import LEAST_STRETCH, lane_at, lane_t
 
 if TYPE_CHECKING:
     from eidrive_scenario.roads.route import Route
 
 STRIDE = 2.0
 """Longest step of the integration along a curved lane [m]."""
-LEAST_STRETCH = 0.05
-"""A lane inside the centre of a bend has no length to speak of: so many metres of path count per metre of s."""
 LOOK_AHEAD = 30.0
 """How far ahead the direction of a branch is judged where it is not a junction's connecting road [m]."""
 

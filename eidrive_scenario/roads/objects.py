@@ -81,9 +81,9 @@ def _repeated(network: RoadNetwork, item: RoadObject) -> Iterator[PlacedObject]:
     for repeat in item.repeats:
         gapless = repeat.distance <= 0.0
         step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
-        count = max(math.ceil(repeat.length / step), 1) if gapless else math.floor(repeat.length / step) + 1
         if step <= 0.0:
             continue
+        count = max(math.ceil(repeat.length / step), 1) if gapless else math.floor(repeat.length / step) + 1
         part = repeat.length / count if gapless else step
         for i in range(count):
             ds = (i + 0.5) * part if gapless else i * part

@@ -109,7 +109,7 @@ class PolynomialTable:
         reached = pieces[:, 0] <= limit
         pieces, owner = pieces[reached], owner[reached]
         self._starts = pieces[:, 0]
-        self._keys = self.base[owner] + pieces[:, 0]
+        self._keys = self.base[owner] + np.maximum(pieces[:, 0], 0.0)
         self._a, self._b, self._c, self._d = (np.ascontiguousarray(column) for column in pieces[:, 1:].T)
         self._constant = bool(np.all(pieces[:, 2:] == 0.0))
         self._single = len(pieces) == len(functions)

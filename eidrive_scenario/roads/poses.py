@@ -13,6 +13,9 @@ from eidrive_scenario.roads.model import Lane, LaneSection, Road
 
 BEYOND = 0.1
 """How far beyond an end of a road a place may lie and still count as its end [m]."""
+LEAST_STRETCH = 0.05
+"""A lane inside the centre of a bend has no length to speak of, and no heading of its own: so many metres of path count
+per metre of s."""
 
 
 def road_pose_at(road: Road, s: float, t: float) -> Pose:
@@ -47,6 +50,8 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
         climb += sideways * sin + t * cos * twist
         sideways = sideways * cos - t * sin * twist
     along = speed * (1.0 - curvature * across)
+    if along < LEAST_STRETCH:
+        along = LEAST_STRETCH
     if lane.heights:
         z += lane_height(lane, s - section.s, offset)
     return Pose(

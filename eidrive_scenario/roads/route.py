@@ -95,8 +95,12 @@ class Route:
         return float(self._course[1][-1])
 
     def polyline(self, spacing: float = 1.0) -> Array:
-        """(M, 3) points of the lanes' centre lines from start to end, at most `spacing` apart [m]."""
-        count = max(math.ceil(self.length / spacing), 1) + 1
+        """(M, 3) points of the lanes' centre lines from start to end, at most `spacing` apart [m].
+
+        Where a broken map has lanes jump, there are no more points than the lanes have in themselves.
+        """
+        most = math.ceil(2.0 * len(self._course[1]) * max(GRAIN / spacing, 1.0))
+        count = min(max(math.ceil(self.length / spacing), 1), most) + 1
         return self.points_at(np.linspace(0.0, self.length, count))
 
     def points_at(self, distance: Array) -> Array:

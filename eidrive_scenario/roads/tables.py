@@ -12,7 +12,7 @@ from eidrive_scenario.roads.curves import CurveTable
 from eidrive_scenario.roads.location import Array, Integers, LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.polynomials import PolynomialTable
-from eidrive_scenario.roads.poses import BEYOND, lane_height, off_road
+from eidrive_scenario.roads.poses import BEYOND, LEAST_STRETCH, lane_height, off_road
 
 
 class RoadTables:
@@ -127,7 +127,7 @@ class RoadTables:
         across, z = t * cos, z + t * sin
         climb = climb + sideways * sin + t * cos * twist
         sideways = sideways * cos - t * sin * twist
-        along = speed * (1.0 - curvature * across)
+        along = np.maximum(speed * (1.0 - curvature * across), LEAST_STRETCH)
         for n in np.flatnonzero(self._lifted[row]):
             z[n] += lane_height(self.lanes[row[n]], float(s[n] - self.section_start[section[n]]), float(offset[n]))
         return Poses(
@@ -143,7 +143,7 @@ class RoadTables:
         """Metres of path per metre of s along lanes' centre lines, in plan view."""
         t, slope = self.lane_t(row, s)
         curvature, speed = self.curves.bend(self.section_road[self.lane_section[row]], s)
-        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), 0.05))
+        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
 
     def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
         """All lanes with their running numbers."""

@@ -11,6 +11,8 @@ from eidrive_scenario.errors import Problem, suggestion
 
 MOST = 100
 """Findings after which reading goes on in silence."""
+LARGEST = 1e9
+"""Size of a number that is read at all: no length, place or coefficient of a road comes near it."""
 
 
 def line_of(element: etree._Element | None) -> int | None:
@@ -38,7 +40,7 @@ class Findings:
     @overload
     def number(self, element: etree._Element, name: str, default: None) -> float | None: ...
     def number(self, element: etree._Element, name: str, default: float | None = math.nan) -> float | None:
-        """A finite number. Missing without a default, or not a number, is a problem and gives 0."""
+        """A number up to LARGEST. Missing without a default, or not such a number, is a problem and gives 0."""
         text = element.get(name)
         if text is None:
             if default is not None and math.isnan(default):
@@ -46,12 +48,13 @@ class Findings:
                 return 0.0
             return default
         try:
-            value = float(text)
+            value = float(text) if _plain(text) else math.nan
         except ValueError:
             value = math.nan
-        if math.isfinite(value):
+        if abs(value) <= LARGEST:
             return value
-        self.add(element, f"<{element.tag}> has {name}={text!r}", "give a finite number")
+        remedy = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
+        self.add(element, f"<{element.tag}> has {name}={text!r}", remedy)
         return 0.0
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
@@ -81,10 +84,12 @@ class Findings:
             self._missing(element, name)
             return 0
         try:
-            return int(text)
+            if _plain(text):
+                return int(text)
         except ValueError:
-            self.add(element, f"<{element.tag}> has {name}={text!r}", "give a whole number")
-            return 0
+            pass
+        self.add(element, f"<{element.tag}> has {name}={text!r}", "give a whole number")
+        return 0
 
     def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
         """Which end of a road; None where the attribute is missing."""
@@ -105,3 +110,8 @@ class Findings:
         near = suggestion(name, map(str, element.attrib)) if element.attrib else ""
         remedy = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
         self.add(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)
+
+
+def _plain(text: str) -> bool:
+    """False for what only Python takes for a number: 1_000, or the digits of other scripts."""
+    return text.isascii() and "_" not in text

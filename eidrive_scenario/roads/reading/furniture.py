@@ -9,6 +9,9 @@ from lxml import etree
 from eidrive_scenario.roads.model import Corner, Repeat, RoadObject, Signal, SignalController, SignalPlace
 from eidrive_scenario.roads.reading.findings import Findings
 
+MOST_REPEATED = 100_000
+"""How often an object may stand along its road."""
+
 
 def read_signals(roads: list[tuple[str, etree._Element]], findings: Findings) -> dict[str, Signal]:
     """The signals of all roads by id, with the references that other roads make to them.
@@ -132,10 +135,15 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, findings: Find
         start = findings.number(repeat, f"{name}Start", fallback)
         return start, findings.number(repeat, f"{name}End", start)
 
+    length, distance = findings.number(repeat, "length"), findings.number(repeat, "distance", 0.0)
+    if length > MOST_REPEATED * (distance if distance > 0.0 else 1.0):
+        message = f"<repeat> has length={length:g} and distance={distance:g}: the object stands there too often"
+        findings.add(repeat, message, f"at most {MOST_REPEATED} of it are read")
+        length = 0.0
     return Repeat(
         s=findings.number(repeat, "s", findings.number(element, "s", 0.0)),
-        length=findings.number(repeat, "length"),
-        distance=findings.number(repeat, "distance", 0.0),
+        length=length,
+        distance=distance,
         t=pair("t", "t"),
         width=pair("width", "width"),
         height=pair("height", "height"),

@@ -1,0 +1,147 @@
+"""Broken maps, and bends too tight: places one at a time and many at once are the same, and all are numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.errors import RoadError
+from eidrive_scenario.roads import RoadNetwork, placed_objects, surface_meshes
+
+Text = Callable[..., str]
+
+LANE = '<lane id="{0}" type="driving"><width sOffset="0" a="4" b="{1}" c="0" d="0"/></lane>'
+
+
+def section(narrowing: float = 0.0, before: str = "") -> str:
+    left, right = LANE.format(1, narrowing), LANE.format(-1, narrowing)
+    return (
+        f'{before}<laneSection s="0"><left>{left}</left><center><lane id="0"/></center><right>{right}</right>'
+        "</laneSection>"
+    )
+
+
+def geometry(s: float, x: float, length: float, shape: str = "<line/>", y: float = 0.0) -> str:
+    return f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="0" length="{length!r}">{shape}</geometry>'
+
+
+def same_one_at_a_time(network: RoadNetwork, road: str) -> None:
+    """Poses of lanes as arrays are those of the scalar path."""
+    length = network.roads[road].length
+    s = np.linspace(0.0, length, 9)
+    for lane in (1, -1):
+        many = network.lane_pose(road, lane, s, 0.2)
+        for number, place in enumerate(s.tolist()):
+            one = network.lane_pose_at(road, lane, place, 0.2)
+            assert all(map(math.isfinite, one))
+            assert [float(part[number]) for part in many] == pytest.approx(one, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        geometry(-30.0, -30.0, 130.0),
+        geometry(0.0, 0.0, 500.0) + geometry(502.0, 0.0, 1.0, y=9.0),
+        geometry(5.0, 5.0, 95.0),
+        geometry(-30.0, -30.0, 50.0) + geometry(-20.0, 7.0, 120.0),
+    ],
+    ids=["before the road", "behind the road", "begins late", "two before the road"],
+)
+def test_geometries_outside_of_their_road_do_not_reach_into_others(road: Text, map_of: Text, broken: str) -> None:
+    network = RoadNetwork.parse(
+        map_of(
+            road("before", lanes=section(), y=50.0),
+            road("broken", lanes=section(), geometry=broken, length=500.0 if 'length="500.0"' in broken else 100.0),
+            road("behind", lanes=section(), y=-50.0),
+        )
+    )
+    for number in network.roads:
+        same_one_at_a_time(network, number)
+    assert network.lane_pose("before", -1, [99.9]).y == pytest.approx([48.0])
+    assert network.lane_pose("behind", -1, [0.1]).y == pytest.approx([-52.0])
+
+
+def test_a_lane_offset_before_its_road_does_not_reach_into_others(road: Text, map_of: Text) -> None:
+    offset = '<laneOffset s="-4" a="1" b="0.1" c="0" d="0"/><laneOffset s="50" a="0" b="0" c="0" d="0"/>'
+    network = RoadNetwork.parse(
+        map_of(road("before", lanes=section(), y=50.0), road("broken", lanes=section(before=offset)))
+    )
+    for number in network.roads:
+        same_one_at_a_time(network, number)
+    assert network.lane_pose_at("broken", -1, 0.0).y == pytest.approx(-2.0 + 1.0 + 0.4)
+
+
+@pytest.mark.parametrize("narrowing", [0.0, -0.01])
+def test_a_lane_inside_the_centre_of_its_bend_does_not_turn_round(road: Text, map_of: Text, narrowing: float) -> None:
+    """A turn of half a circle with a radius of 1.5 m, as at the ends of dead-end streets: lane 1 lies inside of it."""
+    turn = geometry(0.0, 0.0, 1.5 * math.pi, f'<arc curvature="{1 / 1.5!r}"/>')
+    network = RoadNetwork.parse(map_of(road(length=1.5 * math.pi, lanes=section(narrowing), geometry=turn)))
+    same_one_at_a_time(network, "1")
+    for lane in (1, -1):
+        turned = network.lane_pose_at("1", lane, 1.0).h - network.road_pose_at("1", 1.0).h
+        assert abs(turned) < math.radians(15.0)
+
+
+def test_numbers_that_no_road_has_are_refused(road: Text, map_of: Text) -> None:
+    with pytest.raises(RoadError) as caught:
+        RoadNetwork.parse(map_of(road(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
+    assert [str(problem) for problem in caught.value.problems] == [
+        "town.xodr:1: <geometry> has x='1000000000000.0'; give a number of at most 1e+09"
+    ]
+
+
+def test_a_route_over_a_jump_of_the_map_has_no_more_points_than_its_lanes(road: Text, map_of: Text) -> None:
+    far = geometry(0.0, 0.0, 50.0) + geometry(50.0, 9e8, 50.0)
+    network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=far)))
+    route = network.route(network.location("1", -1, 10.0), network.location("1", -1, 90.0))
+    line = route.polyline(1.0)
+    assert len(line) < 1000
+    assert line[[0, -1], 0] == pytest.approx([10.0, 9e8 + 40.0])
+
+
+def problems(text: str) -> list[str]:
+    with pytest.raises(RoadError) as caught:
+        RoadNetwork.parse(text, "town.xodr")
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("text", ["1_0", "\u0663", "nan", "1,5"])
+def test_numbers_are_written_as_in_xml(road: Text, map_of: Text, text: str) -> None:
+    lanes = section().replace('a="4"', f'a="{text}"', 1).replace('id="-1"', f'id="-{text}"', 1)
+    found = problems(map_of(road(lanes=lanes)))
+    assert f"town.xodr:1: <width> has a={text!r}; give a finite number" in found
+    assert f"town.xodr:1: <lane> has id={'-' + text!r}; give a whole number" in found
+
+
+def test_an_object_that_repeats_without_end(road: Text, map_of: Text) -> None:
+    repeat = '<repeat s="0" length="50" distance="1e-9" tStart="3" tEnd="3"/>'
+    objects = f'<objects><object id="1" type="pole" s="0" t="3" radius="0.1" height="1">{repeat}</object></objects>'
+    assert problems(map_of(road(extra=objects))) == [
+        "town.xodr:1: <repeat> has length=50 and distance=1e-09: the object stands there too often; "
+        "at most 100000 of it are read"
+    ]
+    nowhere = objects.replace('length="50" distance="1e-9"', 'length="0" distance="0"')
+    assert list(placed_objects(RoadNetwork.parse(map_of(road(extra=nowhere))))) == []
+
+
+@pytest.mark.parametrize("line", ['length="3" space="6" sOffset="-1.4"', 'length="1e-9" space="1e-9" sOffset="0"'])
+def test_dashes_stay_on_their_road(road: Text, map_of: Text, line: str) -> None:
+    mark = (
+        f'<roadMark sOffset="0" type="broken"><type name="b"><line {line} tOffset="0" width="0.1"/></type></roadMark>'
+    )
+    marked = section().replace('<lane id="0"/>', f'<lane id="0">{mark}</lane>')
+    meshes = {mesh.kind: mesh for mesh in surface_meshes(RoadNetwork.parse(map_of(road(lanes=marked))))}
+    along = meshes["marking_white"].vertices[:, 0]
+    assert along.min() >= 0.0
+    assert 95.0 < along.max() <= 100.0
+
+
+def test_a_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -> None:
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((0, 0), (4, 0), (4, 9e8), (0, 9e8)))
+    crosswalk = f'<object id="1" type="crosswalk" s="50" t="0"><outline>{corners}</outline></object>'
+    network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
+    (paint,) = (mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
+    assert len(paint.faces) == 1000
