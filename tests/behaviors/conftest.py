@@ -64,7 +64,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
 
     Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it. `cruise`
     gives it one of another tool, with these properties, for which an adaptive cruise control or `stand_in` stands in.
-    `performance` are further limits of the vehicles.
+    `brakes` is the largest deceleration of the vehicles [m/s²], `performance` are further limits of theirs.
     """
     (tmp_path / "street.xodr").write_text(STREET)
 
@@ -80,6 +80,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         everywhere: str = "",
         edge: str = "none",
         performance: str = "",
+        brakes: float = 10.0,
     ) -> Played:
         groups = ""
         for number, (actor, action, *condition) in enumerate(steps):
@@ -87,7 +88,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
             groups += GROUP.format(number=number, actor=actor, action=action, trigger=trigger)
         controller = OURS if driven else "" if cruise is None else CRUISE.format(properties=cruise)
         cars = CAR.format(name="Ego", controller=controller) + CAR.format(name="Other", controller="")
-        cars = cars.replace('maxDeceleration="10"/>', f'maxDeceleration="10" {performance}/>')
+        cars = cars.replace('maxDeceleration="10"/>', f'maxDeceleration="{brakes:g}" {performance}/>')
         story = STORY.format(groups=groups) if groups else ""
         text = SCENARIO.format(cars=cars, ego=at(*ego), other=at(*other), story=story, everywhere=everywhere)
         path = tmp_path / "scene.xosc"

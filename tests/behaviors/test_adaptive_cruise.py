@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from eidrive_scenario.errors import ScenarioError
+
 ON = """<PrivateAction><ControllerAction><ActivateControllerAction lateral="true" longitudinal="true"/>
   </ControllerAction></PrivateAction>"""
 SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
@@ -47,3 +49,19 @@ def test_in_the_override_mode_the_set_speed_is_the_property(scene: Any) -> None:
 def test_without_being_activated_it_leaves_the_speed(scene: Any) -> None:
     played = scene(3, cruise="", other=(-1, 150.0, 10.0))
     assert played.at(3.0).speed == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("timeGap", "soon"), ("timeGap", "-1"), ("lateralDist", "NaN"), ("setSpeed", "fast")]
+)
+def test_a_property_that_is_no_number_is_told_with_its_line(scene: Any, name: str, value: str) -> None:
+    mode = f'<Property name="mode" value="override"/><Property name="{name}" value="{value}"/>'
+    with pytest.raises(
+        ScenarioError, match=rf"scene\.xosc:\d+: the controller 'cruise' has the property {name} = '{value}'"
+    ):
+        scene(1, ("Ego", ON), cruise=mode)
+
+
+def test_a_vehicle_without_brakes_rolls_on_behind_a_slower_car(scene: Any) -> None:
+    played = scene(2, ("Ego", ON), cruise="", brakes=0.0, ego=(-1, 50.0, 20.0), other=(-1, 100.0, 19.0))
+    assert played.at(2).speed == pytest.approx(20.0)

@@ -110,6 +110,12 @@ def test_a_lane_that_is_not_there_is_an_error(scene: Any) -> None:
         scene(1, ("Ego", change(lane(-4))))
 
 
+@pytest.mark.parametrize("number", ["--1", "left", "²", "-"])
+def test_a_lane_whose_name_is_no_number_is_an_error(scene: Any, number: Any) -> None:
+    with pytest.raises(ScenarioError, match=f"aims at lane '{number}'; give the lane's number"):
+        scene(1, ("Ego", change(lane(number))))
+
+
 def offset(target: str, continuous: str = "false", acceleration: str = 'maxLateralAcc="1.5"') -> str:
     return f"""<PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
       <LaneOffsetActionDynamics dynamicsShape="cubic" {acceleration}/>

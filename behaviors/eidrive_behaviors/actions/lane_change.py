@@ -55,7 +55,7 @@ class LaneChangeAction(ActionBehaviour):
         self._dynamics = action.lane_change_action_dynamics
         self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = action.lane_change_target.absolute_target_lane
-        if target is not None and not target.value.lstrip("-").isdigit():
+        if target is not None and not target.value.removeprefix("-").isdecimal():
             raise self.problem(f"aims at lane {target.value!r}", "give the lane's number")
         if stage.roads is None:
             raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from eidrive_behaviors.controllers.properties import number
 from eidrive_scenario.api import Actor, Stage, StandIn, box_of, distance, model
 
 CLOSEST = 3.0
@@ -32,17 +33,17 @@ class AdaptiveCruise(StandIn):
 
     def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
         super().__init__(controller, stage, actor)
-        self.time_gap = float(self.properties.get("timeGap", 1.5))
-        self.aside = float(self.properties.get("lateralDist", 5.0))
+        self.time_gap = number(controller, "timeGap", 1.5, least=0.0)
+        self.aside = number(controller, "lateralDist", 5.0, least=0.0)
         self._alone = self.properties.get("mode") == "override"
-        self._given = self.properties.get("setSpeed")
+        self._given = number(controller, "setSpeed", None)
 
     def begin(self) -> None:
         """Drive on with the speed of now."""
         self._last = self.actor.motion.speed
         self._set = self._last
         if self._given is not None and self._alone:
-            self._set = float(self._given)
+            self._set = self._given
 
     def speed(self) -> float:
         """By the law."""
@@ -85,7 +86,8 @@ class AdaptiveCruise(StandIn):
         here, there, roads = stage.location(me), stage.location(name), stage.roads
         if roads is not None and here is not None and there is not None:
             apart = roads.distance(here, there)
-            reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / self.actor.limits()[2])
+            slower = self.actor.limits()[2]
+            reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / slower) if slower > 0.0 else math.inf
             if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.aside:
                 same = here.lane == there.lane if here.road == there.road else self._beside(apart[1]) is False
                 gap = apart[0] - self._overhang(name)

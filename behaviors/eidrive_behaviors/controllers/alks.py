@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from eidrive_behaviors.controllers.properties import number
 from eidrive_behaviors.controllers.reference_driver import DriverSettings, ReferenceDriver
 from eidrive_behaviors.controllers.road_ahead import Ahead, RoadAhead
 from eidrive_behaviors.controllers.safety_models import Fsm, Own, Regulation, Rss, SafetyModel
@@ -37,7 +38,7 @@ class AlksDriver(StandIn):
         self._controller = controller
         self.model = self._chosen()
         self._cruises = self._says("cruise", True)
-        slack = self._number("overlapTolerance", 0.1) or 0.0
+        slack = number(controller, "overlapTolerance", 0.1)
         later = stage.step if self.properties.get("mode") == "override" else 0.0
         self._road = RoadAhead(stage, actor, self.model.reach, tolerance=slack, later=later)
 
@@ -87,10 +88,10 @@ class AlksDriver(StandIn):
         if mode not in ("Dist", "Time"):
             raise self._problem(f"knows no cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
         return DriverSettings(
-            pedestrians=self._number("pedestrianRiskEvaluationTime", usual.pedestrians) or 0.0,
+            pedestrians=number(self._controller, "pedestrianRiskEvaluationTime", usual.pedestrians),
             distance=0.72 if mode == "Dist" else None,
-            moved=self._number("lateralTrigDistance", None),
-            emergency=self._number("aebTTC", usual.emergency) or 0.0,
+            moved=number(self._controller, "lateralTrigDistance", None),
+            emergency=number(self._controller, "aebTTC", usual.emergency),
             full_stop=full_stop,
             always=self._says("alwaysTrigOnScenario", False),
         )
@@ -98,15 +99,6 @@ class AlksDriver(StandIn):
     def _says(self, name: str, usual: bool) -> bool:
         text = self.properties.get(name)
         return usual if text is None else _TRUTH.get(text.strip().lower(), usual)
-
-    def _number(self, name: str, usual: float | None) -> float | None:
-        text = self.properties.get(name)
-        if text is None:
-            return usual
-        try:
-            return float(text)
-        except ValueError as error:
-            raise self._problem(f"has the property {name} = {text!r}", "give it a number") from error
 
     def _problem(self, message: str, remedy: str) -> ScenarioError:
         here = self._controller
