@@ -23,6 +23,10 @@ LATERAL = Gains(proportional=1.0, integral=0.1)
 """On the turn towards the path; the integral carries the slip of the tyres in a curve."""
 CROSS_TRACK_GAIN = 2.0
 """How fast an offset from the path decays [1/s]."""
+LARGEST_APPROACH = 2.0
+"""Of a large offset, the speed towards the path [m/s]: what tyres and steering undo in time before the path."""
+LEARNING = 0.1
+"""Up to this turn towards the path the integral learns; beyond it, it would learn the way there [rad]."""
 SOFTENING = 1.0
 """Keeps the steering calm near standstill [m/s]."""
 STANDSTILL = 0.3
@@ -35,13 +39,14 @@ class Controller:
     """Follows the plans of one vehicle.
 
     Across the path, the law of Stanley (Hoffmann, Tomlin, Montemerlo, Thrun: Autonomous automobile trajectory tracking
-    for off-road driving, ACC 2007): the front wheels point along the path, turned towards it by atan(k e / (v0 + v)).
+    for off-road driving, ACC 2007): the front wheels point along the path, turned towards it by atan(k e / (v0 + v)),
+    where k e is bounded: without that, what is far off its path or stands across it swings about it for ever.
     """
 
     def __init__(self, spec: ActorSpec, dt: float) -> None:
         self.spec = spec
         self._speed = PID(LONGITUDINAL, low=-LARGEST_DECELERATION, high=LARGEST_ACCELERATION, dt=dt, band=SPEED_BAND)
-        self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt)
+        self._direction = PID(LATERAL, low=-spec.max_steering, high=spec.max_steering, dt=dt, band=LEARNING)
         self._steering = 0.0
 
     def control(self, ego: EgoState, plan: Plan) -> Control:
@@ -73,7 +78,8 @@ class Controller:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)
         y = float(ego.position[1]) + self.spec.wheelbase * math.sin(ego.yaw)
         heading, left = _nearest(plan.points[:12].tolist(), x, y)
-        turn = math.atan2(-CROSS_TRACK_GAIN * left, SOFTENING + max(ego.speed, 0.0))
+        back = min(max(-CROSS_TRACK_GAIN * left, -LARGEST_APPROACH), LARGEST_APPROACH)
+        turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
         self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
         return self._steering
 

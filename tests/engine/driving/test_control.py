@@ -106,6 +106,23 @@ def test_an_offset_decays_and_hardly_swings_over(car: ActorSpec, vehicle: Any, o
     assert abs(side[-1]) < 0.07
 
 
+@pytest.mark.parametrize(
+    ("offset", "yaw", "speed"),
+    [(3.0, 1.0, 8.0), (0.0, 1.0, 8.0), (-6.0, -0.4, 12.0), (3.0, 0.4, 18.0), (3.0, 0.0, 28.0)],
+)
+def test_what_is_far_off_or_stands_across_comes_back_and_stays(
+    car: ActorSpec, vehicle: Any, offset: float, yaw: float, speed: float
+) -> None:
+    """As after a turn tighter than its wheels allow, or where somebody pushed: it does not swing about its path."""
+    ego, route, controller = vehicle(y=offset, yaw=yaw, speed=speed), planner(car), Controller(car, 0.05)
+    goal = Goal(speed=speed, path=np.array([[-20.0, 0.0, 0.0], [900.0, 0.0, 0.0]]))
+    for _ in range(300):
+        state = ego.state()
+        ego.drive(controller.control(state, route.plan(state, NOTHING, goal, ego.time)))
+    assert max(abs(y) for _, y, _ in ego.track[-60:]) < 0.1
+    assert ego.speed == pytest.approx(speed, rel=0.02)
+
+
 @pytest.mark.parametrize(("radius", "speed"), [(12.0, 6.0), (40.0, 10.0), (-40.0, 12.0), (100.0, 20.0)])
 def test_a_circle_is_kept(car: ActorSpec, vehicle: Any, radius: float, speed: float) -> None:
     """The front axle keeps to it; the rear one, inside, cuts it by R - sqrt(R² - L²). sqrt(5 R) allows these speeds.
