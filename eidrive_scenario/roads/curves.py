@@ -230,7 +230,7 @@ class ReferenceLine:
         index = max(bisect_right(starts, s) - 1, 0)
         if direction > 0:
             return self.curves[index], starts[index + 1] if index + 1 < len(starts) else math.inf
-        if s == starts[index] and index > 0:
+        while index > 0 and starts[index] >= s:
             index -= 1
         return self.curves[index], starts[index] if index > 0 else -math.inf
 

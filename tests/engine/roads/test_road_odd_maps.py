@@ -145,3 +145,12 @@ def test_a_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -
     network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
     (paint,) = (mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
     assert len(paint.faces) == 1000
+
+
+def test_a_geometry_that_stands_there_twice_is_passed_in_both_directions(road: Text, map_of: Text) -> None:
+    twice = geometry(0.0, 0.0, 60.0) + 2 * geometry(60.0, 60.0, 40.0)
+    network = RoadNetwork.parse(map_of(road(lanes=section(), geometry=twice)))
+    for lane, start, end in ((1, 80.0, 30.0), (-1, 30.0, 80.0)):
+        moved = network.advance(network.location("1", lane, start), 50.0)
+        assert moved is not None
+        assert moved.s == pytest.approx(end)
