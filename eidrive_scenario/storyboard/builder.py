@@ -131,8 +131,7 @@ class Builder:
     def _maneuver(self, maneuver: model.Maneuver, above: Place, cast: Cast) -> ManeuverElement:
         path = (*above, maneuver.name)
         events = tuple(self._event(event, path, cast) for event in maneuver.event)
-        for event in events:
-            event.rivals = events
+        EventElement.compete(events)
         return ManeuverElement(self._stage, path, events)
 
     def _event(self, event: model.Event, above: Place, cast: Cast) -> EventElement:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from py_trees.common import Status
 
@@ -35,14 +35,14 @@ class EventElement(StoryElement):
     ) -> None:
         super().__init__(stage, path, actions, start=start, limit=limit)
         self.priority = priority
-        self.rivals: tuple[EventElement, ...] = ()
-        """The other events of the maneuver."""
+        self._running: dict[EventElement, None] = {}
+        """The running events of the maneuver, in the order in which they started."""
 
     def begin(self, why: str = "") -> None:
         """Start by priority."""
         self._tried_at = self.stage.progress.tick
         alone = self.priority == "parallel"
-        running = [] if alone else [rival for rival in self.rivals if rival.state is State.RUNNING]
+        running = [] if alone else list(self._running)
         if running and self.priority == "skip":
             self.executions += 1
             after = State.STANDBY if self.executions < self.limit else State.COMPLETE
@@ -55,6 +55,20 @@ class EventElement(StoryElement):
         self._change(Transition.START, State.RUNNING, why)
         for action in self.elements:
             action.begin()
+
+    def _change(self, transition: Transition | None, after: State, why: str = "") -> None:
+        super()._change(transition, after, why)
+        if after is State.RUNNING:
+            self._running[self] = None
+        else:
+            self._running.pop(self, None)
+
+    @staticmethod
+    def compete(events: Iterable[EventElement]) -> None:
+        """Let the priorities of these events count against each other."""
+        running: dict[EventElement, None] = {}
+        for event in events:
+            event._running = running
 
 
 class ActionElement(StoryElement):

@@ -42,8 +42,7 @@ class Builder:
         return EventElement(self.stage, (name,), actions, priority=priority, start=self.wait(start), limit=limit)
 
     def maneuver(self, *events: Any) -> Any:
-        for event in events:
-            event.rivals = tuple(other for other in events if other is not event)
+        EventElement.compete(events)
         return ManeuverElement(self.stage, ("maneuver",), events)
 
     def group(self, *maneuvers: Any, limit: Any = 1) -> Any:

@@ -82,6 +82,8 @@ class Tree:
     ) -> None:
         self.stage, self._script, self._task = stage, script, task
         self.scripts: list[Any] = []
+        self.rivals: dict[str, list[str]] = {}
+        """The other events of its maneuver, by event."""
         acts = [self._act(act, f"act{number}") for number, act in enumerate(plan)]
         self.root = StoryboardElement(
             stage, ("storyboard",), [StoryNode(stage, ("story",), acts)], stop=self._wait(stop)
@@ -112,8 +114,8 @@ class Tree:
 
     def _maneuver(self, plans: list[Event], name: str) -> ManeuverElement:
         events = [self._event(plan, f"{name}.{number}") for number, plan in enumerate(plans)]
-        for event in events:
-            event.rivals = tuple(other for other in events if other is not event)
+        EventElement.compete(events)
+        self.rivals |= {event.name: [other.name for other in events if other is not event] for event in events}
         return ManeuverElement(self.stage, (name,), events)
 
     def _event(self, plan: Event, name: str) -> EventElement:
@@ -198,7 +200,7 @@ def test_priorities_bind_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: A
         for change in changes:
             event = tree.elements[change.element]
             if isinstance(event, EventElement):
-                rivals = [states.get(rival.name) is State.RUNNING for rival in event.rivals]
+                rivals = [states.get(rival) is State.RUNNING for rival in tree.rivals[event.name]]
                 if change.transition is Transition.START and event.priority != "parallel":
                     assert not any(rivals)
                 if change.transition is Transition.SKIP:
