@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.experiments.rules import broken_rules
-from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.openscenario.findings import in_order
 from eidrive_scenario.openscenario.lint import Level
 from eidrive_scenario.recording.criteria_text import unbuilt_criteria
@@ -24,14 +23,16 @@ class Findings:
     notes: tuple[Problem, ...] = field(default=(), kw_only=True)
 
 
-def inspect_scenario(path: Path, ignored: Collection[str] = ()) -> Findings:
+def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
     """Read a scenario with its roads, controllers, channels and criteria; every problem says where and what is right.
+
+    source  all that load_scenario takes
 
     Commands of later events are read too, which a run would only meet on its way. What the rules find comes with
     the names of these; `ignored` are the names of rules that are left out. Raises SettingError for an unknown name.
     """
     try:
-        scenario = load_scenario(path)
+        scenario = load_scenario(source)
     except InputError as error:
         return Findings(error.problems)
     unbuilt = [problem for problem in unbuilt_criteria(scenario) if problem not in scenario.warnings]

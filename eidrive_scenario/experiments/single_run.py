@@ -12,7 +12,7 @@ from typing import Any
 
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.openscenario import ConcreteRun, Scenario
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
 from eidrive_scenario.recording.output import create, partial, whole
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
@@ -22,7 +22,7 @@ RECORDING, RESULT, TABLE, PICTURES = "recording.mcap", "result.json", "motion.cs
 
 
 def play(
-    source: str | Path | ConcreteRun,
+    source: Source | ConcreteRun,
     *,
     seed: int = 1,
     settings: RunSettings | None = None,
@@ -32,7 +32,8 @@ def play(
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
 ) -> RunResult:
-    """Run a scenario, given by path or library name, or one run out of a parameter value distribution.
+    """Run a scenario, given by path, library name or as all else that load_scenario takes, or one run out of a
+    parameter value distribution.
 
     out     folder for `result.json` and, unless `record` is False, `recording.mcap` and the cameras' `pictures`
     csv     file for one row per actor and tick
@@ -49,10 +50,10 @@ def play(
     if isinstance(source, ConcreteRun):
         number = source.number
         settings = replace(settings, parameters={**source.assignments, **settings.parameters})
-        path = source.scenario
-    else:
-        path = resolve_scenario(source)
-    scenario = load_for_seed(path, seed, settings.parameters)
+        source = source.scenario
+    elif isinstance(source, str | Path):
+        source = resolve_scenario(source)
+    scenario = load_for_seed(source, seed, settings.parameters)
     observers: list[Observer] = [*explanations]
     pictures = CameraPictures(out / PICTURES) if out is not None and record else None
     if pictures is not None:
@@ -65,7 +66,7 @@ def play(
             observers.append(CsvWriter(stack.enter_context(whole(csv))))
             stack.callback(observers[-1].close)
         if out is not None and record:
-            told, attachments = _told(scenario, seed, number, settings), _attachments(path, scenario)
+            told, attachments = _told(scenario, seed, number, settings), _attachments(source, scenario)
             recording = stack.enter_context(whole(out / RECORDING))
             observers.append(Recorder(recording, metadata=told, attachments=attachments))
             stack.callback(observers[-1].close)
@@ -83,9 +84,9 @@ def play(
     return result
 
 
-def as_json_text(result: RunResult, indent: int | None = None) -> str:
-    """The result as JSON; a number that JSON does not have is null."""
-    return json.dumps(_finite(result.as_json()), indent=indent, ensure_ascii=False, allow_nan=False)
+def as_json_text(result: RunResult, indent: int | None = None, *, ascii_only: bool = False) -> str:
+    """The result as JSON; a number that JSON does not have is null. `ascii_only` writes other letters as `\\u00e4`."""
+    return json.dumps(_finite(result.as_json()), indent=indent, ensure_ascii=ascii_only, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:
@@ -109,12 +110,12 @@ def _told(scenario: Scenario, seed: int, run: int | None, settings: RunSettings)
     return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}
 
 
-def _attachments(path: Path, scenario: Scenario) -> dict[str, bytes]:
+def _attachments(source: Source, scenario: Scenario) -> dict[str, bytes]:
     """The scenario's own text and its road, so that a recording can be shown without the files."""
-    files = {"scenario.xosc": path}
+    texts = {"scenario.xosc": text_of(source)}
     if scenario.road_file is not None:
-        files["road.xodr"] = Path(scenario.road_file)
-    return {name: file.read_bytes() for name, file in files.items()}
+        texts["road.xodr"] = scenario.road_file.read_bytes()
+    return texts
 
 
 def recording_in(place: Path) -> Path:

@@ -2,14 +2,17 @@
 
 from eidrive_scenario.openscenario.distributions import ConcreteRun, Unfolding, load_distribution
 from eidrive_scenario.openscenario.document import read_document
+from eidrive_scenario.openscenario.parsing import Source, text_of
 from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
 
 __all__ = [
     "ConcreteRun",
     "EntityObject",
     "Scenario",
+    "Source",
     "Unfolding",
     "load_distribution",
     "load_scenario",
     "read_document",
+    "text_of",
 ]

@@ -69,6 +69,15 @@ def open_document(source: Source) -> Document:
     return Document(parse(content, str(source)), str(source), path, path.parent)
 
 
+def text_of(source: Source) -> bytes:
+    """The text of a file: its bytes, or those that a tree has as a file. Raises ScenarioError with file:line."""
+    if isinstance(source, bytes):
+        return source
+    if isinstance(source, str | Path):
+        return Path(source).read_bytes()
+    return etree.tostring(open_document(source).root, encoding="utf-8", xml_declaration=True)
+
+
 def _from_tree(source: Any) -> Document:
     """The tree as it is where lxml made it, as then it knows its lines."""
     name = f"<{type(source).__name__}>"

@@ -15,6 +15,7 @@ from eidrive_scenario.pytest_plugin.options import Arm, arms
 from eidrive_scenario.pytest_plugin.outcome import play_arm, properties
 
 if TYPE_CHECKING:
+    from eidrive_scenario.openscenario import Source
     from eidrive_scenario.simulation import RunResult
 
 _KEYWORDS = ("channel", "seeds")
@@ -33,7 +34,7 @@ class RunScenario(Protocol):
 
     def __call__(
         self,
-        source: str | Path | None = None,
+        source: Source | None = None,
         *,
         channel: str | None = None,
         seed: int | None = None,
@@ -94,21 +95,23 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
     """A function that plays a scenario and gives its RunResult; the numbers go into the test report.
 
     In a test with the marker `scenario` it is called without arguments. Any other scenario is played by
-    `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. A wrong input
-    fails the test with file and line.
+    `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. In place of a
+    name it takes what load_scenario takes, as a Scenario of scenariogeneration. A wrong input fails the test with file
+    and line.
     """
     case: Case | None = getattr(request, "param", None)
 
     def run(
-        source: str | Path | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
+        source: Source | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
     ) -> RunResult:
-        if source is None and case is None:
+        source = case.source if source is None and case is not None else source
+        if source is None:
             pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
         arm = case.arm if case is not None else Arm(None, 1)
         arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed)
         try:
-            path = case.source if source is None and case is not None else resolve_scenario(source or "")
-            result = play_arm(request.config, path, arm, **settings)
+            source = resolve_scenario(source) if isinstance(source, str | Path) else source
+            result = play_arm(request.node, source, arm, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         request.node.user_properties.extend(properties(result))

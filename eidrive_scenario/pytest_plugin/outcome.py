@@ -13,7 +13,7 @@ from eidrive_scenario.errors import InputError, Problem, SettingError, suggestio
 from eidrive_scenario.pytest_plugin.options import Arm
 
 if TYPE_CHECKING:
-    from eidrive_scenario.openscenario import ConcreteRun
+    from eidrive_scenario.openscenario import ConcreteRun, Source
     from eidrive_scenario.recording import Verdict
     from eidrive_scenario.simulation import RunResult
 
@@ -33,7 +33,7 @@ def judge(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = N
 
     Raises ScenarioFailed, InputError.
     """
-    result = play_arm(item.config, source, arm) if run is None else _play(item.config, source, run, arm, {})
+    result = _play(item.config, source, run or source, arm, {})
     item.user_properties.extend(properties(result))
     if run is not None:
         item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
@@ -41,19 +41,22 @@ def judge(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = N
         raise ScenarioFailed(result)
 
 
-def play_arm(config: pytest.Config, source: Path, arm: Arm, **overrides: Any) -> RunResult:
+def play_arm(item: pytest.Item, source: Source, arm: Arm, **overrides: Any) -> RunResult:
     """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
 
+    What it leaves behind lies where the scenario's file does, or without one where that of the test does.
     Raises InputError.
     """
-    return _play(config, source, source, arm, overrides)
+    file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
+    return _play(item.config, file, source, arm, overrides)
 
 
 def _play(
-    config: pytest.Config, file: Path, source: Path | ConcreteRun, arm: Arm, overrides: Mapping[str, Any]
+    config: pytest.Config, file: Path, source: Source | ConcreteRun, arm: Arm, overrides: Mapping[str, Any]
 ) -> RunResult:
     # Imported with the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import play
+    from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.simulation import RunSettings
 
     known = [field.name for field in fields(RunSettings)]
@@ -62,7 +65,7 @@ def _play(
             raise SettingError(Problem(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
-    place = [*_place(config, file), *([] if isinstance(source, Path) else [f"run-{source.number}"]), str(arm)]
+    place = [*_place(config, file), *([f"run-{source.number}"] if isinstance(source, ConcreteRun) else []), str(arm)]
     out = Path(config.invocation_params.dir, folder, *place) if folder is not None else None
     return play(source, seed=arm.seed, settings=RunSettings(**settings), out=out)
 

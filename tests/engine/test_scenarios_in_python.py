@@ -11,7 +11,10 @@ from lxml import etree
 from scenariogeneration import xodr, xosc
 
 from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.experiments.inspection import inspect_scenario
+from eidrive_scenario.experiments.single_run import play
 from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 STEP = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
@@ -161,3 +164,17 @@ def test_what_is_no_scenario_is_refused() -> None:
         load_scenario(ElementTree.Element("OpenSCENARIO", {"version": 5}))  # type: ignore[dict-item]
     with pytest.raises(ScenarioError, match="<Element>:2: the root element is Catalog, not OpenSCENARIO"):
         load_scenario(ElementTree.Element("Catalog"))
+
+
+def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
+    findings = inspect_scenario(cut_in())
+    assert (findings.problems, findings.warnings) == ((), ())
+    (problem,) = inspect_scenario(cut_in(changing="Taget")).problems
+    assert "did you mean 'Target'?" in problem.remedy
+
+
+def test_a_record_of_it_has_its_text(cut_in: Build, tmp_path: Path) -> None:
+    result = play(cut_in(), out=tmp_path / "out")
+    recording = read_recording(tmp_path / "out" / "recording.mcap")
+    text = recording.attachments["scenario.xosc"]
+    assert run_file(text).trace_hash == result.trace_hash

@@ -116,3 +116,27 @@ def test_without_marker_a_name_is_needed(project: pytest.Pytester) -> None:
     result = run(project, "def test_none(run_scenario):\n    run_scenario()")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["*name a scenario*"])
+
+
+def test_a_scenario_that_was_written_in_python(project: pytest.Pytester) -> None:
+    text = """
+from xml.etree import ElementTree
+
+class Written:
+    def get_element(self):
+        return ElementTree.parse("drives/first.xosc").getroot()
+
+def test_object(run_scenario):
+    assert run_scenario(Written()).trace_hash == run_scenario("drives/first.xosc").trace_hash
+
+def test_wrong(run_scenario):
+    run_scenario(ElementTree.Element("OpenSCENARIO"))
+"""
+    result = run(project, text, "--eidrive-out", "kept")
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["<Element>:2: OpenSCENARIO lacks the element FileHeader*"])
+    result.stdout.no_fnmatch_line("Traceback*")
+    assert {path.parent.relative_to(project.path).as_posix() for path in project.path.glob("kept/**/result.json")} == {
+        "kept/test_own/test_object/seed1",
+        "kept/drives/first/seed1",
+    }
