@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -40,14 +41,15 @@ def resolve_scenario(name: str | Path) -> Path:
     Raises SettingError, with the nearest name, if there is neither.
     """
     path = Path(name)
-    if path.is_file():
+    if _is_file(path):
+        _check_letters(path)
         return path
-    if not path.is_absolute():
+    if not path.is_absolute() and path.name:
         inside = library_path() / path
         for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
-            if candidate.is_file() and candidate.suffix == _SUFFIX:
+            if _is_file(candidate) and candidate.suffix == _SUFFIX:
                 return candidate
-    if path.is_dir():
+    if str(name) and os.path.isdir(path):
         raise SettingError(Problem(f"{str(name)!r} is a folder", "give one .xosc file"))
     remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
     raise SettingError(Problem(f"no scenario {str(name)!r}: neither a file nor in the library", remedy))
@@ -69,14 +71,29 @@ def names(kind: Kind) -> list[str]:
 def resolve(kind: Kind, name: str | Path) -> Path:
     """The file of a channel profile or weather preset given by path or name. Raises SettingError, with the nearest."""
     path = Path(name)
-    if path.is_file():
+    if _is_file(path):
         return path
     inside = library_path() / kind / f"{name}.yaml"
-    if inside.is_file():
+    if _is_file(inside):
         return inside
     singular = "channel profile" if kind == "channels" else "weather preset"
     remedy = suggestion(str(name), names(kind))
     raise SettingError(Problem(f"no {singular} {str(name)!r}: neither a file nor in the library", remedy))
+
+
+def _check_letters(path: Path) -> None:
+    """Raises SettingError for a path with bytes that are no letters: neither XML nor JSON could name it."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        shown = os.fsencode(path).decode(errors="backslashreplace")
+        remedy = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
+        raise SettingError(Problem("the name has bytes that are no letters here", remedy, shown)) from None
+
+
+def _is_file(path: Path) -> bool:
+    """False too for a text that is no path at all, as it is too long."""
+    return os.path.isfile(path)
 
 
 def definition(path: Path) -> Definition:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Self
 
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.errors import Together
+from eidrive_scenario.errors import Together, suggestion
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.parameters import Assignment
@@ -231,6 +231,17 @@ class Simulation:
     def _command_exit(self, command: CustomCommand) -> None:
         self._exit = exit_verdict(command, self.world.time)
 
+    def _mistaken_values(self) -> Iterator[str]:
+        """Warnings of user-defined values that nobody gave, or nobody asked for."""
+        wanted = self.storyboard.stage.wanted_values
+        for name, by in wanted.items():
+            if name not in self._user_values:
+                where = f"{by.source}:{by.line}"
+                yield f"{where}: nobody gave the user-defined value {name!r}; use --user-value or set_user_value"
+        for name in self.settings.user_values:
+            if name not in wanted:
+                yield f"no UserDefinedValueCondition asks for {name!r}; {suggestion(name, wanted)}"
+
     def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
         verdicts = [criterion.verdict() for criterion in self.criteria]
         if self._exit is not None:
@@ -240,11 +251,6 @@ class Simulation:
             metrics.update(criterion.metrics())
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
-        unanswered = [
-            f"{by.source}:{by.line}: nobody gave the user-defined value {name!r}; use --user-value or set_user_value"
-            for name, by in self.storyboard.stage.wanted_values.items()
-            if name not in self._user_values
-        ]
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(
@@ -259,7 +265,9 @@ class Simulation:
             trace_hash=self._trace.hexdigest(),
             simulated_s=frame.view.time,
             wall_s=wall_s,
-            warnings=tuple(dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings), *unanswered])),
+            warnings=tuple(
+                dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings), *self._mistaken_values()])
+            ),
             parameters=dict(self.scenario.parameters),
             links=dict(self.stations.link_statistics(frame.view.time)),
         )

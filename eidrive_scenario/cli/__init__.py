@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.check import check
-from eidrive_scenario.cli.failures import Guarded
+from eidrive_scenario.cli.failures import BROKEN, Guarded, tell
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
+from eidrive_scenario.cli.streams import make_writable
 
 app = typer.Typer(
     name="eidrive",
@@ -52,4 +53,10 @@ def _options(
 
 def main() -> None:
     """Entry point; ends the process with the command's exit code."""
-    app()
+    make_writable()
+    try:
+        app()
+    except OSError as error:
+        # Help and usage errors are printed before a command runs.
+        tell(error)
+        raise SystemExit(BROKEN) from error

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from eidrive_scenario.cli.failures import WRONG_INPUT
+from eidrive_scenario.cli.failures import BROKEN, WRONG_INPUT, tell
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import definition, resolve_scenario
 
@@ -16,6 +17,7 @@ _SUFFIX = ".xosc"
 
 
 def check(
+    context: typer.Context,
     paths: Annotated[list[str], typer.Argument(metavar="PATH…", help="Files, folders, or names of the library.")],
     strict: Annotated[bool, typer.Option("--strict", help="Let warnings count as problems.")] = False,
     ignore: Annotated[
@@ -30,17 +32,26 @@ def check(
     from eidrive_scenario.experiments.inspection import inspect_scenario
 
     missing: list[Problem] = []
+    broken: list[Exception] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     told: dict[str, dict[Problem, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
     for problem in missing:
         typer.echo(str(problem))
     for path in files:
-        kind = definition(path)
-        if kind == "catalog":
-            typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
+        try:
+            kind = definition(path)
+            if kind == "catalog":
+                typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
+                continue
+            findings = (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
+        except InputError:
+            raise
+        except Exception as error:
+            if context.find_root().params.get("traceback"):
+                raise
+            tell(error, path)
+            broken.append(error)
             continue
-        inspect = inspect_distribution if kind == "distribution" else inspect_scenario
-        findings = inspect(path, ignored)
         for level, found in zip(told, (findings.problems, findings.warnings, findings.notes), strict=True):
             for problem in found:
                 if problem not in told[level]:
@@ -50,6 +61,8 @@ def check(
             typer.echo(f"{path}: {_count(findings.runs, 'run')}")
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in told.items())]
     typer.echo(", ".join(counts if told["note"] else counts[:-1]))
+    if broken:
+        raise typer.Exit(BROKEN)
     raise typer.Exit(WRONG_INPUT if told["problem"] or (strict and told["warning"]) else 0)
 
 
@@ -64,7 +77,7 @@ def _mark(level: str, rule: str) -> str:
 def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
     """The files that are meant; what is not there goes to `missing` and keeps no other from being checked."""
     for given in paths:
-        if not Path(given).is_dir():
+        if not given or not os.path.isdir(given):
             try:
                 yield resolve_scenario(given)
             except InputError as error:

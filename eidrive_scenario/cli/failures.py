@@ -39,12 +39,30 @@ class Guarded(TyperGroup):
                 raise
             typer.echo(f"the run broke: {error}", err=True)
             raise typer.Exit(BROKEN) from error
+        except OSError as error:
+            if ctx.params.get("traceback"):
+                raise
+            tell(error)
+            raise typer.Exit(BROKEN) from error
         except Exception as error:
             if ctx.params.get("traceback") or _from_typer(error):
                 raise
-            typer.echo(f"internal error: {type(error).__name__}: {error}", err=True)
-            typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) shows where; please report it", err=True)
+            tell(error)
             raise typer.Exit(BROKEN) from error
+
+
+def tell(error: Exception, file: object = None) -> None:
+    """Say on stderr what broke in a few words: what the system refused, or an error of this program's own.
+
+    file  which one it broke at, where several are worked through
+    """
+    place = f"{file}: " if file is not None else ""
+    if isinstance(error, OSError) and error.strerror:
+        where = f": {error.filename}" if error.filename is not None else ""
+        typer.echo(f"{place}broken off: {error.strerror}{where}", err=True)
+        return
+    typer.echo(f"{place}internal error: {type(error).__name__}: {error}", err=True)
+    typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) shows where; please report it", err=True)
 
 
 def _from_typer(error: Exception) -> bool:

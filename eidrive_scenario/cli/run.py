@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.places import check_places
+from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.errors import Problem, SettingError
 
 PRINTED = "-"
@@ -25,7 +27,10 @@ def run(
     ],
     channel: Annotated[
         str | None,
-        typer.Option(help="Channel profile, by name or file; none: no cooperation.", show_default="the file's"),
+        typer.Option(
+            help="Channel profile, by name or file, or a YAML mapping; none: no cooperation.",
+            show_default="the file's",
+        ),
     ] = None,
     detector: Annotated[str | None, typer.Option(help="Detector of all stations.", show_default="the file's")] = None,
     weather: Annotated[
@@ -66,7 +71,7 @@ def run(
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
     from eidrive_scenario.cli.batch import play_all
     from eidrive_scenario.cli.verdicts import show
-    from eidrive_scenario.experiments.single_run import as_json_text, play
+    from eidrive_scenario.experiments.single_run import RECORDING, RESULT, as_json_text, play
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation
     from eidrive_scenario.simulation import RunSettings
@@ -104,7 +109,7 @@ def run(
                 explanations=explanations,
             )
             if json:
-                typer.echo(as_json_text(result))
+                typer.echo(as_json_text(result, ascii_only=not has_all_letters()))
             else:
                 show(result, varied="" if isinstance(source, Path) else str(source))
             for explanation in explanations:
@@ -113,6 +118,8 @@ def run(
         return code
 
     path = resolve_scenario(scenario)
+    kept = {f"--out ({name})": out / name for name in (RECORDING, RESULT)} if out is not None else {}
+    check_places({"--csv": csv, "--log": None if log == PRINTED else log, **kept}, (path, channel, weather))
     if definition(path) == "distribution":
         raise typer.Exit(play_all(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
     if max_runs is not None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from eidrive_scenario.cli.places import check_places
 from eidrive_scenario.errors import Problem, SettingError
 
 
@@ -18,6 +19,9 @@ class Names(StrEnum):
     channels = "channels"
     weather = "weather"
     detectors = "detectors"
+    fusion = "fusion"
+    planners = "planners"
+    controllers = "controllers"
     criteria = "criteria"
     actions = "actions"
     conditions = "conditions"
@@ -61,7 +65,9 @@ def tree(
     from eidrive_scenario.roads import RoadNetwork
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
-    loaded = load_scenario(resolve_scenario(scenario))
+    path = resolve_scenario(scenario)
+    check_places({"--svg": svg}, [path])
+    loaded = load_scenario(path)
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
     if svg is not None:
@@ -83,6 +89,7 @@ def view(
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
+    check_places({"--out": page}, [path])
     write_replay(read_recording(path), page)
     if path.stem.endswith(PARTIAL):
         typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)

@@ -41,7 +41,9 @@ def show(result: RunResult, varied: str = "") -> None:
     if result.criteria:
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
         for heading in ("criterion", "", "value", "limit", "reason"):
-            table.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
+            table.add_column(
+                heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
+            )
         for verdict in result.criteria:
             table.add_row(*_row(verdict))
         out.print(table)
@@ -49,7 +51,7 @@ def show(result: RunResult, varied: str = "") -> None:
         out.print("no criterion: nothing was judged", style="yellow")
     speed = f", {result.simulated_s / result.wall_s:.0f} times real time" if result.wall_s > 0 else ""
     out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
-    out.print(Text(f"trace {result.trace_hash}", style="dim"))
+    out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
     for warning in result.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
 

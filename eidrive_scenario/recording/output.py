@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -35,9 +36,9 @@ def whole(path: Path) -> Iterator[Path]:
     whole run; of wrong input nothing is kept. What is no plain file, such as /dev/stdout, is written as it is. Raises
     SettingError if the place is a folder.
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         raise SettingError(Problem("cannot write: Is a directory", "choose another place", str(path)))
-    if path.is_symlink() or (path.exists() and not path.is_file()):
+    if os.path.islink(path) or (os.path.exists(path) and not os.path.isfile(path)):
         yield path
         return
     unfinished = partial(path)

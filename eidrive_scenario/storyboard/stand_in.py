@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from eidrive_scenario.errors import Problem, RegistryError
+from eidrive_scenario.errors import Problem, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry
 from eidrive_scenario.storyboard.actor import Actor, is_ours
@@ -73,7 +73,7 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[P
     remedy = "give it the property module=eidrive, or let something stand in for it"
     if astray:
         remedy += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
-    return [
+    alone = [
         Problem(
             f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
             remedy,
@@ -83,4 +83,8 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[P
         for actor in actors.values()
         for controller in actor.controllers
         if not is_ours(controller) and controller.name not in wanted
+    ]
+    return alone or [
+        Problem(f"the stand-in for {name!r} found no controller of that name", suggestion(name, names))
+        for name in astray
     ]

@@ -11,6 +11,8 @@ Cell = tuple[int, int]
 
 SQUARE = 10.0
 """Side of a square [m]."""
+_FAR = 300.0
+"""Reach from which on there may be more squares than any that have something in them [m]: steps of many seconds."""
 
 
 class Nearby(Generic[Thing]):
@@ -27,7 +29,12 @@ class Nearby(Generic[Thing]):
     def around(self, x: float, y: float, reach: float) -> list[Thing]:
         """Those in the squares within reach of a point [m]; one may come several times."""
         found: list[Thing] = []
-        if self._in_cell:
+        if reach > _FAR:
+            side = reach + SQUARE
+            for (column, line), things in self._in_cell.items():
+                if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
+                    found += things
+        elif self._in_cell:
             for cell in squares(x, y, reach):
                 if cell in self._in_cell:
                     found += self._in_cell[cell]

@@ -76,3 +76,11 @@ def test_what_a_file_defines(tmp_path: Path, text: str, kind: str) -> None:
 
 def test_the_library_of_this_checkout_is_found() -> None:
     assert (library.library_path() / "coop").is_dir()
+
+
+@pytest.mark.parametrize("name", ["", "x" * 300, "a\0b"])
+def test_a_text_that_is_no_path_is_no_file(own_library: Path, name: str) -> None:
+    with pytest.raises(SettingError, match="neither a file nor in the library"):
+        library.resolve_scenario(name)
+    with pytest.raises(SettingError, match="neither a file nor in the library"):
+        library.resolve("weather", name)

@@ -109,8 +109,8 @@ class Outline:
         """The elements that a reference means."""
         return [node for node in self.nodes if node.level is level and is_suffix(reference, node.path)]
 
-    def members(self, name: str) -> tuple[str, ...]:
-        """The entity of this name, or those of the selection of this name."""
+    def members(self, name: str, around: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """The entity of this name, or those of the selection of this name; `around` are selections that it is in."""
         if name in self.scenario.entities:
             return (name,)
         entities = self.scenario.document.entities
@@ -119,7 +119,8 @@ class Outline:
             if selection.name != name:
                 continue
             for ref in selection.members.entity_ref:
-                found += self.members(ref.entity_ref) if ref.entity_ref != name else ()
+                if ref.entity_ref not in (name, *around):
+                    found += self.members(ref.entity_ref, (*around, name))
             for given in selection.members.by_type:
                 kind = _OBJECT_TYPES.get(given.object_type.value)
                 found += [one for one, body in self.scenario.entities.items() if kind and isinstance(body, kind)]

@@ -128,3 +128,44 @@ def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_pa
     assert result.exit_code == 2, result.output
     assert "names road 'nowhere', which the road network does not have" in result.stdout
     assert "(error: no-such-place)" in result.stdout
+
+
+def test_one_that_breaks_the_checker_is_named_and_keeps_none_from_being_checked(
+    eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from eidrive_scenario.experiments import inspection
+
+    inspect = inspection.inspect_scenario
+
+    def broken(path: Path, ignored: tuple[str, ...]) -> object:
+        if path.name == "a.xosc":
+            raise ZeroDivisionError("division by zero")
+        return inspect(path, ignored)
+
+    for name in ("a.xosc", "b.xosc"):
+        (tmp_path / name).write_text("<OpenSCENARIO/>")
+    monkeypatch.setattr(inspection, "inspect_scenario", broken)
+    result = eidrive("check", tmp_path)
+    assert result.exit_code == 3
+    assert f"{tmp_path / 'a.xosc'}: internal error: ZeroDivisionError: division by zero" in result.stderr
+    assert f"{tmp_path / 'b.xosc'}:1: " in result.stdout
+
+
+def test_an_empty_name_is_not_the_folder_one_stands_in(
+    eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.xosc").write_text("<OpenSCENARIO/>")
+    result = eidrive("check", "")
+    assert result.exit_code == 2
+    assert result.stdout.splitlines()[-1] == "0 files, 1 problem, 0 warnings"
+
+
+def test_selections_in_a_circle_are_a_problem(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
+    ring = '<EntitySelection name="{}"><Members><EntityRef entityRef="{}"/></Members></EntitySelection>'
+    rings = ring.format("a", "b") + ring.format("b", "c") + ring.format("c", "a")
+    broken = folder(ring=("</Entities>", f"{rings}</Entities>")) / "ring.xosc"
+    broken.write_text(broken.read_text().replace('entityRef="Parked"', 'entityRef="a"', 1))
+    result = eidrive("check", broken)
+    assert result.exit_code == 2, result.output
+    assert "the selection 'a' is a member of itself" in result.stdout

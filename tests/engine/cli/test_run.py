@@ -151,3 +151,24 @@ def test_json_stays_alone_on_standard_output(eidrive: Eidrive, passing_by: Path)
     assert json.loads(result.stdout)["passed"] is True
     assert "the run stopped at 3.00 s" in result.stderr
     assert eidrive("run", passing_by, "--json", "--log", "-").exit_code == 2
+
+
+@pytest.mark.parametrize("columns", ["50", "70"])
+def test_a_narrow_terminal_wraps_reasons_alone(
+    eidrive: Eidrive, passing_by: Path, columns: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    lines = eidrive("run", passing_by, "--no-record").stdout.splitlines()
+    assert any(line.startswith("min_distance  passed  5.000 m  3.000 m  Ego ") for line in lines), lines
+    assert any(re.fullmatch(r"trace [0-9a-f]{64}", line) for line in lines)
+
+
+def test_values_and_stand_ins_for_nobody_are_told(eidrive: Eidrive, passing_by: Path) -> None:
+    result = eidrive("run", passing_by, "--no-record", "--user-value", "mood=3", "--stand-in", "ALKS=alks")
+    assert result.exit_code == 0, result.output
+    assert "warning: no UserDefinedValueCondition asks for 'mood'; none is known here" in result.stderr
+    assert "warning: the stand-in for 'ALKS' found no controller of that name" in result.stderr
+
+
+def test_very_long_steps_take_no_memory(eidrive: Eidrive) -> None:
+    assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "1000", "--time-limit", "1000").exit_code == 0

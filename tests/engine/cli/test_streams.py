@@ -1,0 +1,68 @@
+"""Standard output that is closed, full, or lacks letters, in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+FULL = Path("/dev/full")
+
+
+def eidrive(
+    *arguments: str | Path, stdout: int | IO[bytes] = subprocess.PIPE, **variables: str
+) -> subprocess.CompletedProcess[bytes]:
+    command = [sys.executable, "-m", "eidrive_scenario", *map(str, arguments)]
+    environment = {**os.environ, **variables}
+    return subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, env=environment, check=False)
+
+
+def test_letters_that_the_encoding_lacks_are_spelled_out(passing_by: Path) -> None:
+    log = eidrive("run", passing_by, "--no-record", "--log", "-", PYTHONIOENCODING="ascii")
+    assert log.returncode == 0, log.stderr
+    assert rb"simulation time 3.00 s \u2265 3 s" in log.stdout
+    assert eidrive("tree", passing_by, PYTHONIOENCODING="latin-1").returncode == 0
+
+
+def test_json_stays_json_in_any_encoding(passing_by: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "späß"
+    folder.mkdir()
+    copy = folder / "größe ≥ 3.xosc"
+    copy.write_bytes(passing_by.read_bytes())
+    for encoding in ("latin-1", "utf-8"):
+        printed = eidrive("run", copy, "--json", "--no-record", PYTHONIOENCODING=encoding)
+        assert json.loads(printed.stdout.decode(encoding))["scenario"] == copy.stem
+
+
+def test_bytes_in_a_name_that_are_no_letters(passing_by: Path, tmp_path: Path) -> None:
+    copy = Path(os.fsdecode(os.fsencode(tmp_path) + b"/b\xffd.xosc"))
+    try:
+        copy.write_bytes(passing_by.read_bytes())
+    except OSError:
+        pytest.skip("this file system takes no such name")
+    played = eidrive("run", copy, PYTHONUTF8="1")
+    assert played.returncode == 2
+    assert rb"b\xffd.xosc: the name has bytes that are no letters here; rename it" in played.stderr
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "FILE"], ["run", "FILE", "--csv", str(FULL)]])
+def test_a_full_disk_is_said_in_one_line(passing_by: Path, arguments: list[str]) -> None:
+    given = [str(passing_by) if argument == "FILE" else argument for argument in arguments]
+    with FULL.open("wb") as full:
+        result = eidrive(*given, stdout=full)
+    assert result.returncode == 3
+    assert result.stderr.decode().splitlines()[-1].startswith("broken off: No space left on device")
+    assert b"internal error" not in result.stderr
+    assert b"Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize("arguments", [["run", "FILE", "--json"], ["tree", "FILE"]])
+def test_a_closed_output_is_no_error(passing_by: Path, arguments: list[str]) -> None:
+    given = " ".join(f"'{passing_by}'" if argument == "FILE" else argument for argument in arguments)
+    closed = f"'{sys.executable}' -m eidrive_scenario {given} >&-"
+    result = subprocess.run(["/bin/sh", "-c", closed], capture_output=True, check=False)
+    assert (result.returncode, result.stderr) == (0, b"")
