@@ -53,10 +53,12 @@ class Actor:
         self.trailer: str | None = None
         """What it draws."""
         self.traveled = 0.0
-        """Distance covered since it entered the world, jumps left out [m]."""
+        """Distance covered in the world, jumps left out [m]."""
         self.standing_since: float | None = None
-        self.off_road_since: float | None = None
         self.end_of_road_since: float | None = None
+        self.off_road_since: float | None = None
+        """Kept up only where somebody wants it."""
+        self.off_road_wanted = False
         self._last: tuple[float, float] | None = None
         self._seen: ActorState | None = None
         self._found: LaneLocation | None = None
@@ -107,6 +109,19 @@ class Actor:
             self.motion.pose = pose_of(view, row)
             self.motion.speed = speed
 
+    def look_below(self, roads: RoadNetwork | None, view: WorldView) -> None:
+        """Keep up since when it is off the road with its reference point. Lanes `none` are no road."""
+        here = None if roads is None else self.location(roads, view.tick)
+        if roads is not None and here is not None and _on_road(roads, here):
+            self.off_road_since = None
+        elif self.off_road_since is None:
+            self.off_road_since = view.time
+
+    def appear(self) -> None:
+        """It enters the world: what has gone on there begins anew."""
+        self.present = True
+        self.standing_since = self.off_road_since = self.end_of_road_since = None
+
     def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
         """Its place on the road: the lane below it, None where no road is near. Looked up once per tick."""
         if self._found_at != tick:
@@ -123,3 +138,7 @@ class Actor:
 def pose_of(view: WorldView, row: int) -> Pose:
     """The pose of one row of a view."""
     return Pose(*view.states[row][:6])
+
+
+def _on_road(roads: RoadNetwork, here: LaneLocation) -> bool:
+    return roads.lane_type(here.road, here.lane, here.s) != "none" and roads.on_road(here)

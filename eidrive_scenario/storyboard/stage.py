@@ -145,6 +145,8 @@ class Stage:
             row = rows.get(name)
             if row is not None:
                 actor.observe(view, row)
+                if actor.off_road_wanted:
+                    actor.look_below(self.roads, view)
 
     def pose(self, name: str) -> Pose:
         """Where an actor is now. Raises Absent if it is not in the world."""
@@ -185,7 +187,7 @@ class Stage:
         actor.motion.put(place)
         actor.forget_location()
         if not actor.present:
-            actor.present = True
+            actor.appear()
             self.commands.additions[name] = actor.motion.placement()
 
     def leave(self, name: str) -> None:

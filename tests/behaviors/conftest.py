@@ -64,7 +64,8 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
 
     Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it. `cruise`
     gives it one of another tool, with these properties, for which an adaptive cruise control or `stand_in` stands in.
-    `brakes` is the largest deceleration of the vehicles [m/s²], `performance` are further limits of theirs.
+    `brakes` is the largest deceleration of the vehicles [m/s²], `performance` are further limits of theirs. Each action
+    may start so many times as `executions` says.
     """
     (tmp_path / "street.xodr").write_text(STREET)
 
@@ -81,11 +82,13 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         edge: str = "none",
         performance: str = "",
         brakes: float = 10.0,
+        executions: int = 1,
     ) -> Played:
         groups = ""
         for number, (actor, action, *condition) in enumerate(steps):
             trigger = TRIGGER.format(edge=edge, condition=condition[0]) if condition else ""
             groups += GROUP.format(number=number, actor=actor, action=action, trigger=trigger)
+        groups = groups.replace('priority="parallel"', f'priority="parallel" maximumExecutionCount="{executions}"')
         controller = OURS if driven else "" if cruise is None else CRUISE.format(properties=cruise)
         cars = CAR.format(name="Ego", controller=controller) + CAR.format(name="Other", controller="")
         cars = cars.replace('maxDeceleration="10"/>', f'maxDeceleration="{brakes:g}" {performance}/>')

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from eidrive_behaviors.conditions.values import agrees
+from street_scene import after
 
 from eidrive_scenario.api import compares, model
 
@@ -20,6 +21,17 @@ def of(condition: str, entity: str = "Ego", rule: str = "any") -> str:
 
 def first(played: Any) -> float | None:
     return played.when("event 0", "runningState")  # type: ignore[no-any-return]
+
+
+def starts(played: Any) -> list[float]:
+    return [one.time for one in played.changes if one.element == "event 0" and one.after.value == "runningState"]
+
+
+def aside(offset: float) -> str:
+    return f"""<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
+      <LaneOffsetActionDynamics dynamicsShape="step"/>
+      <LaneOffsetTarget><AbsoluteTargetLaneOffset value="{offset}"/></LaneOffsetTarget></LaneOffsetAction>
+      </LateralAction></PrivateAction>"""
 
 
 def speed(value: float, seconds: float) -> str:
@@ -171,12 +183,26 @@ def test_the_end_of_the_road_and_off_the_road(scene: Any) -> None:
     """5 m before the end at 20 m/s: there at 0.3 s. Off the road from 4 m beside it on."""
     end = of('<EndOfRoadCondition duration="0.5"/>')
     assert first(scene(2, ("Ego", NOTHING, end), ego=(-1, 995, 20))) == pytest.approx(0.8)
-    aside = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
-      <LaneOffsetActionDynamics dynamicsShape="step"/>
-      <LaneOffsetTarget><AbsoluteTargetLaneOffset value="-7"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
-      </PrivateAction>"""
     off = of('<OffroadCondition duration="0.35"/>')
-    assert first(scene(2, ("Ego", NOTHING, off), ("Ego", aside))) == pytest.approx(0.5)
+    assert first(scene(2, ("Ego", NOTHING, off), ("Ego", aside(-7)))) == pytest.approx(0.5)
+
+
+def test_off_the_road_again_counts_from_then_on_though_nobody_asked_in_between(scene: Any) -> None:
+    """Its event runs from 0.5 s to 1.5 s; off the road again at 1.3 s."""
+    off = of('<OffroadCondition duration="0.35"/>')
+    ways = (("Ego", aside(-7)), ("Ego", aside(0), after(0.65)), ("Ego", aside(-7), after(1.15)))
+    played = scene(2.5, ("Ego", speed(20, 1), off), *ways, executions=2)
+    assert starts(played) == pytest.approx([0.5, 1.7])
+
+
+def test_who_comes_back_has_not_stood_still_while_away(scene: Any) -> None:
+    """Deleted at 0.5 s, back at 2.0 s, seen there at 2.1 s."""
+    entity = '<GlobalAction><EntityAction entityRef="Other">{}</EntityAction></GlobalAction>'
+    back = """<AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position></AddEntityAction>"""
+    away = ("Ego", entity.format("<DeleteEntityAction/>"), after(0.45))
+    still = of('<StandStillCondition duration="0.95"/>', "Other")
+    played = scene(4, ("Ego", NOTHING, still), away, ("Ego", entity.format(back), after(1.95)), other=(-2, 150.0, 0.0))
+    assert first(played) == pytest.approx(3.1)
 
 
 @pytest.mark.element("AngleCondition", "RelativeAngleCondition")

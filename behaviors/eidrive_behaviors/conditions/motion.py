@@ -104,7 +104,7 @@ class StandStillCondition(QuantityCondition):
 
 
 class TraveledDistanceCondition(QuantityCondition):
-    """Has covered a distance since it entered the world [m]."""
+    """Has covered a distance in the world [m]; jumps are left out."""
 
     element: model.TraveledDistanceCondition
     unit = "m"

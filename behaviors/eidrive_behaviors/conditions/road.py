@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_behaviors.conditions.motion import since, span
-from eidrive_scenario.api import LaneLocation, QuantityCondition, Stage, model
+from eidrive_scenario.api import QuantityCondition, Stage, model
 
 
 class EndOfRoadCondition(QuantityCondition):
@@ -37,26 +37,14 @@ class OffroadCondition(QuantityCondition):
     element: model.OffroadCondition
     unit = "s"
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
-        """Compare how long. The state is looked at here, so that runs without this condition need not pay for it."""
-        actor = stage.actors[entity]
-        here = stage.location(entity)
-        if here is not None and self._on_road(stage, here):
-            actor.off_road_since = None
-        elif actor.off_road_since is None:
-            actor.off_road_since = stage.time
-        return super().holds_for(stage, entity)
+    def bind(self, stage: Stage) -> None:
+        """Have it kept up since when they are off the road; runs without this condition need not pay for it."""
+        for name in self.entities:
+            stage.actors[name].off_road_wanted = True
 
     def explain_for(self, stage: Stage, entity: str) -> str:
         """How long."""
         return f"{entity}: {since(stage, stage.actors[entity].off_road_since, 'off the road', 'on the road')}"
-
-    @staticmethod
-    def _on_road(stage: Stage, here: LaneLocation) -> bool:
-        roads = stage.roads
-        if roads is None or roads.lane_type(here.road, here.lane, here.s) == "none":
-            return False
-        return roads.on_road(here)
 
     def describe_for(self) -> str:
         """The duration."""
