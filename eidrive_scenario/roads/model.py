@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Literal
 
 from eidrive_scenario.roads.curves import ReferenceLine
+from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.polynomials import Polynomials
 
 Contact = Literal["start", "end"]
@@ -306,3 +307,5 @@ class RoadMap:
     signals: Mapping[str, Signal]
     controllers: Mapping[str, SignalController]
     objects: tuple[RoadObject, ...]
+    flaws: tuple[Flaw, ...] = ()
+    """What the file has against the standard, and is read all the same."""

@@ -15,6 +15,7 @@ from eidrive_scenario.errors import Problem
 from eidrive_scenario.roads import poses
 from eidrive_scenario.roads.attributes import Roads
 from eidrive_scenario.roads.distance import Chain, RoadDistances
+from eidrive_scenario.roads.flaws import told
 from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
@@ -27,7 +28,7 @@ from eidrive_scenario.roads.nearby import locate_near
 from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.route import Route, joined
-from eidrive_scenario.roads.soundness import doubts
+from eidrive_scenario.roads.soundness import flaws
 from eidrive_scenario.roads.tables import RoadTables
 
 KEPT = 2
@@ -42,6 +43,7 @@ class RoadNetwork(Roads):
 
     def __init__(self, road_map: RoadMap) -> None:
         super().__init__(road_map)
+        self._flaws = road_map.flaws
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
         self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
@@ -63,7 +65,7 @@ class RoadNetwork(Roads):
     @cached_property
     def doubts(self) -> tuple[Problem, ...]:
         """What is likely wrong with the file, though it can be read: one finding a kind, each with its rule."""
-        return doubts(self.source, self.roads, self.junctions, self.links)
+        return told([*self._flaws, *flaws(self.roads, self.junctions, self.links)], self.source)
 
     @cached_property
     def tables(self) -> RoadTables:

@@ -1,17 +1,13 @@
-"""What is doubtful in a road file that can be read all the same: roads that jump, lanes without width, loose ends.
-
-Real maps have many small flaws of one kind. So each kind is told once, with its first place and a count.
-"""
+"""What is doubtful in a road file that can be read all the same: roads that jump, lanes without width, loose ends."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import NamedTuple
 
-from eidrive_scenario.errors import Problem
 from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.links import LaneEnd, LaneLinks, end_section, side_at
 from eidrive_scenario.roads.location import LaneKey
 from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
@@ -26,41 +22,10 @@ NARROW = -0.01
 """Widths below this are negative; rounding reaches less far [m]."""
 OPEN = 0.5
 """A lane of this width at its end does not just taper off [m]."""
-SHOWN = 4
-"""Further lines that a finding names."""
 
 
-class Flaw(NamedTuple):
-    """One flaw: the rule that it breaks, what kind it is, what it is here, and what would be right."""
-
-    rule: str
-    kind: str
-    message: str
-    remedy: str
-    line: int | None
-
-
-def doubts(
-    source: str, roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks
-) -> tuple[Problem, ...]:
-    """What is likely wrong with a file's roads, one finding a kind, each with its rule of `eidrive check`."""
-    kinds: dict[tuple[str, str], list[Flaw]] = {}
-    for flaw in _flaws(roads, junctions, links):
-        kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)
-    return tuple(_told(flaws, source) for flaws in kinds.values())
-
-
-def _told(flaws: list[Flaw], source: str) -> Problem:
-    first = flaws[0]
-    message = first.message
-    if len(flaws) > 1:
-        lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
-        more = ", …" if len(flaws) > 1 + SHOWN else ""
-        message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
-    return Problem(message, first.remedy, source, first.line, first.rule)
-
-
-def _flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks) -> Iterator[Flaw]:
+def flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks) -> Iterator[Flaw]:
+    """What is likely wrong with a file's roads."""
     for road in roads.values():
         yield from _jumps(road)
         for section in road.sections:
@@ -245,8 +210,18 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
         what = f"{name} takes road {connecting.id!r}, which is not of this junction"
         remedy = f"give that road junction={junction.id!r}, or correct connectingRoad"
         yield Flaw(rule, "connections by roads outside", what, remedy, connection.line)
-    here = end_section(incoming, side_at(incoming, junction, connecting, connection.contact)).lanes
-    there = end_section(connecting, 1 if connection.contact == "end" else -1).lanes
+    side, other_side = (
+        side_at(incoming, junction, connecting, connection.contact),
+        1 if connection.contact == "end" else -1,
+    )
+    here, there = end_section(incoming, side).lanes, end_section(connecting, other_side).lanes
+    driven = [
+        (n, m) for n, m in connection.lane_links if n in here and m in there and here[n].drivable and there[m].drivable
+    ]
+    if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
+        what = f"{name} leads against the traffic of the roads {incoming.id!r} and {connecting.id!r}"
+        remedy = 'swap them; where traffic keeps to the left, give the roads rule="LHT"'
+        yield Flaw(rule, "connections against the traffic", what, remedy, connection.line)
     for number, target in connection.lane_links:
         for lane, known, road in ((number, here, incoming), (target, there, connecting)):
             if lane not in known:

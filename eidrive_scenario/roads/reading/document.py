@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, RoadError, suggestion
+from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.model import (
     Connection,
     Header,
@@ -62,14 +64,13 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
     for element in root.iterfind("junction"):
         junction = _read_junction(element, roads, findings)
         junctions[junction.id] = junction
-    for road in roads.values():
-        _check_links(road, roads, junctions, findings)
+    roads = {number: _with_sound_links(road, roads, junctions, findings) for number, road in roads.items()}
     signals = read_signals(elements, findings)
     controllers = read_controllers(root, signals, findings)
     header = _read_header(root, findings)
     if findings.problems:
         raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
-    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects))
+    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects), tuple(findings.flaws))
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
@@ -216,11 +217,19 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], findings: 
     return Connection(element.get("id", ""), incoming, connecting, contact, links, line_of(element))
 
 
-def _check_links(road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: Findings) -> None:
-    for link in (road.predecessor, road.successor):
-        if link is None:
-            continue
-        known = roads if link.element_type == "road" else junctions
-        if link.element_id not in known and len(findings.problems) < 100:
-            message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
-            findings.problems.append(Problem(message, suggestion(link.element_id, known), findings.source, link.line))
+def _with_sound_links(road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: Findings) -> Road:
+    """The road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
+
+    def sound(link: RoadLink | None) -> RoadLink | None:
+        known = {} if link is None else roads if link.element_type == "road" else junctions
+        if link is None or link.element_id in known:
+            return link
+        message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
+        if link.element_type == "road":
+            findings.tell(Problem(message, suggestion(link.element_id, known), findings.source, link.line))
+            return link
+        remedy = "take the link out, or add the junction with its connections"
+        findings.flaws.append(Flaw("road-link", "roads that lead to no junction", message, remedy, link.line))
+        return None
+
+    return replace(road, predecessor=sound(road.predecessor), successor=sound(road.successor))

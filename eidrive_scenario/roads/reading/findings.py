@@ -8,6 +8,7 @@ from typing import Literal, overload
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.roads.flaws import Flaw
 
 MOST = 100
 """Findings after which reading goes on in silence."""
@@ -27,11 +28,20 @@ class Findings:
     def __init__(self, source: str) -> None:
         self.source = source
         self.problems: list[Problem] = []
+        self.flaws: list[Flaw] = []
 
     def add(self, element: etree._Element | None, message: str, remedy: str) -> None:
         """Remember a problem at an element."""
+        self.tell(Problem(message, remedy, self.source, line_of(element)))
+
+    def tell(self, problem: Problem) -> None:
+        """Remember a problem."""
         if len(self.problems) < MOST:
-            self.problems.append(Problem(message, remedy, self.source, line_of(element)))
+            self.problems.append(problem)
+
+    def doubt(self, element: etree._Element, rule: str, kind: str, message: str, remedy: str) -> None:
+        """Remember what is against the standard, and is read all the same."""
+        self.flaws.append(Flaw(rule, kind, message, remedy, line_of(element)))
 
     @overload
     def number(self, element: etree._Element, name: str) -> float: ...

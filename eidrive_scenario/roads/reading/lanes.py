@@ -131,13 +131,17 @@ def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, f
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         for element in section.iterfind(f"{side}/lane"):
             number = findings.integer(element, "id")
-            if (number > 0) - (number < 0) != sign:
-                findings.add(
-                    element,
-                    f"lane {number} stands under <{side}>",
-                    "left lanes have ids above 0, the centre lane 0, right lanes below 0",
-                )
-            elif number in found:
+            wrong = (number > 0) - (number < 0) != sign
+            message = f"lane {number} stands under <{side}>"
+            remedy = "left lanes have ids above 0, the centre lane 0, right lanes below 0"
+            if wrong and number and sign:
+                # Its id is what links and positions name it by.
+                kind = "lanes under the wrong side"
+                findings.doubt(element, "lane-side", kind, f"{message}, and is taken by its id", remedy)
+            elif wrong:
+                findings.add(element, message, remedy)
+                continue
+            if number in found:
                 findings.add(element, f"lane {number} occurs twice in its section", "give each lane its own id")
             else:
                 found[number] = element

@@ -17,6 +17,8 @@ ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
     Rule("road-jump", Level.WARNING, "a road whose geometries do not join", road_file.doubts_about("road-jump")),
     Rule("road-kink", Level.WARNING, "a road that bends at a point", road_file.doubts_about("road-kink")),
     Rule("lane-width", Level.WARNING, "a lane without a width, or below 0", road_file.doubts_about("lane-width")),
+    Rule("lane-side", Level.WARNING, "a lane on the side of the others", road_file.doubts_about("lane-side")),
+    Rule("road-link", Level.WARNING, "a road that leads to no junction", road_file.doubts_about("road-link")),
     Rule("lane-link", Level.WARNING, "a lane that does not go on", road_file.doubts_about("lane-link")),
     Rule(
         "junction-connection",

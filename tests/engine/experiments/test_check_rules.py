@@ -80,7 +80,7 @@ IN_PLACE_OF = {
     "StartTrigger": "StartTrigger",
 }
 """What of the first event an example's element replaces."""
-OF_ROADS = {"planView", "lanes", "junction"}
+OF_ROADS = {"link", "planView", "lanes", "junction"}
 """Elements of the road file."""
 
 

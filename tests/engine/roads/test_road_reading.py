@@ -61,15 +61,50 @@ def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Te
     ]
 
 
-def test_lanes_that_stand_on_the_wrong_side_or_twice(road: Text, map_of: Text) -> None:
-    lane = '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
-    sides = f'<left>{lane}</left><center><lane id="0"/></center><right>{lane}{lane}</right>'
-    section = f'<laneSection s="0">{sides}</laneSection>'
-    found = problems(map_of(road(lanes=section)))
+def sides(*parts: str) -> str:
+    """A lane section whose lanes stand where these parts say."""
+    return f'<laneSection s="0">{"".join(parts)}</laneSection>'
+
+
+def one_lane(number: int) -> str:
+    return f'<lane id="{number}" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
+
+
+def test_lanes_that_occur_twice_or_are_no_centre(road: Text, map_of: Text) -> None:
+    centre, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
+    found = problems(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", centre, right))))
     assert [line.split(": ", 1)[1] for line in found] == [
-        "lane -1 stands under <left>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
+        "lane 0 stands under <left>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
+        "lane 1 stands under <center>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
         "lane -1 occurs twice in its section; give each lane its own id",
     ]
+
+
+def test_lanes_under_the_wrong_side_lie_where_their_ids_say(road: Text, map_of: Text) -> None:
+    left, right = f"<left>{one_lane(-1)}\n{one_lane(-2)}</left>", f"<right>{one_lane(1)}</right>"
+    text = map_of(road(lanes=sides(left, "<center/>", right)))
+    network = RoadNetwork.parse(text, "town.xodr")
+    assert [network.lane_pose_at("1", lane, 10.0).y for lane in (1, -1, -2)] == [1.5, -1.5, -4.5]
+    (doubt,) = network.doubts
+    assert doubt.rule == "lane-side"
+    assert str(doubt) == (
+        "town.xodr:1: lane -1 stands under <left>, and is taken by its id; "
+        "2 more of lanes under the wrong side: line 2, 2; left lanes have ids above 0, the centre lane 0, right lanes below 0"
+    )
+
+
+def test_a_road_that_leads_to_no_junction_ends_there(road: Text, map_of: Text) -> None:
+    network = RoadNetwork.parse(
+        map_of(road(link='<successor elementType="junction" elementId="7"/>'), road("2", y=50.0)), "town.xodr"
+    )
+    (doubt,) = network.doubts
+    assert doubt.rule == "road-link"
+    assert str(doubt) == (
+        "town.xodr:1: road '1' links to junction '7', which does not exist; "
+        "take the link out, or add the junction with its connections"
+    )
+    assert network.roads["1"].successor is None
+    assert network.advance(network.location("1", -1, 90.0), 20.0) is None
 
 
 def test_a_length_that_the_geometry_does_not_cover(road: Text, map_of: Text) -> None:

@@ -146,6 +146,9 @@ def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
     wrong = told(map_of(arm, inner, rest=junction("1", "2", '<laneLink from="-4" to="-1"/>')))
     what = "connection '0' of junction '9' links lane -4 of road '1', which it does not have there"
     assert wrong == [("junction-connection", what)]
+    against = map_of(arm, inner, rest=junction("1", "2", fitting)).replace('rule="RHT"', 'rule="LHT"')
+    what = "connection '0' of junction '9' leads against the traffic of the roads '1' and '2'"
+    assert told(against) == [("junction-connection", what)]
     elsewhere = road("3", y=50.0, lanes=section(0, lane(-1)))
     outside = {message for _, message in told(map_of(arm, inner, elsewhere, rest=junction("3", "3", fitting)))}
     assert "connection '0' of junction '9' comes from road '3', which does not end at the junction" in outside

@@ -1,0 +1,42 @@
+"""What is doubtful in a road file: single flaws, and how they are told.
+
+Real maps have many small flaws of one kind. So each kind is told once, with its first place and a count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from eidrive_scenario.errors import Problem
+
+SHOWN = 4
+"""Further lines that a finding names."""
+
+
+class Flaw(NamedTuple):
+    """One flaw: the rule that it breaks, what kind it is, what it is here, and what would be right."""
+
+    rule: str
+    kind: str
+    message: str
+    remedy: str
+    line: int | None
+
+
+def told(flaws: Iterable[Flaw], source: str) -> tuple[Problem, ...]:
+    """One finding for each kind of flaw, with its rule of `eidrive check`."""
+    kinds: dict[tuple[str, str], list[Flaw]] = {}
+    for flaw in flaws:
+        kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)
+    return tuple(_told(group, source) for group in kinds.values())
+
+
+def _told(flaws: list[Flaw], source: str) -> Problem:
+    first = flaws[0]
+    message = first.message
+    if len(flaws) > 1:
+        lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
+        more = ", …" if len(flaws) > 1 + SHOWN else ""
+        message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
+    return Problem(message, first.remedy, source, first.line, first.rule)
