@@ -89,7 +89,8 @@ def test_lanes_under_the_wrong_side_lie_where_their_ids_say(road: Text, map_of: 
     assert doubt.rule == "lane-side"
     assert str(doubt) == (
         "town.xodr:1: lane -1 stands under <left>, and is taken by its id; "
-        "2 more of lanes under the wrong side: line 2, 2; left lanes have ids above 0, the centre lane 0, right lanes below 0"
+        "2 more of lanes under the wrong side: line 2, 2; "
+        "left lanes have ids above 0, the centre lane 0, right lanes below 0"
     )
 
 
