@@ -12,6 +12,8 @@ from eidrive_scenario.roads.location import Array, Integers
 
 Piece = tuple[float, float, float, float, float]
 """Start s of the piece and its coefficients a, b, c, d; ds counts from that start."""
+ROUNDING = 1e-6
+"""A first piece that starts no later than this holds from 0 on [m]."""
 
 
 class Polynomials:
@@ -21,6 +23,8 @@ class Polynomials:
 
     def __init__(self, pieces: Iterable[Piece] = ()) -> None:
         ordered = sorted(pieces, key=lambda piece: piece[0])
+        if ordered and 0.0 < ordered[0][0] <= ROUNDING:
+            ordered[0] = (0.0, *ordered[0][1:])
         if not ordered or ordered[0][0] > 0.0:
             ordered.insert(0, (0.0, 0.0, 0.0, 0.0, 0.0))
         self.pieces: list[Piece] = ordered

@@ -21,6 +21,13 @@ def test_a_function_is_zero_before_its_first_piece() -> None:
     assert not late.is_constant
 
 
+def test_a_first_piece_that_starts_at_0_but_for_rounding_holds_from_0_on() -> None:
+    rounded = Polynomials([(1e-12, 2.0, 0.5, 0.0, 0.0)])
+    table = PolynomialTable([STEPS, rounded], [20.0, 20.0])
+    assert rounded.value(0.0) == 2.0
+    assert table.value(np.array([1]), np.array([0.0])) == pytest.approx([2.0])
+
+
 def test_a_shifted_function_is_the_same_seen_from_another_origin() -> None:
     shifted = STEPS.shifted(7.0)
     for s in (0.0, 2.9, 3.0, 6.0):
