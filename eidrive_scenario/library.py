@@ -11,7 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 
 Kind = Literal["channels", "weather"]
-Definition = Literal["scenario", "catalog", "distribution", "unreadable", "other"]
+Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable", "other"]
 
 _SUFFIX = ".xosc"
 
@@ -99,7 +99,7 @@ def _is_file(path: Path) -> bool:
 def definition(path: Path) -> Definition:
     """What an OpenSCENARIO file defines, by its first elements, read without entities and network.
 
-    `other` is XML that is not OpenSCENARIO; `unreadable` is no XML before that could be told.
+    `roads` is OpenDRIVE, `other` any other XML; `unreadable` is no XML before that could be told.
     """
     kinds: dict[str, Definition] = {
         "Catalog": "catalog",
@@ -120,7 +120,7 @@ def definition(path: Path) -> Definition:
                 depth += 1
                 word = etree.QName(element).localname if isinstance(element.tag, str) else ""
                 if depth == 1 and word != "OpenSCENARIO":
-                    return "other"
+                    return "roads" if word == "OpenDRIVE" else "other"
                 if depth == 2 and word in kinds:
                     return kinds[word]
     except (OSError, etree.XMLSyntaxError):

@@ -14,6 +14,7 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import definition, resolve_scenario
 
 _SUFFIX = ".xosc"
+_ROADS = ".xodr"
 
 
 def check(
@@ -24,12 +25,12 @@ def check(
         list[str] | None, typer.Option(metavar="RULE", help="A rule to leave out; repeatable.", show_default="none")
     ] = None,
 ) -> None:
-    """Print every mistake in scenarios and distributions as `file:line: what is wrong; what would be right`.
+    """Print every mistake in scenarios, distributions and roads as `file:line: what is wrong; what would be right`.
 
     Findings end with the rule that made them: `eidrive list checks` names all rules.
     """
     from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
-    from eidrive_scenario.experiments.inspection import inspect_scenario
+    from eidrive_scenario.experiments.inspection import inspect_roads, inspect_scenario
 
     missing: list[Problem] = []
     broken: list[Exception] = []
@@ -43,7 +44,10 @@ def check(
             if kind == "catalog":
                 typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
                 continue
-            findings = (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
+            if kind == "roads" or path.suffix == _ROADS:
+                findings = inspect_roads(path, ignored)
+            else:
+                findings = (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
         except InputError:
             raise
         except Exception as error:
@@ -75,7 +79,10 @@ def _mark(level: str, rule: str) -> str:
 
 
 def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
-    """The files that are meant; what is not there goes to `missing` and keeps no other from being checked."""
+    """The files that are meant; what is not there goes to `missing` and keeps no other from being checked.
+
+    A folder stands for its scenarios, which are checked with their roads; one without any for its road files.
+    """
     for given in paths:
         if not given or not os.path.isdir(given):
             try:
@@ -83,9 +90,9 @@ def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
             except InputError as error:
                 missing += error.problems
             continue
-        inside = sorted(Path(given).rglob(f"*{_SUFFIX}"))
+        inside = sorted(Path(given).rglob(f"*{_SUFFIX}")) or sorted(Path(given).rglob(f"*{_ROADS}"))
         if not inside:
-            missing.append(Problem(f"no {_SUFFIX} file in {given!r}", "give another folder"))
+            missing.append(Problem(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
         yield from inside
 
 

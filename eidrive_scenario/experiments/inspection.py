@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from eidrive_scenario.errors import InputError, Problem
-from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.experiments.rules import broken_rules, check_names
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.openscenario.findings import in_order
 from eidrive_scenario.openscenario.lint import Level
 from eidrive_scenario.recording.criteria_text import unbuilt_criteria
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import Simulation
 
 
@@ -46,3 +48,17 @@ def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
         found[Level.ERROR] += [problem for problem in error.problems if problem not in known]
     problems, warnings, notes = (tuple(in_order(problems)) for problems in found.values())
     return Findings(problems, warnings, notes=notes)
+
+
+def inspect_roads(path: Path, ignored: Collection[str] = ()) -> Findings:
+    """Read an OpenDRIVE file: what keeps it from being read, and what its roads have against themselves.
+
+    `ignored` are the names of rules that are left out. Raises SettingError for an unknown name.
+    """
+    check_names(ignored)
+    try:
+        roads = RoadNetwork.load(path)
+    except InputError as error:
+        return Findings(error.problems)
+    doubts = [problem for problem in roads.doubts if problem.rule not in ignored]
+    return Findings((), tuple(sorted(doubts, key=lambda problem: problem.line or 0)))

@@ -22,10 +22,7 @@ def broken_rules(
     `load` reads the road file; who asks about many scenarios on one map may keep it. Raises SettingError if a rule is
     to be ignored that does not exist.
     """
-    known = {rule.name for rule in ALL_RULES}
-    for name in ignored:
-        if name not in known:
-            raise SettingError(Problem(f"there is no rule {name!r}", suggestion(name, known)))
+    check_names(ignored)
     chosen = ALL_RULES
     roads = None
     try:
@@ -37,3 +34,11 @@ def broken_rules(
         if rule.name not in ignored:
             for problem in rule.findings(survey):
                 yield rule.level, problem
+
+
+def check_names(ignored: Collection[str]) -> None:
+    """Raises SettingError if a rule is to be ignored that does not exist."""
+    known = {rule.name for rule in ALL_RULES}
+    for name in ignored:
+        if name not in known:
+            raise SettingError(Problem(f"there is no rule {name!r}", suggestion(name, known)))

@@ -62,7 +62,7 @@ def test_profiles(own_library: Path) -> None:
         (f"{OPENING}<ParameterDeclarations/><CatalogLocations/><RoadNetwork/>", "scenario"),
         (f"{OPENING}<Catalog name='c'/></OpenSCENARIO>", "catalog"),
         (f"{OPENING}<ParameterValueDistribution/></OpenSCENARIO>", "distribution"),
-        ("<OpenDRIVE/>", "other"),
+        ("<OpenDRIVE/>", "roads"),
         ("<OpenSCENARIO><FileHeader>", "unreadable"),
         ("no XML", "unreadable"),
         (f'<!DOCTYPE a [<!ENTITY e SYSTEM "file:///etc/hostname">]>{OPENING}<Storyboard>&e;</Storyboard>', "scenario"),

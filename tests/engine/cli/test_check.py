@@ -62,14 +62,42 @@ def test_what_is_not_there_keeps_nothing_from_being_checked(eidrive: Eidrive, pa
     assert result.exit_code == 2
     first, second, count = result.stdout.splitlines()
     assert "missing.xosc': neither a file nor in the library" in first
-    assert second.startswith("no .xosc file in")
+    assert second.startswith("no .xosc or .xodr file in")
     assert count == "1 file, 2 problems, 0 warnings"
 
 
 def test_a_folder_without_scenarios(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("check", tmp_path)
     assert result.exit_code == 2
-    assert "no .xosc file in" in result.stdout
+    assert "no .xosc or .xodr file in" in result.stdout
+
+
+ROADS = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+<road id="1" length="100" junction="-1">{}<planView>
+<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView>
+<lanes><laneSection s="0"><center><lane id="0"/></center><right><lane id="-1" type="driving">
+<width sOffset="0" a="{}" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road></OpenDRIVE>"""
+DEAD_END = '<link><successor elementType="junction" elementId="4"/></link>'
+
+
+def test_road_files(eidrive: Eidrive, tmp_path: Path) -> None:
+    for name, link, width in (("sound", "", "3"), ("doubtful", DEAD_END, "3"), ("wrong", "", "wide")):
+        (tmp_path / f"{name}.xodr").write_text(ROADS.format(link, width), encoding="utf-8")
+    (tmp_path / "broken.xodr").write_text("<OpenDRIVE>\n<road></OpenDRIVE>", encoding="utf-8")
+    result = eidrive("check", tmp_path)
+    assert result.exit_code == 2
+    broken, doubtful, wrong, count = result.stdout.splitlines()
+    assert broken.startswith(f"{tmp_path}/broken.xodr:2: not well-formed XML: ")
+    assert doubtful == (
+        f"{tmp_path}/doubtful.xodr:2: road '1' links to junction '4', which does not exist; "
+        "take the link out, or add the junction with its connections (warning: road-link)"
+    )
+    assert wrong == f"{tmp_path}/wrong.xodr:5: <width> has a='wide'; give a finite number"
+    assert count == "4 files, 2 problems, 1 warning"
+    doubtful = tmp_path / "doubtful.xodr"
+    assert eidrive("check", doubtful).exit_code == 0
+    assert eidrive("check", "--strict", doubtful).exit_code == 2
+    assert eidrive("check", "--strict", "--ignore", "road-link", doubtful).stdout == "1 file, 0 problems, 0 warnings\n"
 
 
 UNUSED = (
