@@ -40,12 +40,14 @@ class Document:
     name    what messages call it
     path    where it lies; None where it was handed in otherwise
     folder  what its relative paths start from
+    text    what it was parsed from, where there is no file to read again
     """
 
     root: etree._Element
     name: str
     path: Path | None
     folder: Path
+    text: bytes | None = None
 
 
 class _PrologEnds(Exception):
@@ -55,7 +57,7 @@ class _PrologEnds(Exception):
 def open_document(source: Source) -> Document:
     """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
     if isinstance(source, bytes):
-        return Document(parse(source, "<bytes>"), "<bytes>", None, Path())
+        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source)
     if not isinstance(source, str | Path):
         return _from_tree(source)
     path = Path(source)
@@ -93,7 +95,8 @@ def _from_tree(source: Any) -> Document:
         what = "this is neither a path nor XML"
         remedy = "give a path, bytes, an XML tree, or an object with get_element()"
         raise ScenarioError(Problem(what, remedy, name))
-    return Document(parse(_as_written(root, name), name), name, None, Path())
+    text = _as_written(root, name)
+    return Document(parse(text, name), name, None, Path(), text)
 
 
 def _as_written(root: ElementTree.Element, name: str) -> bytes:

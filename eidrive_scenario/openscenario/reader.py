@@ -23,7 +23,7 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.openscenario.parameters import REFERENCE, Assignment, Parameter, Scope, declare
 from eidrive_scenario.openscenario.parsing import line_of
-from eidrive_scenario.openscenario.scalars import STRING, Version, availability
+from eidrive_scenario.openscenario.scalars import DOUBLE, STRING, Version, availability
 from eidrive_scenario.openscenario.schema import AttributeRule, Rules, rules
 from eidrive_scenario.openscenario.structure import check_children
 
@@ -31,6 +31,7 @@ _SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
 _IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
 _MAY_BE_EMPTY = (Action, ObjectController)
 """An action that does nothing, an object without controller."""
+_INFINITE = ("inf", "-inf")
 _WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
 _WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
 
@@ -131,7 +132,10 @@ class Reader:
                 self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
         except ValueError as error:
             if text == "None" and not rule.required:
-                self._written_none(name, node)
+                self._by_python(name, node, text, "as Python writes what is missing; it is taken so", "leave it out")
+            elif text in _INFINITE and rule.scalar is DOUBLE:
+                value = float(text)
+                self._by_python(name, node, text, "as Python writes infinity; it is taken so", f"write {text.upper()}")
             else:
                 self._error(f"{name} of {node.tag} is {text!r}, which is not {rule.scalar.name}", str(error), node)
         if rule.deprecated:
@@ -246,10 +250,10 @@ class Reader:
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(FoundReference(reference, kinds) for reference in references)
 
-    def _written_none(self, name: str, node: etree._Element) -> None:
-        """Python programs write None for what is missing; scenariogeneration 0.16 does so in LaneOffsetActions."""
-        message = f"{name} of {node.tag} is 'None', as Python writes what is missing; it is taken as missing"
-        self.findings.warn(message, "leave it out", source=self.source, line=line_of(node))
+    def _by_python(self, name: str, node: etree._Element, text: str, what: str, remedy: str) -> None:
+        """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
+        message = f"{name} of {node.tag} is {text!r}, {what}"
+        self.findings.warn(message, remedy, source=self.source, line=line_of(node))
 
     def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
         self.findings.warn(f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node))

@@ -28,12 +28,17 @@ def find_road_file(network: RoadNetwork | None, folder: Path, findings: Findings
         if candidate.is_file():
             return candidate
     findings.error(
-        f"no road file '{logic.filepath}' beside the scenario nor in the folders of {MAPS}",
+        f"no road file '{logic.filepath}' {_from(folder)} nor in the folders of {MAPS}",
         _remedy(logic, folder),
         source=logic.source,
         line=logic.line,
     )
     return None
+
+
+def _from(folder: Path) -> str:
+    """Where its path starts from; a scenario without a file has the current folder."""
+    return "in the current folder" if folder == Path() else "beside the scenario"
 
 
 def _candidates(logic: File, folder: Path) -> Iterator[Path]:

@@ -20,6 +20,7 @@ from eidrive_scenario.openscenario.model import (
     LongitudinalDistanceAction,
     Nurbs,
     OpenScenario,
+    Orientation,
     Polyline,
     RelativeLanePosition,
     Timing,
@@ -28,6 +29,8 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.names import check_names
 from eidrive_scenario.openscenario.numbers import unusable
 from eidrive_scenario.openscenario.scalars import Version
+
+_NOTHING_SAID = Orientation()
 
 
 def check_rules(
@@ -41,6 +44,10 @@ def check_rules(
         message = unusable(element, version) or (check(element) if check else "")
         if message and (element.source, element.line) not in flawed:
             findings.error(message, source=element.source, line=element.line)
+        if isinstance(element, Orientation) and element == _NOTHING_SAID:
+            what = "Orientation says nothing, which by the standard means the heading 0 of the world"
+            remedy = 'leave it out, or write type="relative", to look along the road'
+            findings.warn(what, remedy, source=element.source, line=element.line)
     check_names(root, elements, version, entries, findings)
 
 

@@ -50,6 +50,7 @@ class Scenario:
     external     those entities that another tool defines: `entities` has a body of no size for them
     controllers  of each entity, in the order of the file; catalog references resolved
     road_file    None if the scenario names none
+    text         of a scenario that came without a file
     warnings     what the file's version of the standard deprecates
     """
 
@@ -65,6 +66,7 @@ class Scenario:
     warnings: tuple[Problem, ...]
     external: Mapping[str, ExternalObjectReference]
     entries: Mapping[CatalogReference, Element] = field(repr=False)
+    text: bytes | None = field(repr=False, default=None)
 
     @property
     def storyboard(self) -> Storyboard:
@@ -118,6 +120,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         road_file=road_file,
         warnings=warnings,
         entries=library.entries,
+        text=document.text,
     )
 
 

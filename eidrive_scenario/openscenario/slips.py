@@ -77,7 +77,25 @@ def _intensity(node: etree._Element) -> None:
     node.set("intensity", str(node.attrib.pop("illuminance")))
 
 
+def _maneuver_first(node: etree._Element) -> bool:
+    tags = [child.tag for child in node.iterchildren("Maneuver", "CatalogReference")]
+    return tags != sorted(tags)
+
+
+def _catalog_references_first(node: etree._Element) -> None:
+    first = next(node.iterchildren("Maneuver"))
+    for reference in list(node.iterchildren("CatalogReference")):
+        first.addprevious(reference)
+
+
 SLIPS = (
+    Slip(
+        "ManeuverGroup",
+        "a CatalogReference stands behind a Maneuver in ManeuverGroup",
+        "put CatalogReferences first; other tools may refuse it",
+        _maneuver_first,
+        _catalog_references_first,
+    ),
     Slip(
         "LightStateAction",
         "LightState stands before LightType in LightStateAction",

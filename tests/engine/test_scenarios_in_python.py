@@ -169,6 +169,10 @@ def test_what_is_no_scenario_is_refused() -> None:
 def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
     findings = inspect_scenario(cut_in())
     assert (findings.problems, findings.warnings) == ((), ())
+    scenario = cut_in()
+    scenario.parameters.add_parameter(xosc.Parameter("Speed", xosc.ParameterType.double, "3"))
+    (unused,) = inspect_scenario(scenario).warnings
+    assert str(unused).startswith("<Scenario>:5: the parameter 'Speed' is never used")
     (problem,) = inspect_scenario(cut_in(changing="Taget")).problems
     assert "did you mean 'Target'?" in problem.remedy
 

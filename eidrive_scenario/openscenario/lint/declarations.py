@@ -42,7 +42,7 @@ def unused_parameters(survey: Survey) -> Iterator[Problem]:
                 yield Problem(
                     f"the parameter {name!r} is never used",
                     f"take it out, or write ${name} where its value belongs",
-                    str(survey.scenario.path),
+                    survey.scenario.document.source,
                     cast("int | None", declaration.sourceline),
                 )
 
@@ -99,15 +99,16 @@ def unused_selections(survey: Survey) -> Iterator[Problem]:
 def unused_catalogs(survey: Survey) -> Iterator[Problem]:
     """A place for catalogs from which no entry is taken."""
     locations, path = survey.scenario.document.catalog_locations, survey.scenario.path
-    if locations is None or path is None:
+    if locations is None:
         return
+    folder = path.parent if path is not None else Path()
     used = {Path(entry.source).resolve() for entry in survey.scenario.entries.values()}
     for location in locations.children():
         kind = type(location).__name__.removesuffix("Location")
         directory = getattr(location, "directory", None)
         if directory is None:
             continue
-        place = (path.parent / Path(directory.path.replace("\\", "/"))).resolve()
+        place = (folder / Path(directory.path.replace("\\", "/"))).resolve()
         if not any(file == place or file.parent == place for file in used):
             gone = "" if place.exists() else ", which is not there,"
             yield at(location, f"nothing is taken from the {kind} {directory.path!r}{gone}".rstrip(","), "take it out")

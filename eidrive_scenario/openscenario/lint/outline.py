@@ -209,11 +209,12 @@ class Outline:
 
     @cached_property
     def files(self) -> tuple[etree._Element, ...]:
-        """The file as it is written, with `$` and all, then the catalogs that it uses; () where it came without one."""
-        if self.scenario.path is None:
+        """The scenario as it is written, with `$` and all, then the catalogs that it uses; () where it has no text."""
+        scenario = self.scenario.path or self.scenario.text
+        if scenario is None:
             return ()
         catalogs = dict.fromkeys(entry.source for entry in self.scenario.entries.values())
-        return tuple(open_document(path).root for path in (self.scenario.path, *map(Path, catalogs)))
+        return tuple(open_document(source).root for source in (scenario, *map(Path, catalogs)))
 
 
 def _places(action: PrivateAction) -> bool:

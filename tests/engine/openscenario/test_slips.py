@@ -1,5 +1,6 @@
 """What programs write that the schema refuses, and that can mean one thing only: read, with a warning."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -9,7 +10,14 @@ from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.openscenario.model import LightMode, LightStateAction, Phase, Sun
+from eidrive_scenario.openscenario.model import (
+    LaneOffsetActionDynamics,
+    LightMode,
+    LightStateAction,
+    ManeuverGroup,
+    Phase,
+    Sun,
+)
 
 Build = Callable[..., bytes]
 Kind = TypeVar("Kind")
@@ -27,6 +35,14 @@ OFFSET = """<Private entityRef="Ego"><PrivateAction><LateralAction><LaneOffsetAc
 <LaneOffsetActionDynamics maxLateralAcc="None" dynamicsShape="{shape}"/>
 <LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
 </PrivateAction></Private>"""
+MIXED = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"/><Maneuver name="m"><Event name="e" priority="parallel">
+<Action name="x"><UserDefinedAction><CustomCommandAction type="x"/></UserDefinedAction></Action></Event></Maneuver>
+<CatalogReference catalogName="ways" entryName="from the shelf"/></ManeuverGroup></Act></Story>"""
+SHELF = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="" author=""/>
+<Catalog name="ways"><Maneuver name="from the shelf"><Event name="e2" priority="parallel"><Action name="x">
+<UserDefinedAction><CustomCommandAction type="x"/></UserDefinedAction></Action></Event></Maneuver></Catalog>
+</OpenSCENARIO>"""
 BARE = """<GlobalAction><Environment name="e"/></GlobalAction>"""
 
 
@@ -80,6 +96,31 @@ def test_a_catalog_too(scenario_xml: Build, tmp_path: Path) -> None:
     assert next(one.intensity for one in entry.walk() if isinstance(one, Sun)) == 1000.0
     (warning,) = [one for one in scenario.warnings if "illuminance" in one.message]
     assert (warning.source, warning.line) == (str(tmp_path / "skies.xosc"), 3)
+
+
+def test_a_maneuver_may_stand_before_one_of_a_catalog(scenario_xml: Build, tmp_path: Path) -> None:
+    (tmp_path / "ways.xosc").write_text(SHELF)
+    place = f'<ManeuverCatalog><Directory path="{tmp_path}"/></ManeuverCatalog>'
+    scenario = load_scenario(scenario_xml(catalogs=place, story=MIXED))
+    group = only(scenario, ManeuverGroup)
+    assert (len(group.catalog_reference), len(group.maneuver)) == (1, 1)
+    assert "put CatalogReferences first" in str(scenario.warnings[0])
+
+
+def test_infinity_as_python_writes_it(scenario_xml: Build) -> None:
+    scenario = load_scenario(scenario_xml(init=OFFSET.format(continuous="true", shape="step").replace("None", "inf")))
+    assert only(scenario, LaneOffsetActionDynamics).max_lateral_acc == math.inf
+    assert "is 'inf', as Python writes infinity; it is taken so; write INF" in str(scenario.warnings[0])
+
+
+def test_an_orientation_that_says_nothing_is_told(scenario_xml: Build) -> None:
+    """By the standard the type is absolute and the heading 0; scenariogeneration writes it where none was given."""
+    relative = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
+    action = '<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
+    end = "</PrivateAction></Private>"
+    (warning,) = load_scenario(scenario_xml(init=action.format(relative.format(""), end))).warnings
+    assert "the heading 0 of the world" in str(warning)
+    assert load_scenario(scenario_xml(init=action.format(relative.format('type="relative"'), end))).warnings == ()
 
 
 def test_none_is_what_is_missing_where_it_may_be_missing(scenario_xml: Build) -> None:
