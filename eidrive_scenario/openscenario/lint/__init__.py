@@ -42,7 +42,7 @@ RULES: tuple[Rule[Survey], ...] = (
     Rule("conflicting-actions", Level.WARNING, "actions of one event that end each other", actions.conflicting_actions),
     Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.too_fast),
     Rule("no-progress", Level.NOTE, "a transition at the rate 0", actions.no_progress),
-    Rule("untimed-trajectory", Level.WARNING, "times that are missing or go back", actions.untimed_trajectories),
+    Rule("untimed-trajectory", Level.WARNING, "times that are missing or all the same", actions.untimed_trajectories),
     Rule("unread-parameter", Level.WARNING, "a parameter set for nobody", declarations.unread_parameters),
     Rule("unused-parameter", Level.WARNING, "a parameter that nothing uses", declarations.unused_parameters),
     Rule("unused-variable", Level.WARNING, "a variable that nothing uses", declarations.unused_variables),

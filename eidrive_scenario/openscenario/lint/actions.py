@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import combinations, pairwise
+from itertools import combinations
 
 from eidrive_scenario.errors import Problem
 from eidrive_scenario.openscenario.lint.endless import at_once, stands_still
@@ -109,7 +109,7 @@ def no_progress(survey: Survey) -> Iterator[Problem]:
 
 
 def untimed_trajectories(survey: Survey) -> Iterator[Problem]:
-    """Times that count, and are not there or not in order."""
+    """Times that count, and are not there or all the same."""
     for element in survey.elements:
         if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
@@ -126,9 +126,6 @@ def _times(shape: Polyline) -> Iterator[Problem]:
     known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
     if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
         yield at(shape, f"all its vertices have the time {known[0]:g} s", "say when each vertex is passed")
-    for one, after in pairwise(shape.vertex):
-        if one.time is not None and after.time is not None and after.time < one.time:
-            yield at(after, f"the time {after.time:g} s comes after {one.time:g} s", "let the times ascend")
 
 
 def _trajectory(action: FollowTrajectoryAction, survey: Survey) -> Trajectory | None:
