@@ -53,6 +53,9 @@ class InitBlock(Composite):
 
     def displace(self, behaviour: Holder, why: str) -> None:
         """A younger action took the domain."""
+        for held in self.running:
+            if held is behaviour:
+                held.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
 
     def tick(self) -> Iterator[Behaviour]:

@@ -19,7 +19,7 @@ from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import GivenPose, Stage
 from eidrive_scenario.storyboard.stand_in import left_alone, stand_ins
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind
+from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind, refuse_circles
 from eidrive_scenario.world.view import WorldView
 
 STOPPED = "stop trigger"
@@ -50,6 +50,7 @@ class Storyboard:
         self.init, self.root = builder.build()
         for name, actor in self.stage.actors.items():
             actor.trailer = declared_trailer(scenario.entities[name])
+        refuse_circles(self.stage.actors)
         self._external = ExternalObjects(scenario, roads)
         self.stage.warnings += self._external.warnings
         self._stand_ins = stand_ins(self.stage.actors, self.stage, controllers or {}, registry("controllers"))

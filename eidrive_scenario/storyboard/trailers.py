@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.actor import Actor
@@ -20,15 +21,35 @@ def declared_trailer(entity: model.Element) -> str | None:
 
 
 def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
-    """Drawing and drawn actors, from the front of each train to its end."""
+    """Drawing and drawn actors, from the front of each train to its end; each is drawn by one, the first that does."""
     drawn = {actor.trailer for actor in actors.values() if actor.trailer is not None}
     if not drawn:
         return
+    hitched: set[str] = set()
     for name, front in actors.items():
         actor = front
-        while name not in drawn and actor.trailer is not None and actor.trailer in actors:
-            yield actor, actors[actor.trailer]
+        while name not in drawn and actor.trailer is not None and actor.trailer not in hitched:
+            back = actors.get(actor.trailer)
+            if back is None:
+                break
+            hitched.add(back.name)
+            yield actor, back
+            actor = back
+
+
+def refuse_circles(actors: Mapping[str, Actor]) -> None:
+    """Raises ScenarioError for those that draw themselves, directly or over others."""
+    problems = []
+    for name, actor in actors.items():
+        train: list[str] = []
+        while actor.trailer is not None and actor.trailer in actors and actor.trailer not in train:
+            train.append(actor.trailer)
             actor = actors[actor.trailer]
+        if name in train:
+            where = actors[name].entity
+            problems.append(Problem(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
+    if problems:
+        raise ScenarioError(problems)
 
 
 def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:

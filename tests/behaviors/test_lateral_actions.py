@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from street_scene import after
 
 from eidrive_scenario.errors import ScenarioError
 
@@ -248,3 +249,17 @@ def test_a_distance_in_the_own_frame_does_not_make_the_actor_swing(scene: Any) -
     played = scene(5, ("Ego", action), ego=(-1, 100.0, 20.0), other=(1, 100.0, -20.0))
     assert [row["Ego"].y for row in played.rows[1:]] == pytest.approx([played.at(0.0, "Other").y - 4.5] * 50)
     assert [row["Ego"].yaw for row in played.rows[2:]] == pytest.approx([0.0] * 49, abs=1e-6)
+
+
+def test_an_action_of_init_that_a_younger_one_ends_leaves_its_trajectory(run: Any) -> None:
+    """From then on there is none along which a condition could measure."""
+    followed: dict[float, bool] = {}
+
+    def look(simulation: Any, frame: Any) -> None:
+        followed[round(frame.view.time, 3)] = simulation.storyboard.stage.actors["Ego"].trajectory is not None
+
+    aside = offset('<AbsoluteTargetLaneOffset value="1"/>')
+    init = f'<Private entityRef="Ego">{trajectory(CORNER, "<None/>")}</Private>'
+    run(1, ("Ego", aside, after(0.45)), driven=False, init=init, during=look)
+    assert followed[0.4]
+    assert not followed[0.6]

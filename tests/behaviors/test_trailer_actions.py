@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from street_scene import after, everywhere, private
 
+from eidrive_scenario.errors import InputError
+
 BODY = """<BoundingBox><Center x="{middle}" y="0" z="1"/><Dimensions width="2" length="4" height="2"/></BoundingBox>
   <Performance maxSpeed="30" maxAcceleration="5" maxDeceleration="8"/>
   <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.8" positionX="3" positionZ="0.3"/>
@@ -68,3 +70,29 @@ def test_the_bar_always_ends_at_the_hitch(run: Any) -> None:
         bent = max(bent, abs(yaw - turn))
     assert bent > 0.05
     assert played.frames[-1].view.position[played.frames[-1].view.row("Trailer"), 1] == pytest.approx(-6.0, abs=0.05)
+
+
+def link(name: str, trailer: str = "") -> str:
+    """One of a train that can draw and be drawn."""
+    drawn = f'<Trailer><TrailerRef entityRef="{trailer}"/></Trailer>' if trailer else ""
+    return f"""<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="trailer">{BODY.format(middle=1.5)}
+      <TrailerHitch dx="-1"/><TrailerCoupler dx="3"/>{drawn}</Vehicle></ScenarioObject>"""
+
+
+def test_who_is_a_trailer_of_itself_is_refused(run: Any) -> None:
+    """Front draws A, A draws B, and B draws A."""
+    train = link("Front", "A") + link("A", "B") + link("B", "A")
+    with pytest.raises(InputError) as caught:
+        run(1, driven=False, more=train, globally=everywhere(PLACE.format("Front", 200)))
+    messages = [problem.message for problem in caught.value.problems]
+    assert messages == ["'A' is a trailer of itself", "'B' is a trailer of itself"]
+
+
+def test_what_two_draw_follows_the_first_of_them(run: Any) -> None:
+    """Also once it draws the second one itself."""
+    train = link("First", "A") + link("Second", "A") + link("A")
+    placed = everywhere(PLACE.format("First", 200)) + everywhere(PLACE.format("Second", 192))
+    couple = COUPLE.replace('Trailer"', 'Second"')
+    played = run(1, ("A", couple, after(0.5)), driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
+    assert played.x("A") == pytest.approx([196.0] * len(played.frames))
+    assert played.x("Second") == pytest.approx([192.0] * len(played.frames))
