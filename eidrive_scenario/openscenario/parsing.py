@@ -85,7 +85,7 @@ def _from_tree(source: Any) -> Document:
     name = f"<{type(source).__name__}>"
     root = source
     if hasattr(root, "get_element"):
-        root = root.get_element()
+        root = _element_of(root, name)
     if hasattr(root, "getroot"):
         root = root.getroot()
     if isinstance(root, etree._Element):
@@ -97,6 +97,15 @@ def _from_tree(source: Any) -> Document:
         raise ScenarioError(Problem(what, remedy, name))
     text = _as_written(root, name)
     return Document(parse(text, name), name, None, Path(), text)
+
+
+def _element_of(source: WrittenInPython, name: str) -> Any:
+    """Its root element. Raises ScenarioError where the library that made it finds something wrong by now."""
+    try:
+        return source.get_element()
+    except Exception as error:  # of whichever library that is: scenariogeneration raises what its versions do not have
+        what = f"get_element() gives no XML: {error} ({type(error).__name__})"
+        raise ScenarioError(Problem(what, "write_xml would fail alike; mend what it names", name)) from error
 
 
 def _as_written(root: ElementTree.Element, name: str) -> bytes:

@@ -13,7 +13,7 @@ from scenariogeneration import xodr, xosc
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.experiments.inspection import inspect_scenario
 from eidrive_scenario.experiments.single_run import play
-from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
@@ -157,6 +157,16 @@ def test_attributes_that_are_none_are_not_there(cut_in: Build) -> None:
     assert (run.end, run.simulated_s) == ("stop trigger", 0.0)
 
 
+def test_what_the_library_refuses_to_write_is_no_traceback(cut_in: Build) -> None:
+    scenario = cut_in()
+    scenario.header.setVersion(minor=1)  # the library's version is one for all: that of the object made last
+    try:
+        with pytest.raises(ScenarioError, match=r"<Scenario>: get_element\(\) gives no XML: Priority.override is"):
+            load_scenario(scenario)
+    finally:
+        scenario.header.setVersion(minor=3)
+
+
 def test_what_is_no_scenario_is_refused() -> None:
     with pytest.raises(ScenarioError, match="<int>: this is neither a path nor XML; give a path, bytes"):
         load_scenario(5)  # type: ignore[arg-type]
@@ -175,6 +185,24 @@ def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
     assert str(unused).startswith("<Scenario>:5: the parameter 'Speed' is never used")
     (problem,) = inspect_scenario(cut_in(changing="Taget")).problems
     assert "did you mean 'Target'?" in problem.remedy
+
+
+def test_a_distribution_over_it(cut_in: Build) -> None:
+    scenario = cut_in()
+    scenario.parameters.add_parameter(xosc.Parameter("Speed", xosc.ParameterType.double, "15"))
+    init = scenario.storyboard.init
+    init.add_init_action("Ego", xosc.AbsoluteSpeedAction("$Speed", STEP))
+    speeds = xosc.DistributionSet()
+    speeds.add_value("10")
+    speeds.add_value("12")
+    deterministic = xosc.Deterministic()
+    deterministic.add_single_distribution("Speed", speeds)
+    given = xosc.ParameterValueDistribution("speeds", "nobody", "never_written.xosc", deterministic)
+    runs = load_distribution(given)
+    assert "no scenario 'never_written.xosc'" in str(runs.warnings[0])
+    played = [run_file(scenario, settings=RunSettings(parameters=run.assignments)) for run in runs]
+    assert [run.parameters["Speed"] for run in played] == ["10", "12"]
+    assert played[0].trace_hash != played[1].trace_hash
 
 
 def test_a_record_of_it_has_its_text(cut_in: Build, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import overload
@@ -95,7 +95,8 @@ def load_distribution(source: Source, *, seed: float = 0) -> Unfolding:
 
     seed    of the draws where a stochastic distribution names no randomSeed itself
 
-    The scenario's path counts from the folder of the distribution. The scenario itself is not read: whether it has
+    The scenario's path counts from the folder of the distribution; where that is no file, as in Python, it need not
+    be there, which is a warning: its runs are those of any scenario. The scenario itself is not read: whether it has
     the parameters, and whether their constraints allow the values, comes out when a run is loaded.
     Raises ScenarioError with everything that is wrong with the file, each as file:line.
     """
@@ -107,7 +108,8 @@ def load_distribution(source: Source, *, seed: float = 0) -> Unfolding:
         findings.settle()
         raise ScenarioError(_other_kind(read.root if read else None, document.name))
     varied = _varied(distribution, seed, findings)
-    scenario = _scenario_file(distribution.scenario_file, document.folder, findings)
+    report = findings.error if document.path is not None else findings.warn
+    scenario = _scenario_file(distribution.scenario_file, document.folder, report)
     return Unfolding(document.name, scenario, varied, findings.settle())
 
 
@@ -118,11 +120,11 @@ def _varied(distribution: ParameterValueDistribution, seed: float, findings: Fin
     return combinations_of(distribution.deterministic, findings)
 
 
-def _scenario_file(given: File, folder: Path, findings: Findings) -> Path:
+def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Path:
     path = folder / PurePosixPath(given.filepath.strip().replace("\\", "/"))
     if not path.is_file():
         beside = path.parent.glob("*.xosc") if path.parent.is_dir() else ()
-        findings.error(
+        report(
             f"no scenario {given.filepath!r}",
             suggestion(path.stem, {file.stem for file in beside}),
             source=given.source,
