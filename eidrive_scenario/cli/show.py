@@ -82,7 +82,7 @@ def view(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """Write a recorded run as an HTML replay."""
-    from eidrive_scenario.experiments.single_run import recording_in
+    from eidrive_scenario.experiments.single_run import recording_in, result_of
     from eidrive_scenario.recording import read_recording
     from eidrive_scenario.recording.output import PARTIAL
     from eidrive_scenario.reporting.replay import write_replay
@@ -90,7 +90,7 @@ def view(
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
     check_places({"--out": page}, [path])
-    write_replay(read_recording(path), page)
+    write_replay(read_recording(path), page, result_of(path))
     if path.stem.endswith(PARTIAL):
         typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)
     typer.echo(str(page))

@@ -133,6 +133,15 @@ def recording_in(place: Path) -> Path:
     raise InputError(Problem(f"no {RECORDING} in this folder", remedy, str(place)))
 
 
+def result_of(recording: Path) -> dict[str, Any] | None:
+    """What the run came to whose recording this is, or None where nobody wrote that down beside it.
+
+    Raises InputError for a file that is no result.
+    """
+    beside = recording.with_name(RESULT)
+    return read_results([beside])[0] if recording.name == RECORDING and beside.is_file() else None
+
+
 def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
     """The results in these files and folders, and in folders below, in order of their paths.
 

@@ -9,7 +9,8 @@ from html import escape
 
 WIDTH, HEIGHT = 1100.0, 300.0
 LEFT, RIGHT, TOP, BOTTOM = 52.0, 140.0, 14.0, 42.0
-INK, GRID, TEXT = "#475569", "#e5e7eb", "#334155"
+INK, GRID, TEXT, PAPER = "var(--axis, #475569)", "var(--line, #e5e7eb)", "var(--text, #334155)", "var(--paper, #fff)"
+"""Colours of the page around it, in which light and dark differ; each with the one for where there is no page."""
 
 
 @dataclass(frozen=True)
@@ -46,24 +47,24 @@ def line_chart(
     parts = []
     for value in ticks(y_low, y_high, 5):
         _, y = at(x_low, value)
-        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" stroke="{GRID}"/>')
+        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" style="stroke:{GRID}"/>')
         parts.append(_text(LEFT - 8, y + 4, f"{value:g}", "end"))
     for value in ticks(x_low, x_high, 9):
         x, _ = at(value, y_low)
-        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{floor}" y2="{floor + 5}" stroke="{INK}"/>')
+        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{floor}" y2="{floor + 5}" style="stroke:{INK}"/>')
         parts.append(_text(x, floor + 19, f"{value:g}", "middle"))
-    parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{floor}" y2="{floor}" stroke="{INK}"/>')
+    parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{floor}" y2="{floor}" style="stroke:{INK}"/>')
     parts.append(_text((LEFT + right) / 2, HEIGHT - 5, x_title, "middle"))
     middle = (TOP + floor) / 2
     parts.append(f'<g transform="translate(13 {middle:.1f}) rotate(-90)">{_text(0.0, 0.0, y_title, "middle")}</g>')
     if threshold is not None:
         _, y = at(x_low, threshold[0])
         parts.append(
-            f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" stroke="{INK}" stroke-dasharray="2 4"/>'
+            f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" style="stroke:{INK}" stroke-dasharray="2 4"/>'
             + _text(LEFT + 6, y - 5, threshold[1], "start")
         )
     ends = []
-    for line in lines:
+    for line in sorted(lines, key=lambda line: bool(line.dashes)):  # a broken line shows the one that it lies upon
         path, last, before = "", None, False
         for x, y in zip(line.x, line.y, strict=True):
             inside = x_low <= x <= x_high and y_low <= y <= y_high
@@ -80,13 +81,15 @@ def line_chart(
         if line.mark is not None:
             x, y = at(line.x[line.mark], line.y[line.mark])
             parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{line.colour}" stroke="#fff" stroke-width="1.5"/>'
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{line.colour}" style="stroke:{PAPER}" '
+                'stroke-width="1.5"/>'
             )
         ends.append((at(*last), line))
     parts.extend(_names(ends))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="chart" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
-        f'font-size="12.5" fill="{TEXT}"><title>{escape(y_title)} over {escape(x_title)}</title>{"".join(parts)}</svg>'
+        f'font-size="12.5" style="fill:{TEXT}"><title>{escape(y_title)} over {escape(x_title)}</title>'
+        f"{''.join(parts)}</svg>"
     )
 
 

@@ -20,7 +20,7 @@ from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roa
 Array = NDArray[np.float64]
 
 COLOURS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
-DASHES = {"none": "6 3", "cooperation": "", "latency": "", "error": "2 3"}
+DASHES = {"none": "8 8", "cooperation": "", "latency": "", "error": "8 8"}
 HORIZON = 12.0
 """The chart begins where the two cars are this near [m]."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +40,11 @@ COLOURS = {
 }
 
 
-def write_replay(recording: Recording, out: Path) -> Path:
-    """The replay of a recording in the file `out`, which is returned. Raises InputError if it holds no frame."""
+def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
+    """The replay of a recording in the file `out`, which is returned, with the verdicts of its `result` if it is given.
+
+    Raises InputError if the recording holds no frame.
+    """
     data = replay_data(recording.frames(), recorded_roads(recording))
     if not data["times"]:
         raise InputError(Problem("the recording holds no frame", "record the run again", str(recording.path)))
@@ -50,6 +53,7 @@ def write_replay(recording: Recording, out: Path) -> Path:
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
+        result=result,
         facts=_facts(recording),
         data=data,
     )

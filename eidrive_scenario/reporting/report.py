@@ -18,6 +18,8 @@ PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.l
 """Metrics that the overview shows before others, by how their names begin."""
 SHOWN = 4
 """So many metrics stand in the overview."""
+_UNITS = {"count": "", "impact_speed": "m/s"}
+"""Of metrics that have another unit than the value of their criterion, by the last part of their name."""
 
 
 class ReportedCriterion(BaseModel):
@@ -46,6 +48,8 @@ class ReportedRun(BaseModel):
     criteria: tuple[ReportedCriterion, ...] = ()
     metrics: dict[str, float | None] = {}
     simulated_s: float = 0.0
+    run: int | None = None
+    parameters: dict[str, str] = {}
 
     @property
     def finished(self) -> bool:
@@ -64,7 +68,7 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
     if not runs:
         raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
     groups: dict[tuple[str, str], list[ReportedRun]] = {}
-    for run in sorted(runs, key=lambda run: (run.scenario, run.channel, run.seed)):
+    for run in sorted(runs, key=lambda run: (run.scenario, run.channel, run.run or 0, run.seed)):
         groups.setdefault((run.scenario, run.channel), []).append(run)
     metrics = _common_metrics(runs)
     return write_page(
@@ -75,13 +79,14 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
         passed=sum(run.passed for run in runs),
         failed=sum(not run.passed and run.finished for run in runs),
         broken=sum(not run.passed and not run.finished for run in runs),
-        metrics=[{"title": name.replace(".", " ")} for name in metrics],
+        metrics=[_title(name, runs) for name in metrics],
         groups=[
             {
                 "scenario": scenario,
                 "channel": channel,
                 "anchor": f"group-{index}",
                 "runs": group,
+                "varied": _varied(group),
                 "share": wilson(sum(run.passed for run in group), len(group)),
                 "summaries": [_summary(group, name) for name in metrics],
             }
@@ -112,6 +117,22 @@ def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
         return place, -counts[name], name
 
     return sorted(counts, key=rank)[:SHOWN]
+
+
+def _title(metric: str, runs: Sequence[ReportedRun]) -> str:
+    """Its name in words, and its unit where it is that of the criterion which it belongs to."""
+    kind, last = metric.split(".")[0], metric.split(".")[-1]
+    units = (criterion.unit for run in runs for criterion in run.criteria if criterion.name == kind)
+    unit = _UNITS[last] if last in _UNITS else next(units, "")
+    return f"{metric.replace('.', ' ')} [{unit}]" if unit else metric.replace(".", " ")
+
+
+def _varied(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
+    """The parameters in which the runs of a distribution differ; of other runs none, as their seeds tell them apart."""
+    if all(run.run is None for run in runs):
+        return ()
+    names = dict.fromkeys(name for run in runs for name in run.parameters)
+    return tuple(name for name in names if len({run.parameters.get(name) for run in runs}) > 1)
 
 
 def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:

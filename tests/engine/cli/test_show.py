@@ -36,6 +36,9 @@ def test_version(eidrive: Eidrive) -> None:
         ("weather", "foggy_morning"),
         ("criteria", "min_distance"),
         ("detectors", "oracle"),
+        ("fusion", "average"),
+        ("planners", "conflict_area"),
+        ("controllers", "alks"),
         ("actions", "SpeedAction"),
         ("conditions", "SimulationTimeCondition"),
         ("checks", "swallowed-edge"),
@@ -110,3 +113,12 @@ def test_tree_as_a_picture(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -
     result = eidrive("tree", passing_by, "--svg", picture)
     assert (result.exit_code, result.stdout.strip()) == (0, str(picture))
     assert "simulation time ≥ 3 s" in picture.read_text(encoding="utf-8")
+
+
+def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--param", "OtherY=0", "--out", tmp_path)
+    eidrive("view", tmp_path)
+    assert "Ego and Parked hit each other" in (tmp_path / "recording.html").read_text(encoding="utf-8")
+    (tmp_path / "result.json").unlink()
+    eidrive("view", tmp_path)
+    assert "<h3>Verdict" not in (tmp_path / "recording.html").read_text(encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -90,4 +91,37 @@ def test_distances_come_first_and_instants_are_no_metrics(tmp_path: Path) -> Non
     metrics = {"collision.time": 3.0, "collision.count": 1.0, "a": 1.0, "b": 2.0, "min_distance.A.B.box": 0.5, "c": 0.0}
     page = write_report([result(1, "ideal", False, metrics=metrics)], tmp_path)
     heads = [head.text for head in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//thead/tr/th")][4:8]
-    assert heads == ["min_distance A B box", "collision count", "a", "b"]
+    assert heads == ["min_distance A B box [m]", "collision count", "a", "b"]
+
+
+def test_runs_of_a_distribution_are_told_apart_by_what_they_vary(tmp_path: Path) -> None:
+    runs = [
+        result(1, "none", True, run=number, parameters={"Speed": speed, "End": "3"})
+        for number, speed in ((11, "30"), (2, "20"))
+    ]
+    page = write_report(runs, tmp_path)
+    assert [row[:4] for row in rows(page)[1:]] == [["2", "20", "1", "passed"], ["11", "30", "1", "passed"]]
+    headings = [cell.text for cell in html.fromstring(page.read_text(encoding="utf-8")).iterfind(".//th")]
+    assert "Speed" in headings
+    assert "End" not in headings
+
+
+def test_metrics_have_the_units_of_their_criteria(tmp_path: Path) -> None:
+    metrics = {"min_distance.Ego.Incoming.box": 1.0, "collision.impact_speed": 2.0, "collision.count": 1.0}
+    text = write_report([result(1, "ideal", True, metrics=metrics)], tmp_path).read_text(encoding="utf-8")
+    assert "min_distance Ego Incoming box [m]<br>" in text
+    assert "collision impact_speed [m/s]<br>" in text
+    assert "collision count<br>" in text
+
+
+def test_all_colours_of_a_page_have_one_for_the_dark() -> None:
+    templates = Path(write_report.__code__.co_filename).parent / "templates"
+    style = (templates / "style.css").read_text(encoding="utf-8")
+    light, dark = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]
+    named = [re.findall(r"(--\w+): #", colours) for colours in (light, dark)]
+    assert named[0] == named[1]
+    rest = style.replace(light, "").replace(dark, "")
+    pages = [rest, *(path.read_text(encoding="utf-8") for path in templates.glob("*.jinja"))]
+    fixed = re.compile(r"(?:color|background|border)[^;:}]*:[^;}]*#[0-9a-f]{3}")
+    assert not [found for page in pages for found in fixed.findall(page)]
+    assert {name for page in pages for name in re.findall(r"var\((--\w+)", page)} <= {*named[0], "--arm"}
