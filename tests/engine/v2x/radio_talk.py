@@ -1,0 +1,57 @@
+"""Stations that talk over a radio channel, for the tests of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.radio.profile import RadioProfile
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+DT = 0.05
+Place = tuple[float, float, float]
+QUIET: dict[str, object] = {
+    "shadowing_db": 0,
+    "path_loss": {"kind": "tr37885", "blockage": "mean"},
+    "line_of_sight": "clear",
+}
+
+
+def radio(seed: int = 0, **profile: Any) -> RadioChannel:
+    return RadioChannel(RadioProfile.model_validate(profile), seed)
+
+
+def message(sender: str, number: int, time: float, size: int = 300) -> Message:
+    return Message(sender, number, time, StationState(time, 0, 0, 0, 0, 0), Detections(time), size)
+
+
+def talk(
+    carrier: RadioChannel,
+    places: dict[str, Place],
+    ticks: int,
+    *,
+    speed: float = 0.0,
+    sizes: Sequence[int] = (300,),
+    sight: Any = None,
+    per_tick: int = 1,
+    dt: float = DT,
+) -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+    """Every station says something in each tick, in the order of `places`, which move along x."""
+    events: list[LinkEvent] = []
+    heard: list[tuple[str, float, Received]] = []
+    for tick in range(ticks):
+        now = tick * dt
+        at = {name: (x + speed * now * (index + 1), y, z) for index, (name, (x, y, z)) in enumerate(places.items())}
+        carrier.around(Surroundings(at, sight))
+        for receiver in places:
+            heard += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
+        outbox = [
+            (message(name, tick * per_tick + part, now, sizes[tick % len(sizes)]), [n for n in places if n != name])
+            for name in places
+            for part in range(per_tick)
+        ]
+        events += carrier.transmit(outbox, now)
+    return events, heard
