@@ -30,6 +30,8 @@ HASTE_COST = 500.0
 """A lane change within a section of L metres costs this / L metres more: short sections are bad places for it."""
 NARROWEST = 1.0
 """A lane must be this wide in the middle of its section to change to it [m]."""
+HERE = 0.01
+"""A destination that lies behind by less than this is reached without going round [m]."""
 
 
 class RouteError(InputError):
@@ -115,7 +117,7 @@ def find_lanes(
         x, y = graph.nodes[LaneKey(*key[:3])]["end"]
         return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 
-    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < 0.0
+    behind = (end.s - start.s) * driving_direction(roads[end.road], end.lane) < -HERE
     if source[:2] == target[:2] and behind and source in graph:
         graph, source = _started(graph, source)
     try:

@@ -203,13 +203,11 @@ class Route:
         `visit` is the number of the road among those of the route, as `visit` gives it: a route may come by twice.
         """
         for number in self._later(visit):
-            if self._visits[number][0] == road and (following := self._following(number)) is not None:
-                there = [branch for branch in branches if branch.lane.road == following[0]]
-                for branch in there:
-                    if branch.lane in following[1]:
-                        return branch
+            if self._visits[number][0] == road and (following := self.passes(number + 1)) is not None:
+                lanes = self._visits[(number + 1) % len(self._visits)][1]
+                there = [branch for branch in branches if branch.lane.road == following]
                 if there:
-                    return there[0]
+                    return next((branch for branch in there if branch.lane in lanes), there[0])
         for exact in (True, False):
             for name, lanes in self._visits:
                 for branch in branches:
@@ -221,17 +219,17 @@ class Route:
         """Which road of the route that is, counted from 0, for who came by the one numbered `visit` before."""
         return next((number for number in self._later(visit) if self._visits[number][0] == road), visit)
 
+    def passes(self, visit: int) -> str | None:
+        """The road of a visit, None beyond the route's end."""
+        if self.closed:
+            visit %= len(self._visits)
+        return self._visits[visit][0] if visit < len(self._visits) else None
+
     def _later(self, visit: int) -> Iterator[int]:
         """The roads from a visit on, and on a closed route those before it after all others."""
         yield from range(visit, len(self._visits))
         if self.closed:
             yield from range(min(visit, len(self._visits)))
-
-    def _following(self, visit: int) -> tuple[str, frozenset[LaneKey]] | None:
-        """The road after a visit and its lanes."""
-        if visit + 1 < len(self._visits):
-            return self._visits[visit + 1]
-        return self._visits[0] if self.closed else None
 
     @cached_property
     def _visits(self) -> list[tuple[str, frozenset[LaneKey]]]:
@@ -247,7 +245,7 @@ class Route:
             return t
         span = min(abs(leg.s_end - leg.s), LANE_CHANGE_LENGTH)
         part = min(abs(s - leg.s) / span, 1.0) if span > 0.0 else 1.0
-        return t + _eased(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
+        return t + eased(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array, Array]:
@@ -271,7 +269,7 @@ class Route:
             begin = np.array([leg.s for leg in legs])[leg_of]
             part = np.divide(np.abs(s[changes] - begin), span, out=np.ones_like(span), where=span > 0.0)
             t_end = tables.lane_t(row_end[leg_of], s[changes])[0]
-            t[changes] += _eased(np.minimum(part, 1.0)) * (t_end - t[changes])
+            t[changes] += eased(np.minimum(part, 1.0)) * (t_end - t[changes])
         road = tables.section_road[tables.lane_section[row]]
         points = np.column_stack(tables.road_poses(road[owner], s, t)[:3])
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
@@ -281,7 +279,7 @@ class Route:
 Share = TypeVar("Share", float, Array)
 
 
-def _eased(part: Share) -> Share:
+def eased(part: Share) -> Share:
     """How much of a lane change is done at a share of its length: no jump of curvature at either end."""
     return part**3 * (10.0 + part * (6.0 * part - 15.0))
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import Choose, LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.storyboard.route_lanes import RouteLanes
 from eidrive_scenario.world.actor import Placement
 
 TINY = 1e-6
@@ -60,6 +61,7 @@ class Motion:
         self.speed = 0.0
         self._route: Route | None = None
         self._visit = 0
+        self._route_lanes = RouteLanes(roads) if roads is not None else None
         self.choose: Choose | None = None
         """Picks a branch at forks that the route leaves open; None takes the straightest."""
         self.end_of_road = False
@@ -154,6 +156,11 @@ class Motion:
         if self._teleport:
             self._teleport = False
             return self.placement()
+        if self._route is not None and self._route_lanes is not None:
+            if steering is None and target is None and carried is None and distance > 0.0 and not self._crosses:
+                steering = self._to_route(distance)
+            else:
+                self._route_lanes.forget()
         if target is not None:
             self.pose = target
             self.location = None
@@ -206,6 +213,20 @@ class Motion:
         self.location = here
         pose = self.pose_on(here, self.heading)
         self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
+
+    def _to_route(self, distance: float) -> Steering | None:
+        """How to change to a lane that leads on along the route, where this one does not."""
+        assert self._route is not None
+        assert self._route_lanes is not None
+        if self.location is None or self.direction < 0 or self.roads is None:
+            return None
+        found = self._route_lanes.step(self.location, distance, self._route, self._visit)
+        if found is None:
+            return None
+        lane, offset, done = found
+        self.relate_to_lane(lane)
+        way = self.roads.driving_direction(self.location.road, lane)
+        return Steering(offset * way, heading=0.0 if done else None)
 
     def _begin_lap(self, before: LaneLocation, after: LaneLocation) -> None:
         """Where a step passes the start of the route's lap, the lap is the route from then on."""

@@ -128,6 +128,16 @@ def test_places_along_a_route(crossing: RoadNetwork) -> None:
     assert (place.road, place.lane, place.s) == pytest.approx(("3", 3, 15.0))
 
 
+def test_who_stands_at_a_destination_does_not_go_round_to_it(road: Text, map_of: Text) -> None:
+    network = ring(road, map_of)
+    there, beyond = network.location("a", -1, 30.0), network.location("a", -1, 30.0 + 1e-13)
+    assert network.route(beyond, there).length == pytest.approx(0.0, abs=1e-6)
+    onward = network.route(beyond, network.location("b", -1, 10.0), via=[there])
+    assert [key.road for key in onward.lanes] == ["a", "b"]
+    # A metre behind is a lap ahead.
+    assert network.route(network.location("a", -1, 31.0), there).length > 300.0
+
+
 def round_and_out(road: Text, map_of: Text) -> RoadNetwork:
     """Road a ends at a junction, from where b leads round to the start of a, and c leads out; all of 100 m."""
     lane = (
