@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.findings import Findings
@@ -21,6 +22,8 @@ from eidrive_scenario.openscenario.model import (
     StoryboardElementStateCondition,
     StoryboardElementType,
 )
+
+T = TypeVar("T")
 
 SEPARATOR = re.compile(r"::|/")
 """The standard writes ::, many files a slash."""
@@ -54,6 +57,7 @@ class StoryboardNames:
     def __init__(self, storyboard: Storyboard | None, entries: Mapping[CatalogReference, Element]) -> None:
         self._entries = entries
         self.named = [named for story in (storyboard.story if storyboard else ()) for named in self._below(story, ())]
+        self._meant = Meant((named.path, named) for named in self.named)
 
     def _below(self, element: Element, above: tuple[str, ...]) -> Iterator[Named]:
         path = (*above, str(getattr(element, "name", "")))
@@ -86,7 +90,7 @@ class StoryboardNames:
         wanted: StoryboardElementType | None = condition.storyboard_element_type
         if reference is None or wanted is None:
             return
-        found = [named for named in self.named if is_suffix(reference, named.path)]
+        found = self._meant.by(reference)
         if any(named.level is wanted for named in found):
             return
         if found:
@@ -96,6 +100,26 @@ class StoryboardNames:
             message = f"storyboardElementRef names the {wanted.value} {reference!r}, which is not there"
             remedy = suggestion(reference, {named.path[-1] for named in self.named if named.level is wanted})
         findings.error(message, remedy, source=condition.source, line=condition.line)
+
+
+class Meant(Generic[T]):
+    """Elements with their paths, to be asked which of them a reference means."""
+
+    def __init__(self, elements: Iterable[tuple[tuple[str, ...], T]]) -> None:
+        self._by_name: dict[str, list[tuple[int, tuple[str, ...], T]]] = {}
+        for number, (path, element) in enumerate(elements):
+            self._by_name.setdefault(path[-1], []).append((number, path, element))
+
+    def by(self, reference: str) -> list[T]:
+        """Those that are meant, in the order in which they were given."""
+        last = [name for name in SEPARATOR.split(reference) if name][-1:]
+        found = {
+            number: element
+            for name in {reference, *last}
+            for number, path, element in self._by_name.get(name, ())
+            if is_suffix(reference, path)
+        }
+        return [found[number] for number in sorted(found)]
 
 
 def is_suffix(reference: str, path: tuple[str, ...]) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from eidrive_scenario.openscenario.model import StoryboardElementStateCondition
-from eidrive_scenario.openscenario.storyboard_names import is_suffix
+from eidrive_scenario.openscenario.storyboard_names import Meant
 from eidrive_scenario.storyboard.elements import ManeuverElement, ManeuverGroupElement, StoryElement
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -55,7 +55,7 @@ class Box:
 
 def story_boxes(storyboard: Storyboard) -> list[Box]:
     """The stories of a storyboard with all that they hold. A group with a single maneuver takes that into its box."""
-    elements = list(_walk(storyboard.root))
+    elements = Meant((element.record.path, element) for element in _walk(storyboard.root))
     return [_box(story, elements) for story in storyboard.root.elements]
 
 
@@ -81,7 +81,7 @@ def _walk(element: StoryElement) -> Iterator[StoryElement]:
         yield from _walk(child)
 
 
-def _box(element: StoryElement, elements: list[StoryElement]) -> Box:
+def _box(element: StoryElement, elements: Meant[StoryElement]) -> Box:
     lines: list[Line] = []
     waits: list[Path] = []
     if element.start_leaf is not None:
@@ -122,18 +122,16 @@ def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[Line]:
             yield Line(role, first if place == 0 else "and", monitor.describe())
 
 
-def _waits(trigger: Trigger, elements: list[StoryElement]) -> Iterator[Path]:
+def _waits(trigger: Trigger, elements: Meant[StoryElement]) -> Iterator[Path]:
     """The elements whose state a trigger asks for; an action counts as the event that it belongs to."""
     for group in trigger.groups:
         for monitor in group.monitors:
             asked = monitor.condition.element
             if not isinstance(asked, StoryboardElementStateCondition):
                 continue
-            for element in elements:
-                path = element.record.path
-                if element.kind == asked.storyboard_element_type.value and is_suffix(
-                    asked.storyboard_element_ref, path
-                ):
+            for element in elements.by(asked.storyboard_element_ref):
+                if element.kind == asked.storyboard_element_type.value:
+                    path = element.record.path
                     yield path[:-1] if isinstance(element, ActionElement) else path
 
 

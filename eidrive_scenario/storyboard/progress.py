@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from eidrive_scenario.openscenario.storyboard_names import Meant
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 
 NOT_BEGUN = State.STANDBY
@@ -28,10 +29,11 @@ class Progress:
         self.changes: list[StateChange] = []
         self.tick = -1
         self.time = 0.0
+        self._meant: Meant[ElementRecord] | None = None
 
     def enrol(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
         """Keep track of one more element."""
-        record = ElementRecord(kind, path)
+        record, self._meant = ElementRecord(kind, path), None
         self.records.append(record)
         return record
 
@@ -53,9 +55,10 @@ class Progress:
         )
 
     def find(self, kind: str, reference: str) -> list[ElementRecord]:
-        """The elements of one kind whose path ends with `reference`; its parts stand apart by `::`."""
-        wanted = tuple(reference.split("::"))
-        return [r for r in self.records if r.kind == kind and r.path[-len(wanted) :] == wanted]
+        """The elements of one kind that a reference means."""
+        if self._meant is None:
+            self._meant = Meant((record.path, record) for record in self.records)
+        return [record for record in self._meant.by(reference) if record.kind == kind]
 
     def watch(self, kind: str, reference: str) -> Watch | None:
         """A watch on the elements that a reference means, None if there is none."""

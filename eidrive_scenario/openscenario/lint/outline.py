@@ -33,7 +33,7 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.parsing import open_document
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.schema import rules
-from eidrive_scenario.openscenario.storyboard_names import LEVELS, is_suffix
+from eidrive_scenario.openscenario.storyboard_names import LEVELS, Meant
 
 _OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": MiscObject}
 
@@ -95,6 +95,7 @@ class Outline:
         self.root = Node(scenario.storyboard, None, ("storyboard",), None)
         self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
         self.nodes = tuple(self.root.walk())
+        self._meant = Meant((node.path, node) for node in self.nodes)
 
     def _node(self, element: Element, parent: Node, above: tuple[str, ...]) -> Node:
         path = (*above, str(getattr(element, "name", "")))
@@ -107,7 +108,7 @@ class Outline:
 
     def find(self, level: StoryboardElementType, reference: str) -> list[Node]:
         """The elements that a reference means."""
-        return [node for node in self.nodes if node.level is level and is_suffix(reference, node.path)]
+        return [node for node in self._meant.by(reference) if node.level is level]
 
     def members(self, name: str, around: tuple[str, ...] = ()) -> tuple[str, ...]:
         """The entity of this name, or those of the selection of this name; `around` are selections that it is in."""

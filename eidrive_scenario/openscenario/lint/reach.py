@@ -68,16 +68,30 @@ class Reach:
         self._outline = outline
         self._truths: dict[int, Truth] = {}
         self._states = States(outline)
-        changed = True
-        while changed:
-            changed = False
-            for node in outline.nodes:
-                changed |= self._advance(node)
+        watchers = self._watchers()
+        waiting = dict.fromkeys(outline.nodes)
+        while waiting:
+            node = next(iter(waiting))
+            del waiting[node]
+            if self._advance(node):
+                waiting |= dict.fromkeys((node, *node.children))
+                for near in (*node.above(), *node.walk()):
+                    waiting |= dict.fromkeys(watchers.get(near, ()))
 
     @property
     def start(self) -> Mapping[Node, float]:
         """When each element starts at the earliest [s]."""
         return self._states.start
+
+    def _watchers(self) -> Mapping[Node, list[Node]]:
+        """By element, whose triggers ask for its state. That depends on what is below it and around it, too."""
+        found: dict[Node, list[Node]] = {}
+        for node in self._outline.nodes:
+            for trigger in (node.start, stop_trigger(node)):
+                conditions = [one for group in (trigger.condition_group if trigger else ()) for one in group.condition]
+                for asked in dict.fromkeys(asked for one in conditions for asked in self._states.looked_at(one)):
+                    found.setdefault(asked, []).append(node)
+        return found
 
     def _advance(self, node: Node) -> bool:
         states = self._states

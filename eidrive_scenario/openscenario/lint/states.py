@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from eidrive_scenario.openscenario.lint.endless import never_ends
 from eidrive_scenario.openscenario.lint.outline import Node, Outline
@@ -50,6 +51,17 @@ class States:
         self.start[node] = min(start, self.start[node])
         self._stopped[node] = min(stopped, self._stopped[node])
         return better
+
+    def looked_at(self, condition: Condition) -> Iterator[Node]:
+        """The elements that a condition asks for; whether one is stopped depends on all events of its maneuver."""
+        question = _question(condition)
+        if question is None:
+            return
+        for node in self._outline.find(question.storyboard_element_type, question.storyboard_element_ref):
+            event = node.parent if isinstance(node.element, Action) else node
+            stops = question.state is StoryboardElementState.STOP_TRANSITION
+            rivalry = stops and event is not None and isinstance(event.element, Event)
+            yield event.parent if rivalry and event is not None and event.parent is not None else node
 
     def truth(self, condition: Condition, owner: Node, starts: bool) -> Truth:
         """When a condition on states can hold for a trigger that starts or stops its owner."""
@@ -105,11 +117,16 @@ class States:
             return self.start[node]
         if not node.children:
             return math.inf
-        return max(self.start[node], *(self._complete(child) for child in node.children))
+        latest = self.start[node]
+        for child in node.children:
+            latest = max(latest, self._complete(child))
+            if latest == math.inf:
+                break
+        return latest
 
     def _stop(self, node: Node) -> float:
         """By its own trigger, with those above it, by another event of its maneuver, by another action."""
-        times = [self._stopped[one] for one in (node, *node.above())]
+        times = [self._halted(node)]
         event = node.parent if isinstance(node.element, Action) else node
         if isinstance(node.element, Action):
             times.append(self.start[node])
@@ -117,8 +134,13 @@ class States:
             times += [max(self.start[event], self.start[rival]) for rival in _rivals(event)]
         return min(times)
 
+    def _halted(self, node: Node) -> float:
+        """By its own trigger, or with those above it."""
+        return min(self._stopped[one] for one in (node, *node.above()))
+
     def _complete(self, node: Node) -> float:
-        return min(self._end(node), self._stop(node))
+        """Whatever displaces an event or an action does so after its start, at which it may be over."""
+        return min(self._end(node), self._halted(node))
 
     def _missed(self, node: Node, state: StoryboardElementState) -> str:
         """Why a state is never reached."""
@@ -149,12 +171,13 @@ def _can_be_stopped(node: Node) -> bool:
         return True
     acts = [one for one in (node, *node.above()) if one.level is StoryboardElementType.ACT]
     stopped = any(getattr(act.element, "stop_trigger", None) is not None for act in acts)
-    return stopped or bool(_rivals(node))
+    return stopped or any(True for _ in _rivals(node))
 
 
-def _rivals(node: Node) -> list[Node]:
+def _rivals(node: Node) -> Iterator[Node]:
     """The other events of its maneuver that end it when they start."""
     if not isinstance(node.element, Event) or node.parent is None:
-        return []
-    others = [one for one in node.parent.children if one is not node]
-    return [one for one in others if isinstance(one.element, Event) and one.element.priority in _OVERRIDING]
+        return
+    for one in node.parent.children:
+        if one is not node and isinstance(one.element, Event) and one.element.priority in _OVERRIDING:
+            yield one

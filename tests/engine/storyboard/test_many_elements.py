@@ -1,0 +1,96 @@
+"""Large storyboards: work grows with the number of elements, not with its square."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.openscenario.lint.outline import Outline
+from eidrive_scenario.openscenario.lint.reach import Reach
+from eidrive_scenario.openscenario.storyboard_names import Meant, is_suffix
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.storyboard.elements import StoryElement
+from eidrive_scenario.storyboard.events import EventElement
+
+FILE = """<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="many" author="test"/>
+  <VariableDeclarations><VariableDeclaration name="Count" variableType="integer" value="0"/></VariableDeclarations>
+  <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions/></Init>
+  <Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
+  <Actors selectTriggeringEntities="false"/><Maneuver name="maneuver">{events}</Maneuver></ManeuverGroup></Act></Story>
+  </Storyboard></OpenSCENARIO>"""
+EVENT = """<Event name="event {number}" priority="{priority}"><Action name="action {number}"><GlobalAction>
+  <VariableAction variableRef="Count"><ModifyAction><Rule><AddValue value="1"/></Rule></ModifyAction></VariableAction>
+  </GlobalAction></Action><StartTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
+  <ByValueCondition>{condition}</ByValueCondition></Condition></ConditionGroup></StartTrigger></Event>"""
+AT = '<SimulationTimeCondition value="{time}" rule="greaterOrEqual"/>'
+BEHIND = """<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="{reference}"
+  state="completeState"/>"""
+
+
+def chain(length: int, order: Callable[[list[int]], Any], reference: str = "event {}") -> bytes:
+    """Each event starts by the end of the one before; written down in some order."""
+    conditions = [AT.format(time=0.5), *(BEHIND.format(reference=reference.format(n)) for n in range(length - 1))]
+    events = [EVENT.format(number=n, priority="parallel", condition=conditions[n]) for n in range(length)]
+    return FILE.format(events="".join(events[number] for number in order(list(range(length))))).encode()
+
+
+def zigzag(numbers: list[int]) -> list[int]:
+    return [*numbers[1::2], *reversed(numbers[0::2])]
+
+
+@pytest.mark.parametrize("order", [list, reversed, zigzag])
+def test_times_of_a_chain_are_found_by_looking_at_each_link_a_few_times(
+    monkeypatch: pytest.MonkeyPatch, order: Callable[[list[int]], Any]
+) -> None:
+    looked = []
+    advance = Reach._advance
+    monkeypatch.setattr(Reach, "_advance", lambda self, node: looked.append(node) or advance(self, node))
+    outline = Outline(load_scenario(chain(60, order)))
+    reach = Reach(outline)
+    assert all(reach.start[node] == pytest.approx(0.5, abs=1e-5) for node in outline.nodes if "event" in node.path[-1])
+    assert len(looked) < 6 * len(outline.nodes)
+
+
+def test_an_event_that_overrides_asks_nobody_who_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    events = "".join(
+        EVENT.format(number=n, priority="override", condition=AT.format(time=0.01 * n)) for n in range(200)
+    )
+    scenario = load_scenario(FILE.format(events=events).encode())
+    asked = []
+    state = StoryElement.state.fget
+    assert state is not None
+    monkeypatch.setattr(EventElement, "state", property(lambda self: asked.append(1) or state(self)))
+    with Simulation(scenario, settings=RunSettings(dt=1.0)) as simulation:
+        simulation.tick()
+        simulation.tick()
+        simulation.tick()
+        assert simulation.storyboard.stage.variables["Count"] == "200"
+    assert len(asked) < 50 * 200
+
+
+@pytest.mark.parametrize("reference", ["event {}", "maneuver::event {}", "act/event {}", "story::group/event {}"])
+def test_references_may_leave_levels_out_and_be_written_with_slashes(reference: str) -> None:
+    with Simulation(load_scenario(chain(3, list, reference)), settings=RunSettings(dt=0.5)) as simulation:
+        for _ in range(3):
+            simulation.tick()
+        assert simulation.storyboard.stage.variables["Count"] == "3"
+
+
+def test_what_a_reference_means_is_found_as_by_trying_all() -> None:
+    names = ["a", "b", "a/b", "b::a", "a::", ""]
+    paths = [tuple(path) for length in (1, 2, 3) for path in product(names, repeat=length)]
+    meant = Meant((path, path) for path in paths)
+    references = [
+        *names,
+        *(mark.join(pair) for pair in product(names, repeat=2) for mark in ("/", "::")),
+        "c",
+        "/",
+        "::a",
+    ]
+    for reference in references:
+        assert meant.by(reference) == [path for path in paths if is_suffix(reference, path)]
