@@ -7,25 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from sample_car import CAR
 
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.dynamics import SingleTrack, VehicleParameters
 
 SUBSTEPS = 10
-
-CAR = ActorSpec(
-    "Ego",
-    "car",
-    "car",
-    (4.892, 1.837, 1.49),
-    (1.4, 0.0, 0.745),
-    wheelbase=2.85,
-    max_steering=0.6,
-    mass=1900.0,
-    max_acceleration=5.0,
-    max_deceleration=9.0,
-)
 
 
 @dataclass

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from sample_car import CAR
 from scipy.stats import chi2
 
 from eidrive_scenario.geometry import wrap_angle
@@ -29,21 +30,9 @@ from eidrive_scenario.sensing.readings import (
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
 from eidrive_scenario.world import World
-from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.actor import Control, Placement
 
 DT = 0.05
-CAR = ActorSpec(
-    "Ego",
-    "car",
-    "car",
-    (4.892, 1.837, 1.49),
-    (1.4, 0.0, 0.745),
-    wheelbase=2.85,
-    max_steering=0.6,
-    mass=1900.0,
-    max_acceleration=5.0,
-    max_deceleration=9.0,
-)
 
 
 def imu(acceleration: float = 0.0, turn: float = 0.0) -> ImuReading:
