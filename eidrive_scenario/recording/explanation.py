@@ -97,8 +97,10 @@ class _Subject:
             yield f"the run {self._how_it_ended()}"
             word = "stop"
         if self._history is None:
-            if self._times(Transition.START) or element.kind == STORYBOARD:
-                yield f"  it has no {word} trigger"
+            without = f"it has no {word} trigger"
+            starts = self._times(Transition.START)
+            if element.kind == STORYBOARD or any(without not in change.why for change in starts[:_SHOWN]):
+                yield f"  {without}"
             return
         if not self._history.asked:
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,10 @@ def load_profile(
     if path is None:
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         what = f"no file {str(source)!r}" if source.suffix in SUFFIXES else f"no channel profile {str(source)!r}"
-        raise SettingError(Problem(what, suggestion(source.stem, names), origin, line))
+        remedy = suggestion(source.stem, names)
+        if os.path.isfile(source):
+            what, remedy = f"the file {str(source)!r} is no channel profile", "give one that ends in .yaml"
+        raise SettingError(Problem(what, remedy, origin, line))
     data, lines = load_yaml_file(path)
     placed = _with_paths(_mapping(data, str(path), 1), path.parent)
     return _parse(placed, path.stem, str(path), 1, lines)
@@ -94,7 +98,7 @@ def _find(source: Path, folders: Sequence[Path]) -> Path | None:
         candidates = [source, *(folder / source for folder in folders)]
     else:
         candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
-    return next((path for path in candidates if path.is_file()), None)
+    return next((path for path in candidates if os.path.isfile(path)), None)
 
 
 def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:

@@ -145,7 +145,7 @@ def test_an_event_that_started(explained: Explained) -> None:
 
 
 def test_an_event_without_trigger(explained: Explained) -> None:
-    assert explained(event())[1:] == ["at 0.00 s: it has no start trigger", "it has no start trigger"]
+    assert explained(event())[1:] == ["at 0.00 s: it has no start trigger"]
 
 
 def test_an_event_that_was_skipped(explained: Explained) -> None:

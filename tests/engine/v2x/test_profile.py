@@ -91,6 +91,15 @@ def test_a_wrong_profile_says_where_and_what_would_be_right(source: str, message
     assert message in str(caught.value)
 
 
+def test_a_file_that_is_no_profile_and_a_text_that_is_no_path(tmp_path: Path) -> None:
+    file = tmp_path / "mine.txt"
+    file.write_text("model: composed\n")
+    with pytest.raises(SettingError, match=r"mine.txt' is no channel profile; give one that ends in .yaml"):
+        load_profile(str(file), [LIBRARY])
+    with pytest.raises(SettingError, match="no channel profile 'xxx"):
+        load_profile("x" * 300, [LIBRARY])
+
+
 def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text("model: composed\nloss:\n  kind: bernoulli\nspeed: 3\n")
