@@ -208,23 +208,31 @@ def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
 def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve, here: Pose | None) -> Layout:
     s: list[float] = [0.0]
     poses: list[Pose] = []
-    clock: list[float] = []
-    segments = shape.clothoid_spline_segment
-    for index, segment in enumerate(segments):
+    for segment in shape.clothoid_spline_segment:
         if segment.position_start is not None:
             here = resolve(segment.position_start)
         if here is None:
             here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         here = here._replace(h=here.h + (segment.h_offset or 0.0))
         along, line = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
-        following = segments[index + 1].time_start if index + 1 < len(segments) else shape.time_end
-        if segment.time_start is not None and following is not None:
-            clock += _even(along, segment.time_start, following)
         base = s[-1]
         s += [base + distance for distance in along]
         poses += line
         here = line[-1]
-    return Layout(tuple(s[1:]), tuple(poses), tuple(clock) if len(clock) == len(poses) else None, closed)
+    return Layout(tuple(s[1:]), tuple(poses), _spline_times(shape, s[1:]), closed)
+
+
+def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[float, ...] | None:
+    """Times at the points: constant speed between the segments that say when they begin; the first one says 0."""
+    if shape.time_end is None:
+        return None
+    known, begin = {0.0: 0.0}, 0.0
+    for segment in shape.clothoid_spline_segment:
+        if segment.time_start is not None:
+            known[begin] = segment.time_start
+        begin += segment.length
+    known[begin] = shape.time_end
+    return tuple(np.interp(s, list(known), list(known.values())).tolist())
 
 
 def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:

@@ -12,6 +12,13 @@ from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvat
 from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Layout, Place, Pose, Stage, lay_out, model, resolve
 
 TINY = 1e-6
+TIMED = {
+    "polyline": "each vertex a time",
+    "clothoid": "startTime and stopTime",
+    "clothoid_spline": "timeEnd",
+    "nurbs": "each control point a time",
+}
+"""By shape, what says when it is passed."""
 
 
 class FollowTrajectoryAction(ActionBehaviour):
@@ -58,7 +65,10 @@ class FollowTrajectoryAction(ActionBehaviour):
         """Lay the trajectory out; positions relative to entities mean where those are now."""
         self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)
         if self._timing is not None and self._layout.times is None:
-            raise self.problem("has a Timing, but the trajectory has no times", "give each vertex a time, or say None")
+            timed = next(
+                remedy for shape, remedy in TIMED.items() if getattr(self._trajectory.shape, shape) is not None
+            )
+            raise self.problem("has a Timing, but the trajectory has no times", f"give {timed}, or say None")
         self.actor.trajectory = self._followed = self._layout
         self._s = self.action.initial_distance_offset or 0.0
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -106,6 +107,22 @@ def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
     way = lay_out(trajectory(clothoid_spline=model.ClothoidSpline(clothoid_spline_segment=pieces)), resolve)
     assert way.length == pytest.approx(10.0 + 5 * math.pi)
     assert way.at(way.length)[:4] == pytest.approx((20.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
+
+
+@pytest.mark.element("ClothoidSpline")
+def test_a_clothoid_spline_takes_the_times_that_its_pieces_say() -> None:
+    """10, 10 and 20 m: the first piece begins at 0 s as it says nothing, the second at 5 s, the end is at 11 s."""
+    lengths = ((10.0, None), (10.0, 5.0), (20.0, None))
+    pieces = tuple(
+        model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=length, time_start=time)
+        for length, time in lengths
+    )
+    shape = model.ClothoidSpline(clothoid_spline_segment=pieces, time_end=11.0)
+    way = lay_out(trajectory(clothoid_spline=shape), resolve)
+    assert (way.start_time, way.end_time) == (0.0, 11.0)
+    assert [way.at_time(time) for time in (2.5, 5.0, 7.0, 11.0)] == pytest.approx([5.0, 10.0, 20.0, 40.0])
+    without = lay_out(trajectory(clothoid_spline=replace(shape, time_end=None)), resolve)
+    assert without.times is None
 
 
 @pytest.mark.element("Nurbs")
