@@ -80,6 +80,7 @@ class Movement:
                 break
             following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
             if following is None and remaining <= 0.0:
+                s = math.nextafter(s, section.s)  # where the section ends, the next one begins, without this lane
                 break
             if following is None:
                 return None

@@ -65,7 +65,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
         junction = _read_junction(element, roads, findings)
         junctions[junction.id] = junction
     roads = {number: _with_sound_links(road, roads, junctions, findings) for number, road in roads.items()}
-    signals = read_signals(elements, findings)
+    signals = read_signals(elements, roads, findings)
     controllers = read_controllers(root, signals, findings)
     header = _read_header(root, findings)
     if findings.problems:

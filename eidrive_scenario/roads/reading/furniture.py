@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from lxml import etree
 
-from eidrive_scenario.roads.model import Corner, Repeat, RoadObject, Signal, SignalController, SignalPlace
+from eidrive_scenario.roads.model import Corner, Repeat, Road, RoadObject, Signal, SignalController, SignalPlace
 from eidrive_scenario.roads.reading.findings import Findings
 
 MOST_REPEATED = 100_000
 """How often an object may stand along its road."""
+BEYOND = 0.1
+"""A signal may stand so far beyond its road for rounding [m]."""
 
 
-def read_signals(roads: list[tuple[str, etree._Element]], findings: Findings) -> dict[str, Signal]:
+def read_signals(
+    elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], findings: Findings
+) -> dict[str, Signal]:
     """The signals of all roads by id, with the references that other roads make to them.
 
     Some maps give one id to several signals: the second of them is found under 'id#2', and so on.
     """
     signals: dict[str, Signal] = {}
     references: list[tuple[str, SignalPlace, etree._Element]] = []
-    for road, element in roads:
+    for number, element in elements:
+        road = roads[number]
         for signal in element.iterfind("signals/signal"):
             read = _read_signal(road, signal, findings)
             same = sum(1 for key in signals if key == read.id or key.startswith(f"{read.id}#"))
@@ -35,11 +41,17 @@ def read_signals(roads: list[tuple[str, etree._Element]], findings: Findings) ->
     return signals
 
 
-def _read_place(road: str, element: etree._Element, findings: Findings) -> SignalPlace:
+def _read_place(road: Road, element: etree._Element, findings: Findings) -> SignalPlace:
     orientation = element.get("orientation", "none")
+    s = findings.number(element, "s")
+    held = min(max(s, 0.0), road.length)
+    if abs(s - held) > BEYOND:
+        message = f"a signal stands at s = {s:g} m of road {road.id!r}, and is put at s = {held:g} m"
+        remedy = f"the road runs from 0 to {road.length:g} m"
+        findings.doubt(element, "signal-off-road", "signals beyond their roads", message, remedy)
     return SignalPlace(
-        road=road,
-        s=findings.number(element, "s"),
+        road=road.id,
+        s=held,
         t=findings.number(element, "t"),
         orientation=orientation if orientation in ("+", "-") else "none",
         validity=tuple(
@@ -48,7 +60,7 @@ def _read_place(road: str, element: etree._Element, findings: Findings) -> Signa
     )
 
 
-def _read_signal(road: str, element: etree._Element, findings: Findings) -> Signal:
+def _read_signal(road: Road, element: etree._Element, findings: Findings) -> Signal:
     return Signal(
         id=findings.text(element, "id"),
         name=element.get("name", ""),

@@ -55,7 +55,8 @@ def read_sections(
     sections: list[LaneSection] = []
     left_out: list[Mapping[int, Lane]] = []
     for (s, element), end in zip(found, ends, strict=True):
-        read = _read_section(element, 0.0 if not sections else s, lane_offset, findings)
+        start = s if sections else 0.0
+        read = _read_section(element, start, lane_offset, findings)
         if end - s <= 1e-6 and (sections or len(found) > 1):
             if sections:
                 sections[-1] = replace(sections[-1], lanes=_led_past(sections[-1].lanes, read, "successors"))
@@ -64,7 +65,7 @@ def read_sections(
         for between in reversed(left_out):
             read = _led_past(read, between, "predecessors")
         left_out.clear()
-        sections.append(LaneSection(len(sections), 0.0 if not sections else s, max(end - s, 0.0), read))
+        sections.append(LaneSection(len(sections), start, max(end - start, 0.0), read))
     if not sections:
         findings.add(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
     return tuple(sections)

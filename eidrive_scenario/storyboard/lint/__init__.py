@@ -19,6 +19,12 @@ ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
     Rule("lane-width", Level.WARNING, "a lane without a width, or below 0", road_file.doubts_about("lane-width")),
     Rule("lane-side", Level.WARNING, "a lane on the side of the others", road_file.doubts_about("lane-side")),
     Rule("road-link", Level.WARNING, "a road that leads to no junction", road_file.doubts_about("road-link")),
+    Rule(
+        "signal-off-road",
+        Level.WARNING,
+        "a signal beyond the ends of its road",
+        road_file.doubts_about("signal-off-road"),
+    ),
     Rule("lane-link", Level.WARNING, "a lane that does not go on", road_file.doubts_about("lane-link")),
     Rule(
         "junction-connection",

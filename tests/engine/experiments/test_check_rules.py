@@ -80,7 +80,7 @@ IN_PLACE_OF = {
     "StartTrigger": "StartTrigger",
 }
 """What of the first event an example's element replaces."""
-OF_ROADS = {"link", "planView", "lanes", "junction"}
+OF_ROADS = {"link", "planView", "lanes", "signals", "junction"}
 """Elements of the road file."""
 
 
@@ -111,7 +111,7 @@ def put_on_road(folder: Path, element: etree._Element) -> None:
     root = etree.fromstring(ROAD)
     old = root.find(f".//{element.tag}")
     if old is None:
-        root.append(element)
+        (root if element.tag == "junction" else root.find("road")).append(element)
     else:
         old.getparent().replace(old, element)
     (folder / "street.xodr").write_bytes(etree.tostring(root, pretty_print=True))

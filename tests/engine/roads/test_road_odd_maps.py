@@ -154,3 +154,44 @@ def test_a_geometry_that_stands_there_twice_is_passed_in_both_directions(road: T
         moved = network.advance(network.location("1", lane, start), 50.0)
         assert moved is not None
         assert moved.s == pytest.approx(end)
+
+
+def test_a_signal_beyond_its_road_stands_at_its_end(road: Text, map_of: Text) -> None:
+    signals = "".join(
+        f'<signal id="{n}" s="{s}" t="-5" dynamic="yes" orientation="+" zOffset="2" type="1000001"/>'
+        for n, s in enumerate((-3.0, 100.02, 140.0))
+    )
+    network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<signals>{signals}</signals>")), "town.xodr")
+    assert [network.signal_pose(signal).x for signal in network.signals.values()] == [0.0, 100.0, 100.0]
+    (doubt,) = network.doubts
+    assert doubt.rule == "signal-off-road"
+    assert str(doubt) == (
+        "town.xodr:1: a signal stands at s = -3 m of road '1', and is put at s = 0 m; "
+        "1 more of signals beyond their roads: line 1; the road runs from 0 to 100 m"
+    )
+
+
+@pytest.mark.parametrize("s", ["10", "100000"])
+def test_the_first_lane_section_begins_with_its_road(road: Text, map_of: Text, s: str) -> None:
+    late = section().replace('s="0"', f's="{s}"')
+    network = RoadNetwork.parse(map_of(road(lanes=late)))
+    (only,) = network.roads["1"].sections
+    assert (only.s, only.end) == (0.0, 100.0)
+    assert network.lane_width("1", -1, 1.0) == 4.0
+
+
+def test_a_first_lane_section_that_begins_late_reaches_the_second(road: Text, map_of: Text) -> None:
+    lanes = section().replace('s="0"', 's="10"') + section().replace('s="0"', 's="60"')
+    network = RoadNetwork.parse(map_of(road(lanes=lanes)))
+    assert [(part.s, part.end) for part in network.roads["1"].sections] == [(0.0, 60.0), (60.0, 100.0)]
+
+
+def test_a_lane_that_ends_where_one_comes_to_rest(road: Text, map_of: Text) -> None:
+    """Moved to where its lane ends: the next section, which begins there, has no such lane."""
+    wide = section().replace("</right>", LANE.format(-2, 0.0) + "</right>")
+    only_left = f'<laneSection s="50"><left>{LANE.format(1, 0.0)}</left><center><lane id="0"/></center></laneSection>'
+    network = RoadNetwork.parse(map_of(road(lanes=wide + only_left)))
+    place = network.advance(network.location("1", -2, 20.0), 30.0)
+    assert place is not None
+    assert place.lane == -2
+    assert network.pose(place).x == pytest.approx(50.0)
