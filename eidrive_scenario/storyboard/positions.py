@@ -11,6 +11,7 @@ from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.roads.location import PositionError
 from eidrive_scenario.storyboard.geographic import height_of_level, plane_coordinates
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.route import route_of
@@ -33,7 +34,10 @@ def resolve(position: model.Position, stage: Stage, actor: str | None = None) ->
     if held is not None and held[0] is position:
         return held[1]
     frame = position.chosen()
-    place = FRAMES[type(frame)](frame, stage, actor)
+    try:
+        place = FRAMES[type(frame)](frame, stage, actor)
+    except PositionError as error:
+        raise _missing(frame, f"means no place: {error.problems[0].message}", error.problems[0].remedy) from error
     if isinstance(frame, FIXED):
         stage.fixed_places[id(position)] = (position, place)
     return place

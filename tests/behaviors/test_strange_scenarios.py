@@ -65,3 +65,16 @@ def test_air_without_end_and_wind_without_example(run: Any) -> None:
 def test_a_negative_wind_is_refused(run: Any) -> None:
     with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; give a number that is not negative"):
         run(0.2, ("Ego", everywhere(WEATHER.format(wind=-1, fog=100))), driven=False)
+
+
+ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="way" closed="false">
+  <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="100"/></Position></Waypoint>
+  <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="300"/></Position></Waypoint>
+  </Route></RouteRef><InRoutePosition><FromLaneCoordinates pathS="50" laneId="7"/></InRoutePosition></RoutePosition>
+  </Position></TeleportAction>"""
+
+
+def test_a_lane_beside_the_route_is_refused_by_its_line(run: Any) -> None:
+    told = r"scene\.xosc:\d+: RoutePosition means no place: road '1' has no lane 7 at s = 150"
+    with pytest.raises(InputError, match=told):
+        run(1, ("Ego", private(ON_ROUTE)), driven=False)
