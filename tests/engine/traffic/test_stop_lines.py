@@ -130,7 +130,7 @@ def test_a_car_that_stands_on_the_line_is_not_held_by_it(car: Car) -> None:
     assert place.x > 102.0
 
 
-def test_a_light_on_a_connecting_road_holds_cars_before_the_junction(library_roads: RoadNetwork, car: Car) -> None:
+def test_red_lights_hold_a_car_before_the_junction_until_they_are_green(library_roads: RoadNetwork, car: Car) -> None:
     lights = Lights()
     fleet = Fleet(library_roads, must_stop=lights)
     start = library_roads.location("3", 1, 70.0)
@@ -139,6 +139,9 @@ def test_a_light_on_a_connecting_road_holds_cars_before_the_junction(library_roa
         place = fleet.step(None, 0.05)["me"]
     assert lights.asked == {"10", "20", "30", "40"}
     assert place.speed < 0.05
+    stands = library_roads.locate_at(place.x, place.y)
+    assert stands is not None
+    assert stands.road == "3"
     lights.red = False
     for _ in range(900):
         fleet.step(None, 0.05)
