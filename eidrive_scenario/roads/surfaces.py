@@ -50,8 +50,10 @@ LONGEST = 25.0
 FILL_RADIUS = 9.0
 """Triangles of a smaller circumradius fill junctions: the holes between lanes, not the bays at the corners [m]."""
 FILL_DEPTH = 0.02
+CYCLE_DEPTH = 0.01
 MARKING_HEIGHT = 0.02
-"""Markings lie above the surface, the filling of junctions below, so that neither flickers in a picture [m]."""
+"""Markings lie above the surface, the filling of junctions below, and cycle lanes across a junction in between, so that
+nothing flickers in a picture [m]."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,8 @@ def _lane_parts(
         low, high = _points(network, road, s, inner), _points(network, road, s, outer)
         if kind == "junction" and road.junction_id is not None:
             edges.setdefault(road.junction_id, []).extend((low, high))
+        if kind == "biking" and road.junction_id is not None:
+            low, high = low - (0.0, 0.0, CYCLE_DEPTH), high - (0.0, 0.0, CYCLE_DEPTH)
         lift_inner, lift_outer = _lift(lane, ds)
         raised = low + np.outer(lift_inner, (0.0, 0.0, 1.0))
         faces = _ribbon(len(s))

@@ -93,3 +93,16 @@ def test_objects_repeat_along_the_road(road: Text, map_of: Text) -> None:
     posts, parts = np.array([(p.pose.x, p.pose.y, p.height) for p in placed[:3]]), placed[3:]
     assert posts == pytest.approx(np.array([(10, 4, 1), (30, 5, 1.5), (50, 6, 2)]))
     assert np.array([(p.pose.x, p.length) for p in parts]) == pytest.approx(np.array([(2, 4), (6, 4), (10, 4)]))
+
+
+def test_cycle_lanes_pass_below_the_lanes_of_cars_in_junctions(road: Text, map_of: Text) -> None:
+    both = (
+        '<laneSection s="0"><center><lane id="0"/></center><right>'
+        '<lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
+        '<lane id="-2" type="biking"><width sOffset="0" a="1" b="0" c="0" d="0"/></lane></right></laneSection>'
+    )
+    inside = by_kind(RoadNetwork.parse(map_of(road(lanes=both, junction="9"), rest='<junction id="9" name=""/>')))
+    assert np.unique(inside["biking"].vertices[:, 2]) == pytest.approx([-0.01])
+    assert inside["junction"].vertices[:, 2].max() == 0.0
+    outside = by_kind(RoadNetwork.parse(map_of(road(lanes=both))))
+    assert np.unique(outside["biking"].vertices[:, 2]) == pytest.approx([0.0])
