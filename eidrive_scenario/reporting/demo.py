@@ -93,7 +93,7 @@ def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple
             street_picture(bodies, roads, view, pose, without=EGO),
         )
     )
-    for sender in (heard.message.sender for heard in snapshot.heard):
+    for sender in dict.fromkeys(heard.message.sender for heard in snapshot.heard):
         pose = helper_view(view, sender, HIDDEN)
         png = street_picture(bodies, roads, view, pose, without=sender)
         pictures.append(CameraPicture(f"What {sender} sees", f"at {view.time:.2f} s, looking at {HIDDEN}", png))

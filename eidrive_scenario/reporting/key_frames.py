@@ -151,7 +151,7 @@ class KeyFrames:
             if "heard" not in self._found:
                 senders = [held.message.sender for held in snapshot.heard if self._shows(held.message.detections)]
                 if senders:
-                    title = f"{self.ego} knows {self.hidden} from {_listed(senders)} alone"
+                    title = f"{self.ego} knows {self.hidden} from {_listed(list(dict.fromkeys(senders)))} alone"
                     self._found["heard"] = (title, snapshot)
         if "entered" not in self._found and self.areas:
             at = snapshot.view.centres[snapshot.view.row(self.hidden), :2]

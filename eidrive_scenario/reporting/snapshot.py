@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.received_objects import ReceivedObjects
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.message import LinkEvent, Received
+from eidrive_scenario.v2x.message import LinkEvent, Message, Received
 from eidrive_scenario.world.view import WorldView
 
-REPORT_LIFETIME = AgentSettings().report_timeout
-"""How long a station goes by an old report [s]."""
+USUAL = AgentSettings()
+"""A station's, which say how long it goes by an old report."""
 LINK_LIFETIME = 0.15
 """How long the last message on a link stays in the picture [s]; links of 10 Hz then do not flicker."""
 
@@ -22,7 +23,8 @@ class Snapshot:
     """What `station` saw (`own`), holds from others (`heard`) and concluded (`fused`), and the links towards it.
 
     `own` is what the station goes by: where its own detections travel the channel too, those that have come back.
-    `heard` and `links` hold one entry per sender, the newest.
+    `heard` holds one entry per sender and kind of message: the newest, with what the sender said before of objects that
+    the newest leaves out. `links` hold one per sender, the newest.
     """
 
     station: str
@@ -44,7 +46,8 @@ class Knowledge:
 
     def __init__(self, station: str) -> None:
         self.station = station
-        self._heard: dict[str, Received] = {}
+        self._heard: dict[tuple[str, str], Received] = {}
+        self._partial: dict[str, ReceivedObjects] = {}
         self._links: dict[str, LinkEvent] = {}
         self._own_travels = False
 
@@ -53,33 +56,47 @@ class Knowledge:
         now = frame.view.time
         step = frame.steps.get(self.station)
         for received in step.inbox if step else ():
-            held = self._heard.get(received.message.sender)
-            if held is None or received.message.detections.time >= held.message.detections.time:
-                self._heard[received.message.sender] = received
+            self._hear(received)
         for event in frame.links:
             if event.receiver == self.station:
                 self._links[event.sender] = event
                 self._own_travels |= event.sender == self.station
         self._heard = {
-            name: held
-            for name, held in self._heard.items()
-            if now - held.message.detections.time <= REPORT_LIFETIME + 1e-9
+            key: held
+            for key, held in self._heard.items()
+            if now - held.message.detections.time <= _lifetime(held.message) + 1e-9
         }
         self._links = {name: event for name, event in self._links.items() if now - event.sent <= LINK_LIFETIME + 1e-9}
         return Snapshot(
             station=self.station,
             view=frame.view,
             own=self._own(step, now),
-            heard=tuple(held for name, held in self._heard.items() if name != self.station),
+            heard=tuple(held for (name, _), held in self._heard.items() if name != self.station),
             fused=step.fused if step else Detections(now),
             links=tuple(event for name, event in self._links.items() if name != self.station),
             step=step,
         )
+
+    def _hear(self, received: Received) -> None:
+        message = received.message
+        if message.objects is not None:
+            usual = USUAL.lifetime(complete=False)
+            said = self._partial.setdefault(message.sender, ReceivedObjects(usual)).take(message)
+            received = replace(received, message=replace(message, detections=said))
+        key = message.sender, message.kind
+        held = self._heard.get(key)
+        if held is None or received.message.detections.time >= held.message.detections.time:
+            self._heard[key] = received
 
     def _own(self, step: AgentStep | None, now: float) -> Detections:
         if step is None:
             return Detections(now)
         if not self._own_travels:
             return step.detections
-        held = self._heard.get(self.station)
+        held = self._heard.get((self.station, "cpm"))
         return held.message.detections if held is not None else Detections(now)
+
+
+def _lifetime(message: Message) -> float:
+    """How long a station goes by a message [s]."""
+    return USUAL.lifetime(complete=message.objects is None and message.kind == "cpm")

@@ -110,6 +110,39 @@ def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(st
     assert (snapshot.heard, snapshot.links) == ((), ())
 
 
+def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[Received, ...]:
+    """What Ego holds in the end where it hears these, one after the other, from the first frame on."""
+    knowledge = Knowledge("Ego")
+    for frame, message in zip(frames, messages, strict=False):
+        step = dataclasses.replace(frame.steps["Ego"], inbox=(Received(message, frame.view.time),))
+        snapshot = knowledge.observe(Frame(frame.view, {"Ego": step}))
+    return snapshot.heard
+
+
+def test_who_tells_of_itself_is_still_known_to_see_others(street: Play) -> None:
+    """A CAM has its sender as its only object, and takes no CPM's place."""
+    frames = street(None)
+    state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    seen = frames[0].steps["Ego"].detections
+    report = Message("Rsu", 0, 0.0, state, seen, 100)
+    itself = Message("Rsu", 1, 0.05, state, dataclasses.replace(seen.subset([0]), time=0.05), 100, "cam")
+    heard = heard_by_ego(frames, report, itself)
+    assert [(held.message.kind, len(held.message.detections)) for held in heard] == [("cpm", len(seen)), ("cam", 1)]
+
+
+def test_objects_that_a_message_leaves_out_are_known_from_those_before(street: Play) -> None:
+    frames = street(None)
+    state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    one = frames[0].steps["Ego"].detections.subset([0])
+    other = dataclasses.replace(one, time=0.05, boxes=one.boxes + np.eye(7)[0] * 20.0)
+    parts = [
+        Message("Rsu", n, now, state, held, 100, objects=(n,))
+        for n, (now, held) in enumerate([(0.0, one), (0.05, other)])
+    ]
+    (known,) = heard_by_ego(frames, *parts)
+    assert known.message.detections.tracks == (0, 1)
+
+
 def test_conflict_area_and_roads_are_drawn_below_the_cars(street: Play) -> None:
     area = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
     lane = np.array([[0.0, -1.75], [60.0, -1.75], [60.0, 1.75], [0.0, 1.75]])
