@@ -219,6 +219,18 @@ def test_two_arrive_together(scene: Any) -> None:
     assert played.at(end + 0.1).speed == 22.0
 
 
+@pytest.mark.parametrize("dt", [0.01, 0.02, 0.05, 0.1, 0.5])
+def test_at_any_step_the_meeting_ends_when_the_master_arrives(scene: Any, dt: float) -> None:
+    """Ego needs (200 - 100) / 20 = 5 s, a whole number of all these steps."""
+    action = """<PrivateAction><SynchronizeAction masterEntityRef="Ego">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="200"/></TargetPositionMaster>
+      <TargetPosition><LanePosition roadId="1" laneId="-2" s="220"/></TargetPosition>
+      </SynchronizeAction></PrivateAction>"""
+    played = scene(6, ("Other", action), dt=dt, other=(-2, 150.0, 10.0))
+    assert played.when("action 0", "completeState") == pytest.approx(5.0)
+    assert played.at(5.0, "Other").x == pytest.approx(220.0)
+
+
 @pytest.mark.element("SynchronizeAction")
 def test_who_is_early_by_far_arrives_together_all_the_same(scene: Any) -> None:
     """Other needs (350 - 150) / 10 = 20 s; Ego has 100 m for that: braking evenly from 20 m/s it would be there after

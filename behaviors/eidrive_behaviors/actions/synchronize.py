@@ -62,7 +62,7 @@ class SynchronizeAction(ActionBehaviour):
         speed = self.stage.speed(self.action.master_entity_ref)
         time = max(master_way - theirs, TINY) / speed if speed > TINY else math.inf
         final = self._final_speed()
-        if way < mine + TINY or master_way < theirs + TINY or passed or time < dt:
+        if way < mine + TINY or master_way < theirs + TINY or passed or time < dt + TINY:
             if final is not None:
                 motion.speed = final
             return Status.SUCCESS
