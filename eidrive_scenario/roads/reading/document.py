@@ -139,6 +139,12 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
         lane_offset = read_lane_offset(lanes, findings)
         sections = read_sections(lanes, length, lane_offset, findings)
     junction = element.get("junction", "-1")
+    for profile in element.iterfind("lateralProfile/*"):
+        level = [findings.number(profile, name, 0.0) == 0.0 for name in "abcd"]
+        if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
+            message = f"road {number!r} has <{profile.tag}>, which is not read: its cross section is straight"
+            remedy = "say the slope by <superelevation>"
+            findings.doubt(profile, "road-surface", "cross sections that are not read", message, remedy)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -179,6 +185,12 @@ def _read_link(element: etree._Element | None, findings: Findings) -> RoadLink |
         findings.add(element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction")))
         return None
     number = findings.text(element, "elementId")
+    if kind == "road" and element.get("elementS") is not None:
+        # Of virtual junctions (1.6 to 1.8): a way into or out of a road between its ends.
+        message = f"a road leads to road {number!r} between its ends, and ends there instead"
+        remedy = "split that road there, and join the parts by a junction"
+        findings.doubt(element, "road-link", "roads that lead to others between their ends", message, remedy)
+        return None
     contact = findings.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
 
@@ -189,13 +201,22 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], findings: Fi
         read = _read_connection(connection, roads, findings)
         if read is not None:
             connections.append(read)
+    number, kind = findings.text(element, "id"), element.get("type", "default")
+    if kind == "virtual":
+        connections = [one for one in connections if _ends_at(roads[one.incoming_road], number)]
     return Junction(
-        id=findings.text(element, "id"),
+        id=number,
         name=element.get("name", ""),
-        type=element.get("type", "default"),
+        type=kind,
         connections=tuple(connections),
         controllers=tuple(findings.text(controller, "id") for controller in element.iterfind("controller")),
     )
+
+
+def _ends_at(road: Road, junction: str) -> bool:
+    """Whether an end of the road lies at the junction; what a virtual one joins in between is no way."""
+    ends = (road.predecessor, road.successor)
+    return any(link is not None and (link.element_type, link.element_id) == ("junction", junction) for link in ends)
 
 
 def _read_connection(element: etree._Element, roads: dict[str, Road], findings: Findings) -> Connection | None:

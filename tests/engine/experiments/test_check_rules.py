@@ -80,7 +80,7 @@ IN_PLACE_OF = {
     "StartTrigger": "StartTrigger",
 }
 """What of the first event an example's element replaces."""
-OF_ROADS = {"link", "planView", "lanes", "signals", "junction"}
+OF_ROADS = {"link", "planView", "lateralProfile", "lanes", "signals", "junction"}
 """Elements of the road file."""
 
 

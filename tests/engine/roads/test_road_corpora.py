@@ -5,7 +5,7 @@ import gzip
 import math
 import warnings
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from types import ModuleType
 from typing import Any
 
@@ -86,9 +86,9 @@ def test_a_hundred_thousand_points_of_a_town(corpora: Path) -> None:
     width = tables.width.value(row, s - tables.section_start[tables.lane_section[row]])
     poses = tables.lane_poses(row, s, rng.uniform(-0.45, 0.45, len(rows)) * width)
     network.locate(poses.x[:1], poses.y[:1])
-    before = perf_counter()
+    before = process_time()
     found = network.locate(poses.x, poses.y, poses.z)
-    assert perf_counter() - before < 2.0
+    assert process_time() - before < 2.0
     assert np.all(found.outside == 0.0)
     back = tables.road_poses(found.road, found.s, found.t)
     assert np.hypot(back.x - poses.x, back.y - poses.y).max() < 0.01

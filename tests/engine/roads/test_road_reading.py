@@ -236,3 +236,24 @@ def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, 
     for key in list(network.graph)[:8]:
         start = network.roads[key.road].sections[key.section].s
         network.advance(network.location(key.road, key.lane, start), 30.0)
+
+
+def test_a_virtual_junction_does_not_lead_from_the_ends_of_its_main_road(road: Text, map_of: Text) -> None:
+    """A driveway leaves road 1 at s = 50; whoever comes to the end of road 1 must not get into it."""
+    leaves = '<predecessor elementType="road" elementId="1" elementS="50" elementDir="+"/>'
+    connection = (
+        '<connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start"><laneLink from="-1" to="-1"/>'
+        "</connection>"
+    )
+    virtual = (
+        '<junction id="9" name="" type="virtual" mainRoad="1" sStart="45" sEnd="55" orientation="+">'
+        f"{connection}</junction>"
+    )
+    driveway = road("2", x=50.0, y=-2.0, hdg=-1.5, length=20.0, link=leaves, junction="9")
+    network = RoadNetwork.parse(map_of(road("1"), driveway, rest=virtual), "town.xodr")
+    assert network.advance(network.location("1", -1, 90.0), 20.0) is None
+    (doubt,) = network.doubts
+    assert str(doubt) == (
+        "town.xodr:1: a road leads to road '1' between its ends, and ends there instead; "
+        "split that road there, and join the parts by a junction"
+    )
