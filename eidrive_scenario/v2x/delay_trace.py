@@ -45,7 +45,7 @@ class TraceDelay(Settings):
             return data
         if data.get("seconds") is not None:
             raise ValueError("give either seconds or a file")
-        scale = UNITS.get(data.get("unit", "s"), 1.0)
+        scale = UNITS.get(str(data.get("unit", "s")), 1.0)
         values = _column(Path(str(data["file"])), data.get("column", 0))
         return {**data, "seconds": [scale * value for value in values]}
 
@@ -71,13 +71,15 @@ class TraceDelay(Settings):
         return self.seconds[number % len(self.seconds)]
 
 
-def _column(path: Path, column: str | int) -> list[float]:
+def _column(path: Path, column: object) -> list[float]:
     """The numbers in a column of a CSV file; a first row of words names the columns. Raises ValueError."""
+    if not isinstance(column, str | int) or isinstance(column, bool):
+        raise ValueError(f"the column is {column!r}; give its name, or its number from 0 on")
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.reader(stream)
             rows = [(reader.line_num, row) for row in reader if row]
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
     if not rows:
         raise ValueError(f"{path} is empty")

@@ -163,6 +163,10 @@ def test_each_wrong_key_is_told_with_its_own_line_however_deep_it_stands(tmp_pat
         ("delay\n0.1\n", "column: 1", "has no column 1; it has 1, from 0 on"),
         ("delay\n0.1\n", "column: -1", "has no column -1; it has 1, from 0 on"),
         ("delay\n0.1\n", "unit: min", "'delay.trace.unit' is 'min'; input should be 's' or 'ms'"),
+        ("delay\n0.1\n", "unit: [ms]", r"'delay.trace.unit' is \['ms'\]; input should be 's' or 'ms'"),
+        ("delay\n0.1\n", "column: [1]", r"the column is \[1\]; give its name, or its number from 0 on"),
+        ("delay\n0.1\n", "column: 0.5", "the column is 0.5; give its name"),
+        ("delay\n" + 200_000 * "1" + "\n", "", "cannot read .*measured.csv: field larger than field limit"),
     ],
 )
 def test_a_measured_trace_that_is_none(tmp_path: Path, rows: str | None, more: str, words: str) -> None:
