@@ -14,8 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.simulation import RunResult, RunSettings, run_file
+from eidrive_scenario.simulation import RunSettings
 
 T = TypeVar("T")
 
@@ -33,11 +32,6 @@ class Job:
 def jobs_of(scenario: str, arms: dict[str, RunSettings], seeds: Sequence[int]) -> tuple[Job, ...]:
     """Every arm with every seed. Seed by seed, so that a run that was cut short still holds pairs."""
     return tuple(Job(scenario, arm, seed, settings) for seed in seeds for arm, settings in arms.items())
-
-
-def run_job(job: Job) -> RunResult:
-    """The plain task: run it, keep the result."""
-    return run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings)
 
 
 def cores() -> int:
