@@ -36,10 +36,10 @@ def test_all_files_are_counted() -> None:
 
 def test_the_largest_is_counted_at_once_and_walked_in_constant_memory() -> None:
     path = next(path for path in distributions() if path.name == LARGEST)
-    started = time.perf_counter()
+    started = time.process_time()
     runs = load_distribution(path)
     assert len(runs) == 52_500
-    assert time.perf_counter() - started < 2
+    assert time.process_time() - started < 2
     seen = set()
     tracemalloc.start()
     for run in runs:

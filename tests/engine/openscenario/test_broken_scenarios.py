@@ -61,7 +61,7 @@ def test_broken_file_is_refused_where_it_is_wrong(name: str, monkeypatch: pytest
 
 @pytest.mark.parametrize("name", ["xml_bomb", "external_entity"])
 def test_dangerous_files_are_refused_at_once(name: str) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ScenarioError):
         load_scenario(BROKEN / f"{name}.xosc")
-    assert time.perf_counter() - started < 0.5
+    assert time.process_time() - started < 0.5
