@@ -176,7 +176,6 @@ WITHOUT_EFFECT = {
     "SensorAttachment.MountingPosition": "sensors are those of the station's controller",
     "SensorAttachment.sensorRef": "sensors are those of the station's controller",
     "SensorAttachments.SensorAttachment": "sensors are those of the station's controller",
-    "VariableDeclaration.variableType": "values are kept as text; conditions compare numbers where both are numbers",
     "Vehicle.SensorAttachments": "sensors are those of the station's controller",
     "Vehicle.vehicleRole": "a word about a vehicle; traffic draws roles from its own distribution",
 }

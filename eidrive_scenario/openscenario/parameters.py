@@ -131,7 +131,7 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
     scalar = TYPES[declaration.parameter_type]
     place = (assignment and assignment.origin) or Problem("", "", declaration.source, declaration.line)
     name, text = declaration.name, assignment.text if assignment else declaration.value
-    if not _fits(declaration.value, scalar):
+    if not fits_type(declaration.value, scalar):
         findings.warn(
             f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{declaration.value!r}",
@@ -171,7 +171,8 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
         )
 
 
-def _fits(text: str, scalar: Scalar) -> bool:
+def fits_type(text: str, scalar: Scalar) -> bool:
+    """Whether a text is a value of a type."""
     try:
         scalar.convert(text)
     except ValueError:

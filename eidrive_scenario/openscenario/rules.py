@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from eidrive_scenario.openscenario.declared_types import check_types
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
     CatalogReference,
@@ -48,6 +49,7 @@ def check_rules(
             what = "Orientation says nothing, which by the standard means the heading 0 of the world"
             remedy = 'leave it out, or write type="relative", to look along the road'
             findings.warn(what, remedy, source=element.source, line=element.line)
+    check_types(elements, findings)
     check_names(root, elements, version, entries, findings)
 
 

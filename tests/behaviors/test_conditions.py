@@ -124,6 +124,11 @@ def test_speeds_while_ego_brakes_to_a_stop_in_four_seconds(scene: Any, condition
     assert first(played) == pytest.approx(time)
 
 
+def test_a_direction_is_named(scene: Any) -> None:
+    slow = '<SpeedCondition rule="lessThan" value="1" direction="lateral"/>'
+    assert "lateral speed 0" in scene(1, ("Ego", NOTHING, of(slow))).why("event 0")
+
+
 @pytest.mark.element("triggeringEntitiesRule")
 def test_any_and_all(scene: Any) -> None:
     fast = '<SpeedCondition rule="greaterThan" value="15"/>'

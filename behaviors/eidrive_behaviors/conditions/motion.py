@@ -25,6 +25,10 @@ def velocity_of(view: View, entity: str) -> list[float]:
     return vector
 
 
+def _named(direction: model.DirectionalDimension | None) -> str:
+    return "" if direction is None else f"{direction.value} "
+
+
 class SpeedCondition(QuantityCondition):
     """Speed [m/s], signed along the heading; with a direction the velocity's component along that axis."""
 
@@ -33,7 +37,7 @@ class SpeedCondition(QuantityCondition):
 
     def what(self) -> str:
         """What is compared."""
-        return "speed"
+        return f"{_named(self.element.direction)}speed"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The speed."""
@@ -50,7 +54,7 @@ class RelativeSpeedCondition(QuantityCondition):
 
     def what(self) -> str:
         """What is compared."""
-        return f"speed above that of {self.element.entity_ref}"
+        return f"{_named(self.element.direction)}speed above that of {self.element.entity_ref}"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The difference."""
@@ -72,7 +76,7 @@ class AccelerationCondition(QuantityCondition):
 
     def what(self) -> str:
         """What is compared."""
-        return "acceleration"
+        return f"{_named(self.element.direction)}acceleration"
 
     def quantity(self, stage: Stage, entity: str) -> float:
         """The acceleration."""
