@@ -5,7 +5,7 @@ docs/checks.md says of each rule what it means, with an example that breaks it a
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.lint import actions, declarations, entities, triggers
+from eidrive_scenario.openscenario.lint import actions, declarations, entities, partners, triggers
 from eidrive_scenario.openscenario.lint.rule import Level, Rule, at
 from eidrive_scenario.openscenario.lint.survey import Survey
 
@@ -43,6 +43,8 @@ RULES: tuple[Rule[Survey], ...] = (
     Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.too_fast),
     Rule("no-progress", Level.NOTE, "a transition at the rate 0", actions.no_progress),
     Rule("untimed-trajectory", Level.WARNING, "times that are missing or all the same", actions.untimed_trajectories),
+    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that nobody starts", partners.unknown_traffic),
+    Rule("loose-trailer", Level.WARNING, "a trailer that nothing holds", partners.loose_trailers),
     Rule("unread-parameter", Level.WARNING, "a parameter set for nobody", declarations.unread_parameters),
     Rule("unused-parameter", Level.WARNING, "a parameter that nothing uses", declarations.unused_parameters),
     Rule("unused-variable", Level.WARNING, "a variable that nothing uses", declarations.unused_variables),
