@@ -78,7 +78,7 @@ def _controls(leaf: Element) -> set[str]:
 
 
 def too_fast(survey: Survey) -> Iterator[Problem]:
-    """A speed beyond the maxSpeed of the vehicle that shall drive it."""
+    """A speed beyond the maxSpeed of the vehicle that shall drive it, forwards or backwards."""
     for action, actors in survey.performances:
         for element in action.walk():
             speed = _speed(element)
@@ -87,7 +87,7 @@ def too_fast(survey: Survey) -> Iterator[Problem]:
             for name in actors:
                 body = survey.scenario.entities.get(name)
                 limit = body.performance.max_speed if isinstance(body, Vehicle) else None
-                if limit is not None and speed > limit + 1e-9:
+                if limit is not None and abs(speed) > limit + 1e-9:
                     yield at(
                         element,
                         f"{speed:g} m/s is asked of {name!r}, whose maxSpeed is {limit:g} m/s",

@@ -62,7 +62,7 @@ class Watch:
 
 
 class Reach:
-    """The earliest times of a outline's elements [s]; inf for never."""
+    """The earliest times of an outline's elements [s]; inf for never."""
 
     def __init__(self, outline: Outline) -> None:
         self._outline = outline

@@ -173,6 +173,11 @@ def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> N
         assert problem.remedy
 
 
+def test_backwards_a_car_is_no_faster(folder: Path) -> None:
+    assert "above-max-speed" in broken(folder, SPEED.replace('value="10"', 'value="-61"'))
+    assert "above-max-speed" not in broken(folder, SPEED.replace('value="10"', 'value="-60"'))
+
+
 def test_a_rule_can_be_left_out(folder: Path) -> None:
     findings(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
