@@ -78,7 +78,9 @@ class Controller:
         x = float(ego.position[0]) + self.spec.wheelbase * math.cos(ego.yaw)
         y = float(ego.position[1]) + self.spec.wheelbase * math.sin(ego.yaw)
         heading, left = _nearest(plan.points[:12].tolist(), x, y)
-        back = min(max(-CROSS_TRACK_GAIN * left, -LARGEST_APPROACH), LARGEST_APPROACH)
+        back = -CROSS_TRACK_GAIN * left
+        if abs(back) > LARGEST_APPROACH:
+            back = math.copysign(LARGEST_APPROACH, back)
         turn = math.atan2(back, SOFTENING + max(ego.speed, 0.0))
         self._steering = self._direction.update(turn, feed_forward=wrap_angle(heading - ego.yaw))
         return self._steering

@@ -230,7 +230,7 @@ class Motion:
 
     def _begin_lap(self, before: LaneLocation, after: LaneLocation) -> None:
         """Where a step passes the start of the route's lap, the lap is the route from then on."""
-        lap = self.route.lap if self.route is not None else None
+        lap = self._route.lap if self._route is not None else None
         if lap is None or self.roads is None or after.road != lap.start.road:
             return
         way = self.roads.driving_direction(after.road, after.lane)
