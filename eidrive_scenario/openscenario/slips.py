@@ -88,7 +88,22 @@ def _catalog_references_first(node: etree._Element) -> None:
         first.addprevious(reference)
 
 
+def _graffic(node: etree._Element) -> bool:
+    return node.get("miscObjectCategory") == "grafficIsland"
+
+
+def _traffic(node: etree._Element) -> None:
+    node.set("miscObjectCategory", "trafficIsland")
+
+
 SLIPS = (
+    Slip(
+        "MiscObject",
+        "the category of a MiscObject is written 'grafficIsland'",
+        "write trafficIsland; other tools may refuse it",
+        _graffic,
+        _traffic,
+    ),
     Slip(
         "ManeuverGroup",
         "a CatalogReference stands behind a Maneuver in ManeuverGroup",
