@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from typing import Self
 
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
@@ -113,10 +114,11 @@ class Simulation:
         self.close()
 
     def close(self) -> None:
-        """Free the world and finish what the observers write."""
-        self.world.close()
-        for observer in self._observers:
-            observer.close()
+        """Free the world and finish what the observers write, each of them, whatever another one meets at it."""
+        with ExitStack() as stack:
+            for observer in reversed(self._observers):
+                stack.callback(observer.close)
+            self.world.close()
 
     def set_user_value(self, name: str, value: str) -> None:
         """Give a value to the UserDefinedValueConditions of this name, from the next tick on."""

@@ -211,3 +211,21 @@ def test_observers_are_closed_once_even_when_the_run_breaks() -> None:
     with pytest.raises(RuntimeError, match="full disk"):
         play(ONE, 1, watch)
     assert watch.closed == 1
+
+
+def test_observers_are_closed_whatever_one_of_them_meets_at_it() -> None:
+    order: list[str] = []
+
+    class Closes(Frames):
+        def __init__(self, name: str, error: str = "") -> None:
+            super().__init__()
+            self.name, self.error = name, error
+
+        def close(self) -> None:
+            order.append(self.name)
+            if self.error:
+                raise OSError(self.error)
+
+    with pytest.raises(OSError, match="full disk"):
+        play(ONE, 1, Closes("first"), Closes("second", "full disk"), Closes("third"))
+    assert order == ["first", "second", "third"]
