@@ -49,7 +49,8 @@ def show(result: RunResult, varied: str = "") -> None:
         out.print(table)
     else:
         out.print("no criterion: nothing was judged", style="yellow")
-    speed = f", {result.simulated_s / result.wall_s:.0f} times real time" if result.wall_s > 0 else ""
+    pace = result.simulated_s / result.wall_s if result.wall_s > 0 else 0.0
+    speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
     out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
     out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
     for warning in result.warnings:

@@ -1,11 +1,16 @@
 """What docs/why.md shows of scenario 1 is what comes."""
 
+import json
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from typer.testing import Result
+
+from eidrive_scenario.recording.csv_writer import COLUMNS
 
 Eidrive = Callable[..., Result]
 PAGE = Path(__file__).parents[3] / "docs" / "why.md"
@@ -30,3 +35,22 @@ def test_the_explanation(eidrive: Eidrive, blocks: list[list[str]]) -> None:
     printed = eidrive(*command.removeprefix("$ eidrive ").split()).stdout
     told = [re.sub(r"'(\w+)', .*/(scenario_1\.xosc)", r"'\1', \2", line) for line in printed.splitlines()]
     assert told[-len(shown) :] == shown
+
+
+RESULTS = PAGE.with_name("results.md")
+
+
+def test_all_keys_of_a_result_are_explained(eidrive: Eidrive, passing_by: Path) -> None:
+    text = RESULTS.read_text(encoding="utf-8")
+    table = text[text.index("| key |") : text.index("| metric |")]
+    shown = [key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1] if row else "")]
+    printed = json.loads(eidrive("run", passing_by, "--json", "--no-record").stdout)
+    assert shown == ["scenario", "run", *list(printed)[1:]]
+    assert ",".join(COLUMNS) in text
+
+
+def test_a_recording_is_read_as_shown(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    eidrive("run", passing_by, "--out", tmp_path / "run")
+    code = re.findall(r"```python\n(.*?)```", RESULTS.read_text(encoding="utf-8"), re.DOTALL)[0]
+    printed = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (printed.stdout, printed.stderr) == ("passing_by 1 3.0\n", "")

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
+from eidrive_scenario.cli.verdicts import show
 from eidrive_scenario.recording import read_recording
+from eidrive_scenario.simulation import RunResult
 
 Eidrive = Callable[..., Result]
 
@@ -172,3 +174,10 @@ def test_values_and_stand_ins_for_nobody_are_told(eidrive: Eidrive, passing_by: 
 
 def test_very_long_steps_take_no_memory(eidrive: Eidrive) -> None:
     assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "1000", "--time-limit", "1000").exit_code == 0
+
+
+def test_what_is_slower_than_real_time_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
+    took = {320.0: "0.01 times", 12.9: "0.31 times", 2.0: "2.0 times", 0.1: "40 times"}
+    for wall, told in took.items():
+        show(RunResult("a", 1, "none", True, "stop trigger", 0, (), {}, "00", 4.0, wall))
+        assert f"({wall:.2f} s wall, {told} real time)" in capsys.readouterr().out
