@@ -42,7 +42,7 @@ EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
 class Scenario:
     """A scenario whose parameters are put in and whose catalog references lead somewhere.
 
-    name         the file's name without its suffix; the header's description where there is no file
+    name         the file's name without its suffix; the header's description, on one line, where there is no file
     version      of the standard that the file is written for, as (1, 3)
     parameters   of the scenario as a whole, with the values that count
     variables    of the scenario, with their values at the start
@@ -108,7 +108,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     warnings = findings.settle()
     objects = list(scenario_objects(root.entities, library.entries))
     return Scenario(
-        name=document.path.stem if document.path else root.file_header.description,
+        name=document.path.stem if document.path else " ".join(root.file_header.description.split()) or document.name,
         path=document.path,
         version=read.version,
         document=root,

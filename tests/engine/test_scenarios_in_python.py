@@ -113,6 +113,13 @@ def test_it_is_the_same_run_as_that_of_its_file(cut_in: Build, tmp_path: Path) -
     assert load_scenario(cut_in()).path is None
 
 
+def test_its_name_is_one_line(cut_in: Build) -> None:
+    scenario = cut_in()
+    for description, name in (("a cut-in,\n  from the left", "a cut-in, from the left"), ("", "<Scenario>")):
+        scenario.header.description = description
+        assert load_scenario(scenario).name == name
+
+
 def test_a_mistake_has_the_line_that_the_file_would_have(cut_in: Build, tmp_path: Path) -> None:
     wrong = cut_in(changing="Taget")
     path = tmp_path / "cut_in.xosc"

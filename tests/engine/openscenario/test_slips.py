@@ -110,9 +110,9 @@ def test_a_maneuver_may_stand_before_one_of_a_catalog(scenario_xml: Build, tmp_p
 
 
 def test_the_misspelt_traffic_island(scenario_xml: Build) -> None:
-    island = """<ScenarioObject name="Island"><MiscObject name="i" mass="1" miscObjectCategory="grafficIsland"><BoundingBox>
-    <Center x="0" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox><Properties/></MiscObject>
-    </ScenarioObject>"""
+    island = """<ScenarioObject name="Island"><MiscObject name="i" mass="1" miscObjectCategory="grafficIsland">
+    <BoundingBox><Center x="0" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox>
+    <Properties/></MiscObject></ScenarioObject>"""
     scenario = load_scenario(scenario_xml(entities=island))
     assert only(scenario, MiscObject).misc_object_category is MiscObjectCategory.TRAFFIC_ISLAND
     assert "write trafficIsland" in str(scenario.warnings[0])
