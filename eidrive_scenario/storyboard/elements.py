@@ -60,9 +60,11 @@ class StoryElement(Composite):
         return self.record.state
 
     def stand_by(self) -> None:
-        """Wait for the start trigger; the parent has begun to run."""
+        """Wait for the start trigger; the parent has begun to run. What may never be executed is complete."""
         self.executions = 0
         self._arm()
+        if self.limit < 1:
+            self._change(Transition.SKIP, State.COMPLETE, "its maximumExecutionCount is 0")
 
     def judge(self) -> None:
         """First phase of a turn: stop, start, and let the children do the same.

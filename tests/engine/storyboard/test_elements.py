@@ -170,6 +170,15 @@ def test_a_skipped_event_without_executions_left_is_complete(clock: Any, make: A
     assert ticks[2][:3] == ["running.0 end", "running end", "maneuver end"]
 
 
+def test_what_may_never_be_executed_is_skipped_at_once(clock: Any, make: Any, task: Any) -> None:
+    never, other = make.event("never", task(1), limit=0), make.event("other", task(1))
+    ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(never, other)))), 2)
+    assert "never skip" in ticks[0]
+    assert "other start" in ticks[0]
+    assert never.executions == 0
+    assert ticks[1][-1] == "storyboard end"
+
+
 @pytest.mark.element("priority parallel")
 def test_parallel_lets_others_run(clock: Any, make: Any, task: Any) -> None:
     old, new = make.event("old", task(9)), make.event("new", task(9), start=[NO, YES])
