@@ -81,9 +81,10 @@ _DEFINITIONS = (
 def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
     scenario = storyboard.scenario
     version = ".".join(map(str, scenario.version))
+    count = "1 entity" if len(scenario.entities) == 1 else f"{len(scenario.entities)} entities"
     parts = [
         _text(MARGIN, MARGIN + 18, scenario.name, size=22, weight=700),
-        _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {len(scenario.entities)} entities", colour=MUTED),
+        _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {count}", colour=MUTED),
     ]
     y = MARGIN + 60
     first, *others = stop_lines(storyboard)

@@ -92,3 +92,11 @@ def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
 )
 def test_parameters_as_a_reader_wants_them(text: str, shown: str) -> None:
     assert _shortly(text) == shown
+
+
+def test_where_nobody_is_a_station_nothing_speaks_of_stations(street: Play, tmp_path: Path) -> None:
+    hidden = ".stations { display: none; }"
+    alone = [Frame(frame.view) for frame in street(1)]
+    for frames, expected in ((street(1), False), (alone, True)):
+        page = write_replay(read_recording(recorded(frames, tmp_path)), tmp_path / "page.html")
+        assert (hidden in page.read_text(encoding="utf-8")) is expected
