@@ -106,6 +106,7 @@ def _read_object(road: str, element: etree._Element, findings: Findings) -> Road
         return findings.number(element, name, 0.0)
 
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
+    corners = [tuple(_read_corners(outline, findings)) for outline in outlines]
     return RoadObject(
         id=element.get("id", ""),
         name=element.get("name", ""),
@@ -123,7 +124,7 @@ def _read_object(road: str, element: etree._Element, findings: Findings) -> Road
         width=number("width"),
         height=number("height"),
         radius=number("radius"),
-        outlines=tuple(tuple(_read_corners(outline, findings)) for outline in outlines),
+        outlines=tuple(outline for outline in corners if len(outline) >= 3),
         repeats=tuple(_read_repeat(repeat, element, findings) for repeat in element.iterfind("repeat")),
     )
 

@@ -48,6 +48,19 @@ def test_sizes_are_the_map_s_or_usual_ones() -> None:
 
 
 @pytest.mark.parametrize(
+    "outline", ["", '<cornerLocal u="0" v="0" z="0"/>', '<cornerRoad s="1" t="2"/><cornerRoad s="3" t="2"/>']
+)
+@pytest.mark.parametrize("kind", ["barrier", "building"])
+def test_an_outline_without_three_corners_is_none(kind: str, outline: str) -> None:
+    roads = network(
+        f'type="{kind}" s="50" t="-9" zOffset="0" length="6" width="4" height="3"><outline>{outline}</outline>'
+    )
+    with World(roads) as world:
+        hits = world.cast([[50.0, -2.0, 1.0]], [[50.0, -20.0, 1.0]])
+    assert hits.position[0] == pytest.approx([50.0, -7.0, 1.0], abs=1e-3)
+
+
+@pytest.mark.parametrize(
     "attributes",
     [
         'type="crosswalk" s="50" t="-2" zOffset="0" length="4" width="3" height="0">',
