@@ -58,6 +58,8 @@ class Stations:
         self._dt = dt
         self._fixed_channel = channel is not None
         self._channel: Channel | None = None
+        self._silenced: Channel | None = None
+        """The channel before, where there is none any more: its books still count."""
         self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
         """When the books of the channel were last read, and what they said: those of many links take a while."""
         self.channel_name = NO_COOPERATION
@@ -175,7 +177,7 @@ class Stations:
 
     def metrics(self, now: float) -> dict[str, float]:
         """Counts of messages over all links."""
-        if self._channel is None:
+        if self._channel is None and self._silenced is None:
             return {}
         books = self.link_statistics(now).values()
         return {
@@ -186,11 +188,12 @@ class Stations:
         }
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        """The books of every link, by (sender, receiver); empty without a channel."""
-        if self._channel is None:
+        """The books of every link, by (sender, receiver); empty where there never was a channel."""
+        channel = self._channel or self._silenced
+        if channel is None:
             return {}
         if self._books is None or self._books[0] != now:
-            self._books = now, self._channel.statistics(now)
+            self._books = now, channel.statistics(now)
         return self._books[1]
 
     def _surroundings(self, world: World, view: WorldView) -> Surroundings:
@@ -219,7 +222,10 @@ class Stations:
 
     def _set_channel(self, source: str | Path, *, origin: str, line: int | None) -> None:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line)
-        self._channel = build_channel(profile, self._seed, previous=self._channel)
+        before = self._channel or self._silenced
+        self._channel = build_channel(profile, self._seed, previous=before)
+        self._silenced = before if self._channel is None else None
+        self._books = None
         self.channel_name = profile.name if profile is not None else NO_COOPERATION
         for agent in self._agents.values():
             agent.own_perception = self._own_perception and agent.listens

@@ -277,20 +277,43 @@ def test_asn1_modules_say_how_large_messages_are(tmp_path: Path) -> None:
         assert size == 100 + -(-(48 + 16 + 8 + 31 + 32 + 9 + (7 if count else 0) + 94 * count) // 8)
 
 
+def switched(tmp_path: Path, *channels: tuple[float, str]) -> Path:
+    """Scenario 1 whose storyboard sets channels at times [s]."""
+    start = '<Event name="EgoSetsOff"'
+    events = "".join(
+        f"""<Event name="Switch at {time}" priority="parallel"><Action name="Switch"><UserDefinedAction>
+        <CustomCommandAction type="eidrive.channel">{channel}</CustomCommandAction></UserDefinedAction></Action>
+        <StartTrigger><ConditionGroup><Condition name="Later" delay="0" conditionEdge="none"><ByValueCondition>
+        <SimulationTimeCondition value="{time}" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
+        </StartTrigger></Event>"""
+        for time, channel in channels
+    )
+    return edited(tmp_path, (start, events + start))
+
+
 def test_without_a_channel_nothing_is_told_of_links(tmp_path: Path) -> None:
     """At 0.5 s the storyboard takes the channel away: no fate of a message is told once more after that."""
-    off = """<Event name="SwitchOff" priority="parallel"><Action name="Off"><UserDefinedAction>
-        <CustomCommandAction type="eidrive.channel">none</CustomCommandAction></UserDefinedAction></Action>
-        <StartTrigger><ConditionGroup><Condition name="Later" delay="0" conditionEdge="none"><ByValueCondition>
-        <SimulationTimeCondition value="0.5" rule="greaterOrEqual"/></ByValueCondition></Condition></ConditionGroup>
-        </StartTrigger></Event>"""
-    start = '<Event name="EgoSetsOff"'
     kept = Kept()
-    path = edited(tmp_path, (start, off + start))
+    path = switched(tmp_path, (0.5, "none"))
     run_file(path, seed=1, settings=RunSettings(time_limit=1.0), observers=[kept])
     told = [link.sent for frame in kept.frames for link in frame.links]
     assert len(told) == len(set(told)) > 5
     assert max(told) <= 0.5 + 1e-9
+
+
+@pytest.mark.parametrize("channel", ["ideal", "{model: radio}"])
+def test_messages_said_before_the_channel_was_taken_away_still_count(tmp_path: Path, channel: str) -> None:
+    """Those of the 11 ticks up to 0.5 s, and of the 4 after 0.75 s; in the last tick nobody says anything."""
+    settings = RunSettings(time_limit=1.0)
+    away = run_file(switched(tmp_path, (0.0, channel), (0.5, "none")), seed=1, settings=settings)
+    assert away.channel == "none"
+    back = run_file(switched(tmp_path, (0.0, channel), (0.5, "none"), (0.75, channel)), seed=1, settings=settings)
+    sent = [result.metrics["messages.sent"] for result in (away, back)]
+    assert 11 * sent[1] == 15 * sent[0] > 0
+    for result in (away, back):
+        books = result.links.values()
+        assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
+        assert sum(book.sent for book in books) == result.metrics["messages.sent"]
 
 
 @pytest.mark.parametrize(
