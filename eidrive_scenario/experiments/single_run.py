@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
@@ -123,7 +124,7 @@ def recording_in(place: Path) -> Path:
 
     Raises InputError for a folder without one.
     """
-    if not place.is_dir():
+    if not os.path.isdir(place):
         return place
     for path in (place / RECORDING, partial(place / RECORDING)):
         if path.exists():
@@ -143,13 +144,16 @@ def result_of(recording: Path) -> dict[str, Any] | None:
 
 
 def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
-    """The results in these files and folders, and in folders below, in order of their paths.
+    """The results in these files and folders, and in folders below, in order of their paths; each file once.
 
     Raises InputError for a file that is no result.
     """
-    results = []
+    results, taken = [], set()
     for place in places:
-        for path in sorted(place.rglob(RESULT)) if place.is_dir() else [place]:
+        for path in sorted(place.rglob(RESULT)) if os.path.isdir(place) else [place]:
+            if (real := os.path.realpath(path)) in taken:
+                continue
+            taken.add(real)
             try:
                 result = json.loads(path.read_text(encoding="utf-8"))
             except OSError as error:

@@ -13,6 +13,7 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recording
 from eidrive_scenario.reporting.page import write_page
+from eidrive_scenario.reporting.report import reported
 from eidrive_scenario.reporting.road_drawing import recorded_roads
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
 from eidrive_scenario.reporting.top_view import (
@@ -43,7 +44,7 @@ COLOURS = {
 def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
     """The replay of a recording in the file `out`, which is returned, with the verdicts of its `result` if it is given.
 
-    Raises InputError if the recording holds no frame.
+    Raises InputError if the recording holds no frame, or the result is none.
     """
     data = replay_data(recording.frames(), recorded_roads(recording))
     if not data["times"]:
@@ -53,7 +54,7 @@ def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | No
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
-        result=result,
+        result=None if result is None else reported(result),
         facts=_facts(recording),
         data=data,
     )

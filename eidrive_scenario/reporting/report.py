@@ -64,7 +64,7 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
     there are no results, or one of them is none.
     """
     page = out if out.suffix == ".html" else out / "report.html"
-    runs = [_checked(result) for result in results]
+    runs = [reported(result) for result in results]
     if not runs:
         raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
     groups: dict[tuple[str, str], list[ReportedRun]] = {}
@@ -97,7 +97,8 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
     )
 
 
-def _checked(result: Mapping[str, Any]) -> ReportedRun:
+def reported(result: Mapping[str, Any]) -> ReportedRun:
+    """What pages tell of a run, from what `--json` prints. Raises InputError if it is none."""
     try:
         return ReportedRun.model_validate(result)
     except ValidationError as error:

@@ -84,7 +84,10 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[P
         for controller in actor.controllers
         if not is_ours(controller) and controller.name not in wanted
     ]
-    return alone or [
-        Problem(f"the stand-in for {name!r} found no controller of that name", suggestion(name, names))
-        for name in astray
-    ]
+    ours = {controller.name for actor in actors.values() for controller in actor.controllers if is_ours(controller)}
+    odd = [Problem(f"nothing stands in for {name!r}, which is a controller of ours") for name in wanted if name in ours]
+    if not alone:
+        known = names - ours
+        message = "the stand-in for {!r} found no controller of that name"
+        odd += [Problem(message.format(name), suggestion(name, known)) for name in astray]
+    return [*odd, *alone]

@@ -181,3 +181,10 @@ def test_what_is_slower_than_real_time_is_said_to_be_so(capsys: pytest.CaptureFi
     for wall, told in took.items():
         show(RunResult("a", 1, "none", True, "stop trigger", 0, (), {}, "00", 4.0, wall))
         assert f"({wall:.2f} s wall, {told} real time)" in capsys.readouterr().out
+
+
+def test_nothing_stands_in_for_a_controller_of_ours(eidrive: Eidrive) -> None:
+    short = ("run", "coop/scenario_1", "--no-record", "--time-limit", "0.1")
+    warned = eidrive(*short, "--stand-in", "EgoStack=alks").stderr
+    assert "warning: nothing stands in for 'EgoStack', which is a controller of ours" in warned
+    assert eidrive(*short).stderr == ""

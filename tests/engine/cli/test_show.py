@@ -119,6 +119,16 @@ def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, pa
     eidrive("run", passing_by, "--param", "OtherY=0", "--out", tmp_path)
     eidrive("view", tmp_path)
     assert "Ego and Parked hit each other" in (tmp_path / "recording.html").read_text(encoding="utf-8")
+    (tmp_path / "result.json").write_text('{"trace_hash": "00"}')
+    wrong = eidrive("view", tmp_path)
+    assert (wrong.exit_code, wrong.stderr.startswith("a result's 'scenario': field required")) == (2, True)
     (tmp_path / "result.json").unlink()
     eidrive("view", tmp_path)
     assert "<h3>Verdict" not in (tmp_path / "recording.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("arguments", [["view"], ["report", "-o", "page"]])
+def test_a_name_that_is_no_path_is_a_wrong_input(eidrive: Eidrive, arguments: list[str]) -> None:
+    result = eidrive(*arguments, "x" * 300)
+    assert result.exit_code == 2
+    assert "cannot read: File name too long" in result.stderr

@@ -49,6 +49,8 @@ def test_results_are_found_below_folders(tmp_path: Path) -> None:
     for seed in (2, 1):
         play(PASSING_BY, seed=seed, out=tmp_path / f"seed-{seed}", record=False)
     assert [result["seed"] for result in read_results([tmp_path])] == [1, 2]
+    twice = [tmp_path, tmp_path / "seed-1", tmp_path / "seed-2" / ".." / "seed-2" / "result.json"]
+    assert [result["seed"] for result in read_results(twice)] == [1, 2]
     assert [result["seed"] for result in read_results([tmp_path / "seed-2" / "result.json"])] == [2]
 
 
