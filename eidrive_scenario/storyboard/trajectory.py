@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.clothoids import MOST_POINTS, SPACING, Course, clothoid, clothoid_spline
 from eidrive_scenario.storyboard.nurbs import Nurbs, along_the_curve
 
-SPACING = 0.1
-"""Distance between the points at which curved shapes are laid out [m]."""
-MOST_POINTS = 20_000
-"""On curves of more than 2 km the points are further apart."""
 ROUNDING = 2.0
 """How far from a corner of a polyline the heading begins to turn [m]."""
 
@@ -151,11 +148,16 @@ def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None =
     if isinstance(shape, model.Polyline):
         return _polyline(shape, trajectory.closed, resolve)
     if isinstance(shape, model.Clothoid):
-        return _clothoid(shape, trajectory.closed, resolve)
+        return _passed(clothoid(shape, resolve(shape.position)), trajectory.closed)
     if isinstance(shape, model.ClothoidSpline):
-        return _clothoid_spline(shape, trajectory.closed, resolve, start)
+        return _passed(clothoid_spline(shape, resolve, start), trajectory.closed)
     assert isinstance(shape, model.Nurbs)
     return _nurbs(shape, trajectory.closed, resolve)
+
+
+def _passed(course: Course, closed: bool) -> Layout:
+    s, poses, times = course
+    return Layout(tuple(s), tuple(poses), times, closed)
 
 
 def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
@@ -193,62 +195,6 @@ def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, clo
             poses.append(_blend(a, b, share)._replace(h=line + turn))
         stations.append(stations[-1] + span)
     return Layout(tuple(s), tuple(poses), times, closed, stations=tuple(stations))
-
-
-def _clothoid(shape: model.Clothoid, closed: bool, resolve: Resolve) -> Layout:
-    start = resolve(shape.position)
-    change = shape.curvature_prime if shape.curvature_prime is not None else shape.curvature_dot or 0.0
-    s, poses = _spiral(start, shape.curvature, shape.curvature + change * shape.length, shape.length)
-    times = None
-    if shape.start_time is not None and shape.stop_time is not None:
-        times = _even(s, shape.start_time, shape.stop_time)
-    return Layout(tuple(s), tuple(poses), times, closed)
-
-
-def _clothoid_spline(shape: model.ClothoidSpline, closed: bool, resolve: Resolve, here: Pose | None) -> Layout:
-    s: list[float] = [0.0]
-    poses: list[Pose] = []
-    for segment in shape.clothoid_spline_segment:
-        if segment.position_start is not None:
-            here = resolve(segment.position_start)
-        if here is None:
-            here = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        here = here._replace(h=here.h + (segment.h_offset or 0.0))
-        along, line = _spiral(here, segment.curvature_start, segment.curvature_end, segment.length)
-        base = s[-1]
-        s += [base + distance for distance in along]
-        poses += line
-        here = line[-1]
-    return Layout(tuple(s[1:]), tuple(poses), _spline_times(shape, s[1:]), closed)
-
-
-def _spline_times(shape: model.ClothoidSpline, s: Sequence[float]) -> tuple[float, ...] | None:
-    """Times at the points: constant speed between the segments that say when they begin; the first one says 0."""
-    if shape.time_end is None:
-        return None
-    known, begin = {0.0: 0.0}, 0.0
-    for segment in shape.clothoid_spline_segment:
-        if segment.time_start is not None:
-            known[begin] = segment.time_start
-        begin += segment.length
-    known[begin] = shape.time_end
-    return tuple(np.interp(s, list(known), list(known.values())).tolist())
-
-
-def _spiral(start: Pose, first: float, last: float, length: float) -> tuple[list[float], list[Pose]]:
-    """Points of a curve whose curvature goes linearly from `first` to `last`; midpoint rule on short steps."""
-    count = min(max(1, math.ceil(length / SPACING)), MOST_POINTS)
-    step = length / count
-    s, poses, x, y = [0.0], [start], start.x, start.y
-    for number in range(count):
-        middle = (number + 0.5) * step
-        h = start.h + first * middle + 0.5 * (last - first) / length * middle * middle
-        x, y = x + step * math.cos(h), y + step * math.sin(h)
-        end = (number + 1) * step
-        h = start.h + first * end + 0.5 * (last - first) / length * end * end
-        s.append(end)
-        poses.append(start._replace(x=x, y=y, h=h))
-    return s, poses
 
 
 def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
@@ -301,11 +247,6 @@ def _blend(a: Pose, b: Pose, share: float) -> Pose:
 
 def _gap(ends: tuple[float, float]) -> float:
     return ends[1] - ends[0]
-
-
-def _even(s: Sequence[float], first: float, last: float) -> tuple[float, ...]:
-    length = s[-1] if s[-1] > 0.0 else 1.0
-    return tuple(first + (last - first) * distance / length for distance in s)
 
 
 def _times(clock: Sequence[float | None]) -> tuple[float, ...] | None:
