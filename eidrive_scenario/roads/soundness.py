@@ -18,6 +18,8 @@ KINK = 1e-3
 """Between their headings [rad]."""
 CORNER = math.radians(10.0)
 """A larger angle than this is a corner that somebody drew [rad]."""
+STEEP = 0.5 * math.pi
+"""A road that is tilted across by more than this lies on its back: degrees were meant [rad]."""
 NARROW = -0.01
 """Widths below this are negative; rounding reaches less far [m]."""
 OPEN = 0.5
@@ -28,6 +30,7 @@ def flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: L
     """What is likely wrong with a file's roads."""
     for road in roads.values():
         yield from _jumps(road)
+        yield from _tilts(road)
         for section in road.sections:
             for lane in section.lanes.values():
                 yield from _widths(road, section, lane)
@@ -74,6 +77,13 @@ def _jumps(road: Road) -> Iterator[Flaw]:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
         yield Flaw("road-jump", "lengths that are not those of the geometry", what, "correct the length", road.line)
+
+
+def _tilts(road: Road) -> Iterator[Flaw]:
+    for start, tilt, *_ in road.superelevation.pieces:
+        if abs(tilt) > STEEP:
+            what = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
+            yield Flaw("road-surface", "such tilts", what, "give <superelevation> in radians", road.line)
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:

@@ -20,7 +20,10 @@ ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
     Rule("lane-side", Level.WARNING, "a lane on the side of the others", road_file.doubts_about("lane-side")),
     Rule("road-link", Level.WARNING, "a road that leads to no junction", road_file.doubts_about("road-link")),
     Rule(
-        "road-surface", Level.WARNING, "heights across a road that are not read", road_file.doubts_about("road-surface")
+        "road-surface",
+        Level.WARNING,
+        "heights across a road that are not read, or too steep",
+        road_file.doubts_about("road-surface"),
     ),
     Rule(
         "signal-off-road",

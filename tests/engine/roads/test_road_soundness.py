@@ -131,6 +131,23 @@ def test_linked_lanes_that_do_not_meet(road: Text, map_of: Text) -> None:
         assert told(map_of(first, second)) == ([("road-jump", what)] if apart else [])
 
 
+def test_what_lies_across_a_road(road: Text, map_of: Text) -> None:
+    def profile(*entries: str) -> list[tuple[str, str]]:
+        return told(map_of(road(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
+
+    flat, bent = '<shape s="0" t="-4" a="0" b="0" c="0" d="0"/>', '<shape s="0" t="-4" a="0" b="0.02" c="0" d="0"/>'
+    assert profile(flat, '<superelevation s="0" a="1.5" b="0" c="0" d="0"/>') == []
+    unread = "road '1' has <{}>, which is not read: its cross section is straight"
+    assert profile(flat, bent) == [("road-surface", unread.format("shape"))]
+    assert profile('<crossfall side="right" s="0" a="0.02" b="0" c="0" d="0"/>') == [
+        ("road-surface", unread.format("crossfall"))
+    ]
+    assert profile("<crossSectionSurface/>") == [("road-surface", unread.format("crossSectionSurface"))]
+    assert profile('<superelevation s="40" a="-4" b="0" c="0" d="0"/>') == [
+        ("road-surface", "road '1' is tilted by -4 rad at s = 40 m")
+    ]
+
+
 def test_connections_that_do_not_fit(road: Text, map_of: Text) -> None:
     into = '<successor elementType="junction" elementId="9"/>'
     through = '<predecessor elementType="road" elementId="1" contactPoint="end"/>'
