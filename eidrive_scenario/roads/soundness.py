@@ -22,6 +22,8 @@ STEEP = 0.5 * math.pi
 """A road that is tilted across by more than this lies on its back: degrees were meant [rad]."""
 NARROW = -0.01
 """Widths below this are negative; rounding reaches less far [m]."""
+WIDE = 200.0
+"""No lane is wider than this; a term of its width is wrong [m]."""
 OPEN = 0.5
 """A lane of this width at its end does not just taper off [m]."""
 
@@ -87,7 +89,7 @@ def _tilts(road: Road) -> Iterator[Flaw]:
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
-    sound = lane.width.is_constant and lane.width.value(0.0) >= NARROW
+    sound = lane.width.is_constant and NARROW <= lane.width.value(0.0) <= WIDE
     if lane.id == 0 or (sound and lane.width_from <= JUMP):
         return
     name = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m)"
@@ -95,10 +97,14 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
         what = f"{name} has no width{until}"
         yield Flaw("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
-    least = min(_extremes(lane, section.length))
+    widths = list(_extremes(lane, section.length))
+    least, most = min(widths), max(widths)
     if least < NARROW:
         what = f"{name} becomes {least:.3g} m wide"
         yield Flaw("lane-width", "negative widths", what, "let widths be 0 or more", lane.line)
+    if most > WIDE:
+        what = f"{name} becomes {most:.3g} m wide"
+        yield Flaw("lane-width", "widths beyond all roads", what, "correct its terms", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:

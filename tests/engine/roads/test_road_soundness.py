@@ -74,6 +74,8 @@ def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of
         (WIDTH.format(0, 2, -0.03, 0, 0), "becomes -1 m wide"),
         # 1 - 6 (ds/100)² + 5 (ds/100)³ is least at 80 m: 1 - 3.84 + 2.56.
         (WIDTH.format(0, 1, 0, -6e-4, 5e-6), "becomes -0.28 m wide"),
+        (WIDTH.format(0, 350, 0, 0, 0), "becomes 350 m wide"),
+        (WIDTH.format(0, 3.5, 0, 0, 1), "becomes 1e+06 m wide"),
     ],
 )
 def test_widths(road: Text, map_of: Text, width: str, message: str) -> None:
