@@ -45,7 +45,12 @@ class RunScenario(Protocol):
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Parametrise tests that are marked with `scenario` over scenarios, channels and seeds."""
     marker = metafunc.definition.get_closest_marker("scenario")
-    if marker is None or "run_scenario" not in metafunc.fixturenames:
+    if marker is None:
+        return
+    if "run_scenario" not in metafunc.fixturenames:
+        if marker in metafunc.definition.own_markers:
+            message = "it has the marker scenario, and does not take the fixture run_scenario, which plays it"
+            raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {message}", pytrace=False)
         return
     try:
         channels, seeds = _read_marker(marker)

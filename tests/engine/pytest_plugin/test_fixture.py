@@ -140,3 +140,12 @@ def test_wrong(run_scenario):
         "kept/test_own/test_object/seed1",
         "kept/drives/first/seed1",
     }
+
+
+def test_a_marked_test_that_plays_nothing_is_told(project: pytest.Pytester) -> None:
+    alone = "@pytest.mark.scenario('drives/first.xosc')\ndef test_alone(): pass"
+    result = run(project, alone)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*::test_alone: it has the marker scenario, and does not take the fixture *"])
+    whole = "pytestmark = pytest.mark.scenario('drives/first.xosc')\ndef test_beside_others(): pass"
+    run(project, whole).assert_outcomes(passed=1)
