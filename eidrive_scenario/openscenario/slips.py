@@ -96,7 +96,29 @@ def _traffic(node: etree._Element) -> None:
     node.set("miscObjectCategory", "trafficIsland")
 
 
+def _bare_command(node: etree._Element) -> bool:
+    return node.find("CustomCommandAction") is not None
+
+
+def _wrapped_command(node: etree._Element) -> None:
+    for command in list(node.iterchildren("CustomCommandAction")):
+        around = etree.Element("UserDefinedAction")
+        around.sourceline = command.sourceline
+        node.replace(command, around)
+        around.append(command)
+
+
 SLIPS = (
+    *(
+        Slip(
+            holder,
+            f"a CustomCommandAction stands in {holder} by itself",
+            "put it into a UserDefinedAction; other tools may refuse it",
+            _bare_command,
+            _wrapped_command,
+        )
+        for holder in ("Actions", "Action")
+    ),
     Slip(
         "MiscObject",
         "the category of a MiscObject is written 'grafficIsland'",

@@ -11,6 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.openscenario.model import (
+    Action,
     LaneOffsetActionDynamics,
     LightMode,
     LightStateAction,
@@ -107,6 +108,21 @@ def test_a_maneuver_may_stand_before_one_of_a_catalog(scenario_xml: Build, tmp_p
     group = only(scenario, ManeuverGroup)
     assert (len(group.catalog_reference), len(group.maneuver)) == (1, 1)
     assert "put CatalogReferences first" in str(scenario.warnings[0])
+
+
+def test_a_command_may_stand_by_itself(scenario_xml: Build) -> None:
+    """So scenariogeneration writes the user-defined actions of Init, and takes them in events."""
+    command = '<CustomCommandAction type="eidrive.channel">none</CustomCommandAction>'
+    event = MIXED.replace("<UserDefinedAction>", "").replace("</UserDefinedAction>", "")
+    story = event.replace('<CatalogReference catalogName="ways" entryName="from the shelf"/>', "")
+    scenario = load_scenario(scenario_xml(init=command, story=story))
+    assert [one.custom_command_action.type for one in scenario.storyboard.init.actions.user_defined_action] == [
+        "eidrive.channel"
+    ]
+    action = only(scenario, Action)
+    assert action.user_defined_action is not None
+    assert action.user_defined_action.line == action.line
+    assert [str(one).count("put it into a UserDefinedAction") for one in scenario.warnings] == [1, 1]
 
 
 def test_the_misspelt_traffic_island(scenario_xml: Build) -> None:
