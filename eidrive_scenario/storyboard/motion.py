@@ -95,6 +95,8 @@ class Motion:
         self._adopt(place.location)
         self._crosses = self.location is not None and abs(math.cos(self.heading)) < ACROSS
         self.end_of_road = False
+        if self._route_lanes is not None:
+            self._route_lanes.forget()
         self._teleport = self.jumped = True
 
     def settle(self) -> None:

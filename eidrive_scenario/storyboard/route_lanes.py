@@ -29,7 +29,7 @@ class RouteLanes:
 
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
-        self._asked: tuple[Route, int] | None = None
+        self._asked: tuple[Route, int, str, int] | None = None
         self._leading: list[frozenset[int]] = []
         self._change: LaneChange | None = None
 
@@ -61,8 +61,9 @@ class RouteLanes:
         return (change.after, aside + before - after, done) if part > 0.5 else (change.before, aside, done)
 
     def _needed(self, here: LaneLocation, section: int, way: int, route: Route, visit: int) -> LaneChange | None:
-        if self._asked is None or self._asked[0] is not route or self._asked[1] != visit:
-            self._asked, self._leading = (route, visit), self._lanes_to_next(here.road, way, route, visit)
+        asked = (route, visit, here.road, way)
+        if self._asked is None or self._asked[0] is not route or self._asked[1:] != asked[1:]:
+            self._asked, self._leading = asked, self._lanes_to_next(here.road, way, route, visit)
         leading = self._leading[section] if section < len(self._leading) else frozenset()
         if not leading or here.lane in leading:
             return None

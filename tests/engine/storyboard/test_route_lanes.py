@@ -122,3 +122,13 @@ def test_who_is_steered_by_an_action_is_left_alone(fork: RoadNetwork) -> None:
         motion.step(0.05)
     assert motion.location is not None
     assert (motion.location.road, motion.pose.y) == ("b", pytest.approx(-1.5))
+
+
+def test_who_is_put_elsewhere_begins_no_change_there(fork: RoadNetwork) -> None:
+    """The change before the fork is over where it was; on a road that the route does not pass, none is known."""
+    motion = on_its_way(fork, -1, 170.0, "c")
+    assert driven(motion, 0.5)[-1, 1] < -2.0
+    for road_id, s in (("a", 20.0), ("b", 80.0)):
+        here = fork.location(road_id, -1, s)
+        motion.put(Place(fork.pose(here), here))
+        assert driven(motion, 0.5)[:, 1] == pytest.approx(np.full(10, -2.0))
