@@ -18,7 +18,7 @@ from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, R
 from eidrive_scenario.recording.output import create, partial, whole
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
 
-RECORDING, RESULT, TABLE, PICTURES = "recording.mcap", "result.json", "motion.csv", "pictures"
+RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
 """Names of the files in a run's folder."""
 
 
