@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import typer
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.trends import (
     Curve,
     age_by_burst,
@@ -18,6 +20,7 @@ from eidrive_scenario.experiments.trends import (
     precision_by_delay,
     reception_by_distance,
 )
+from eidrive_scenario.recording.output import create
 
 COLOURS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce")
 SPEEDS = (5.0, 10.0, 15.0)
@@ -96,17 +99,22 @@ PICTURES = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Draw all pictures into a folder."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw all pictures into a folder; 2 if nothing can be written there, else 0."""
     parser = argparse.ArgumentParser(description="Draw known trends, measured and expected.")
     parser.add_argument("--out", type=Path, default=Path("reports/trends"))
     folder: Path = parser.parse_args(arguments).out
-    folder.mkdir(parents=True, exist_ok=True)
     for name, picture in PICTURES.items():
         path = folder / f"{name}.png"
-        picture().savefig(path, dpi=130)
+        try:
+            with create(path) as stream:
+                picture().savefig(stream, format="png", dpi=130)
+        except InputError as error:
+            typer.echo(str(error), err=True)
+            return 2
         typer.echo(f"wrote {path}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

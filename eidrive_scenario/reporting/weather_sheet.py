@@ -14,9 +14,10 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import library_path, names
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.recording.output import create
 from eidrive_scenario.reporting.street_view import look_at
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import Photographer
@@ -111,9 +112,11 @@ def _in_words(weather: Weather) -> str:
 def _captioned(picture: NDArray[np.uint8], title: str, about: str) -> NDArray[np.uint8]:
     bar = np.full((30, picture.shape[1], 3), 245, dtype=np.uint8)
     cv2.putText(bar, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (20, 20, 20), 1, cv2.LINE_AA)
-    wide = cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)[0][0]
+    room = picture.shape[1] - cv2.getTextSize(title, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)[0][0] - 32
+    size = 0.38 * min(1.0, room / max(1, cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, 0.38, 1)[0][0]))
+    wide = cv2.getTextSize(about, cv2.FONT_HERSHEY_SIMPLEX, size, 1)[0][0]
     cv2.putText(
-        bar, about, (picture.shape[1] - wide - 8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (90, 90, 90), 1, cv2.LINE_AA
+        bar, about, (picture.shape[1] - wide - 8, 20), cv2.FONT_HERSHEY_SIMPLEX, size, (90, 90, 90), 1, cv2.LINE_AA
     )
     framed = np.vstack([bar, picture])
     framed[:, -2:] = 245
@@ -127,11 +130,16 @@ def write(
     ] = None,
 ) -> None:
     """Draw the contact sheet."""
-    chosen = weather or sorted(names("weather"), key=("sunny", "foggy_morning", "storm", "midnight").index)
-    sheet = contact_sheet([load_weather(name, origin="--weather") for name in chosen])
-    out.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(out), cv2.cvtColor(sheet, cv2.COLOR_RGB2BGR)):
-        raise SettingError(Problem(f"cannot write {out}", "give the path of a PNG file", "--out"))
+    order = ("sunny", "foggy_morning", "storm", "midnight")
+    known = set(names("weather"))
+    chosen = weather or [*(name for name in order if name in known), *sorted(known - {*order})]
+    try:
+        weathers = [load_weather(name, origin="--weather") for name in chosen]
+        with create(out) as stream:
+            stream.write(cv2.imencode(".png", cv2.cvtColor(contact_sheet(weathers), cv2.COLOR_RGB2BGR))[1].tobytes())
+    except InputError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(2) from error
     typer.echo(f"wrote {out}")
 
 

@@ -1,0 +1,51 @@
+"""The commands that draw pictures: what is written, and wrong places and names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import typer
+from matplotlib.figure import Figure
+
+from eidrive_scenario.reporting import trends, weather_sheet
+
+
+def test_the_sheet_has_a_row_for_each_weather(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "sheet.png"
+    weather_sheet.write(out, ["storm", "sunny"])
+    picture = cv2.imread(str(out))
+    assert picture is not None
+    assert picture.shape == (2 * (360 + 30), 2 * 640, 3)
+
+
+def test_a_long_caption_leaves_room_for_the_title() -> None:
+    bare = np.zeros((4, 640, 3), dtype=np.uint8)
+    title = weather_sheet._captioned(bare, "storm: car", "")
+    both = weather_sheet._captioned(bare, "storm: car", "visual range 4000 m, " * 6)
+    end = int(np.flatnonzero((title[:30, :600] < 200).any(axis=(0, 2)))[-1])
+    dark = np.flatnonzero((both[:30] < 200).any(axis=(0, 2)))
+    assert not ((dark > end) & (dark <= end + 12)).any()
+
+
+@pytest.mark.parametrize("weather", [["sunnny"], ["sunny"]])
+def test_wrong_weather_and_wrong_places_are_told(
+    tmp_path: Path, weather: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(typer.Exit) as ended:
+        weather_sheet.write(tmp_path, weather)
+    assert ended.value.exit_code == 2
+    assert ("did you mean 'sunny'?" if weather == ["sunnny"] else "Is a directory") in capsys.readouterr().err
+
+
+def test_trends_are_drawn_or_the_place_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(trends, "PICTURES", {"empty": Figure})
+    assert trends.main(["--out", str(tmp_path / "new")]) == 0
+    assert (tmp_path / "new" / "empty.png").read_bytes()[1:4] == b"PNG"
+    (tmp_path / "file").write_text("")
+    assert trends.main(["--out", str(tmp_path / "file")]) == 2
+    assert "cannot write: File exists" in capsys.readouterr().err
