@@ -108,14 +108,15 @@ class Motion:
         """Lateral motion of the step that begins now."""
         self._steering = steering
 
-    def go_to(self, pose: Pose, *, land: bool = False) -> None:
+    def go_to(self, pose: Pose, *, land: bool = False, jump: bool = False) -> None:
         """The pose at the end of the step that begins now, wherever it is (a trajectory).
 
         With `land` the actor looks for its lane there, to follow it from then on; where there are no roads at all it
-        has nothing left to follow, and stops.
+        has nothing left to follow, and stops. With `jump` it is put there: the way is none that it covers.
         """
         self._next_pose = pose
         self._landing = land
+        self.jumped = self.jumped or jump
 
     def carry(self, distance: float) -> None:
         """Move by a distance along the lane in this step, whatever speed and heading say [m]."""
@@ -178,7 +179,7 @@ class Motion:
             self._freely(distance)
         x, y, z, h, p, r = self.pose
         across = distance == 0.0 or target is not None or carried is not None
-        return Placement(x, y, z, h, p, r, self.speed, False, across)
+        return Placement(x, y, z, h, p, r, self.speed, target is not None and self.jumped, across)
 
     def placement(self) -> Placement:
         """Where it is now."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from street_scene import everywhere, private
+from street_scene import NOTHING, after, everywhere, private
 
 from eidrive_scenario.errors import InputError
 
@@ -78,3 +78,27 @@ def test_a_lane_beside_the_route_is_refused_by_its_line(run: Any) -> None:
     told = r"scene\.xosc:\d+: RoutePosition means no place: road '1' has no lane 7 at s = 150"
     with pytest.raises(InputError, match=told):
         run(1, ("Ego", private(ON_ROUTE)), driven=False)
+
+
+FAR = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false"><Shape><Polyline>
+  <Vertex time="0"><Position><WorldPosition x="500" y="-2"/></Position></Vertex>
+  <Vertex time="10"><Position><WorldPosition x="700" y="-2"/></Position></Vertex></Polyline></Shape></Trajectory>
+  </TrajectoryRef><TimeReference>{timing}</TimeReference><TrajectoryFollowingMode followingMode="position"/>
+  </FollowTrajectoryAction></RoutingAction>"""
+CLOCK = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("timing", "start"), [("<None/>", 501.0), (CLOCK, 521.0)], ids=["own speed", "late by the clock"]
+)
+def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timing: str, start: float) -> None:
+    """At 20 m/s from x = 100 m; at 1 s on, by the clock, the place of that time: 500 m + 20 m."""
+    travelled = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
+      </TriggeringEntities><EntityCondition><TraveledDistanceCondition value="50"/></EntityCondition>
+      </ByEntityCondition>"""
+    steps = (("Ego", private(FAR.format(timing=timing)), after(0.975)), ("Ego", NOTHING, travelled))
+    played = run(3, *steps, driven=False)
+    assert played.x("Ego")[19:22] == pytest.approx([119.0, 120.0, start])
+    assert played.of("Ego", "speed") == pytest.approx([20.0] * len(played.frames))
+    assert max(abs(frame.view.velocity).max() for frame in played.frames) == pytest.approx(20.0)
+    assert played.begun("event 1")[0] == pytest.approx(2.55)

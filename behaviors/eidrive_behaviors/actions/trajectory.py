@@ -12,6 +12,8 @@ from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvat
 from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Layout, Place, Pose, Stage, lay_out, model, resolve
 
 TINY = 1e-6
+APART = 1.0
+"""Who is further from the place on the trajectory at which he begins is put there, as by a teleport [m]."""
 TIMED = {
     "polyline": "each vertex a time",
     "clothoid": "startTime and stopTime",
@@ -80,6 +82,10 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._pursuit = self._run = None
         if follow and self.actor.present and not self._layout.given and not self._backwards:
             self._pursue()
+        if self._timing is not None and self._pursuit is None:
+            self._s = self._layout.at_time(self._clock(0.0), self._speeds)
+        here, start = self.actor.motion.pose, self._layout.at(self._s)
+        self._jumps = math.hypot(start.x - here.x, start.y - here.y) > APART
 
     def _pursue(self) -> None:
         vehicle, motion = self.actor.entity, self.actor.motion
@@ -121,7 +127,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         if dt == 0.0 or not self.actor.present:
             self.stage.enter(self.actor.name, Place(pose))
         else:
-            motion.go_to(pose, land=done)
+            motion.go_to(pose, land=done, jump=self._jumps)
+        self._jumps = False
         return Status.SUCCESS if done else Status.RUNNING
 
     def _drive(self, pursuit: Pursuit) -> Status:
