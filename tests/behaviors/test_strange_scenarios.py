@@ -102,3 +102,13 @@ def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timi
     assert played.of("Ego", "speed") == pytest.approx([20.0] * len(played.frames))
     assert max(abs(frame.view.velocity).max() for frame in played.frames) == pytest.approx(20.0)
     assert played.begun("event 1")[0] == pytest.approx(2.55)
+
+
+def test_who_keeps_a_distance_drives_no_faster_than_it_can(run: Any) -> None:
+    """A time gap to oneself is never reached; the Performance of the car ends at 70 m/s."""
+    gap = private(
+        '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="true" freespace="false" '
+        'timeGap="10"><DynamicConstraints maxAcceleration="100"/></LongitudinalDistanceAction></LongitudinalAction>'
+    )
+    played = run(4, ("Ego", gap), driven=False)
+    assert max(map(abs, played.of("Ego", "speed"))) == pytest.approx(70.0)

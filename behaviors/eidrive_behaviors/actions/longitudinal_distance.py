@@ -63,7 +63,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         elif wanted > max(self._acceleration, 0.0):
             wanted = min(wanted, self._acceleration + _change(limits.max_acceleration_rate, dt))
         self._acceleration = wanted
-        top = _or_infinite(limits.max_speed)
+        top = min(_or_infinite(limits.max_speed), self.actor.limits()[0])
         motion.speed = min(max(motion.speed + wanted * dt, -top), top)
         return error + (other - motion.speed) * dt
 
