@@ -17,8 +17,8 @@ from eidrive_scenario.world.view import WorldView
 Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 
-_BEYOND = 5e-3
-"""How far behind a hit the ray goes on [m]: from inside a body pybullet does not see that body again."""
+_BEYOND = 0.02
+"""How far behind a hit the ray goes on [m]: from so far inside a body pybullet hardly ever sees that body again."""
 _FEW = 8
 """So many rays are first asked whether they meet anything but their end, which is quicker."""
 _MOST_BODIES = 16

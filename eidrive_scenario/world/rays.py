@@ -18,8 +18,11 @@ GROUND, NOTHING = -1, -2
 """Rows of a ray that ended at the ground or a building, and of one that met nothing."""
 
 _BATCH = 16_000
-_STEP_IN = 2e-3
-"""How far a ray is moved into a body that it may pass [m]; from a millimetre inside, pybullet does not see the body."""
+_STEP_IN = 0.01
+"""How far a ray is moved into a body that it may pass [m]. From a millimetre inside, pybullet sees the body again; from
+a centimetre in 0.3 % of directions, those along its surface, which then go in twice as far each time."""
+_STEPS = 12
+"""So often for each body that may be passed: 40 m after the last."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +50,16 @@ def cast_rays(client: int, origins: Array, targets: Array, row_of_handle: Intege
     rows = row_of_handle[handles]
     if len(passed):
         length = np.linalg.norm(targets - origins, axis=1)
-        for _ in range(len(passed)):
+        step = np.full(len(rows), _STEP_IN)
+        for _ in range(_STEPS * len(passed)):
             again = np.flatnonzero(np.isin(rows, passed))
             if not len(again):
                 break
-            start = np.minimum(fraction[again] + _STEP_IN / np.maximum(length[again], _STEP_IN), 1.0)
+            start = np.minimum(fraction[again] + step[again] / np.maximum(length[again], step[again]), 1.0)
             begin = origins[again] + start[:, None] * (targets[again] - origins[again])
             handles, further, normal[again] = _cast(client, begin, targets[again])
-            rows[again] = row_of_handle[handles]
+            before, rows[again] = rows[again], row_of_handle[handles]
+            step[again] = np.where(rows[again] == before, 2.0 * step[again], _STEP_IN)
             fraction[again] = np.where(handles < 0, 1.0, start + further * (1.0 - start))
     position = origins + fraction[:, None] * (targets - origins)
     return RayHits(rows, fraction, position, normal)

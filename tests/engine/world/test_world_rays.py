@@ -37,6 +37,21 @@ def test_ignored_actors_are_looked_through(world: World, car: CarFactory) -> Non
     assert world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0",)).position[0, 0] == pytest.approx(19.1, abs=1e-3)
 
 
+def test_ignored_actors_are_looked_through_from_everywhere(world: World, car: CarFactory) -> None:
+    """Whatever the direction, along a wall too, and whatever stands behind is met."""
+    rng = np.random.default_rng(4)
+    world.add(car("Hidden"), Placement(100.0, -70.0, yaw=0.7))
+    world.add(car("Behind"), Placement(100.0, -30.0, yaw=2.0))
+    hidden, behind = world.view().boxes[:, :3]
+    direction = rng.normal(size=(3000, 3)) * (1.0, 1.0, 0.3)
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    begin, end = hidden - 20.0 * direction, hidden + rng.normal(size=(3000, 3)) * 0.6 + 15.0 * direction
+    assert np.count_nonzero(world.cast(begin, end).rows == 0) > 1500
+    assert not np.any(world.cast(begin, end, ignore=("Hidden",)).rows == 0)
+    through = hidden + (hidden - behind) + rng.uniform(-0.3, 0.3, size=(500, 3))
+    assert world.cast(through, np.broadcast_to(behind, (500, 3)), ignore=("Hidden",)).rows.tolist() == [1] * 500
+
+
 def test_line_of_sight_behind_a_lorry(world: World, car: CarFactory) -> None:
     world.add(car("Lorry"), Placement(10.0, 0.0))
     clear = world.line_of_sight((0, 0, 1.0), [[20, 0, 1.0], [20, 0, 4.0], [8.0, 0, 1.0], [20, 3, 1.0]])
