@@ -49,6 +49,7 @@ class RoutePlanner(Planner):
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         self._path: Path | None = None
+        self._goal: Goal | None = None
         self._way: tuple[Array | None, Array | None, Array | None] = (None, None, None)
         self._progress = 0
         self._lane: list[LaneLocation] = []
@@ -105,6 +106,9 @@ class RoutePlanner(Planner):
         return self._first_speed
 
     def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> Path:
+        if self._path is not None and goal is self._goal:
+            return self._path
+        self._goal = goal
         way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
         if self._path is None or not all(map(_same, way, self._way)):
             self._way, self._progress, self._lane = way, 0, []

@@ -25,13 +25,7 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     if not len(first) or not len(second):
         return []
     if len(first) * len(second) <= FEW:
-        near = [
-            (row, column, distance)
-            for row, one in enumerate(first.tolist())
-            for column, other in enumerate(second.tolist())
-            if (distance := math.dist(one, other)) < gate
-        ]
-        return matched(*zip(*near, strict=True)) if near else []
+        return associate_few(first.tolist(), second.tolist(), gate)
     offset = first[:, None, :] - second[None, :, :]
     distance = np.sqrt(np.einsum("nmi,nmi->nm", offset, offset))
     inside = distance < gate
@@ -39,6 +33,19 @@ def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]
     if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
         rows, columns = linear_sum_assignment(np.where(inside, distance, OUTSIDE))
     return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
+
+
+def associate_few(
+    first: Sequence[Sequence[float]], second: Sequence[Sequence[float]], gate: float
+) -> list[tuple[int, int]]:
+    """The same as `associate` in plain numbers."""
+    near = [
+        (row, column, distance)
+        for row, one in enumerate(first)
+        for column, other in enumerate(second)
+        if (distance := math.dist(one, other)) < gate
+    ]
+    return matched(*zip(*near, strict=True)) if near else []
 
 
 def matched(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:

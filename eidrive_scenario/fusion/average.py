@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.fusion.association import associate
+from eidrive_scenario.fusion.association import FEW as FEW_PAIRS
+from eidrive_scenario.fusion.association import associate, associate_few
 from eidrive_scenario.fusion.method import FusionMethod, Report
 
 Array = NDArray[np.float64]
@@ -55,15 +56,18 @@ class AverageFusion(FusionMethod):
         labels = list(range(len(objects)))
         for report in reports[1:]:
             centres = report.boxes[:, :3]
-            known = np.array([[thing.x, thing.y, thing.z] for thing in objects])
-            pairs = {column: row for row, column in associate(known, centres, self.gate)}
-            for column, centre in enumerate(centres.tolist()):
+            known = [(thing.x, thing.y, thing.z) for thing in objects]
+            plain: list[list[float]] = centres.tolist()
+            few = len(known) * len(plain) <= FEW_PAIRS
+            found = associate_few(known, plain, self.gate) if few else associate(np.array(known), centres, self.gate)
+            pairs = {column: row for row, column in found}
+            for column, (x, y, z) in enumerate(plain):
                 label = pairs.get(column)
                 if label is None:
                     label = len(objects)
-                    objects.append(_Object(*centre))
+                    objects.append(_Object(x, y, z))
                 else:
-                    objects[label].add(*centre)
+                    objects[label].add(x, y, z)
                 labels.append(label)
         return labels
 

@@ -51,10 +51,9 @@ class Obstacles:
         soft = [_foliage(piece) for piece in self._soft]
         return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
 
-    def near(self, x: float, y: float, reach: float) -> bool:
-        """Whether anything solid is within reach of a point [m]."""
-        around = self._nearby.around(x, y, reach)
-        return bool(around) and any(_gap(piece, x, y) <= reach for piece in around)
+    def clearance(self, x: float, y: float, most: float) -> float:
+        """How far from a point nothing solid stands, at most `most` [m]."""
+        return min([_gap(piece, x, y) for piece in self._nearby.around(x, y, most)], default=most)
 
     def name_at(self, x: float, y: float) -> str:
         """What stands at a point at which something was touched."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from eidrive_scenario.errors import Problem, SettingError
@@ -24,6 +25,10 @@ _HARDEST = 20.0
 """Acceleration of any part of a vehicle that nothing hits, at most [m/s²]."""
 _MARGIN = 0.1
 """pybullet deals with bodies that are nearer than twice its collision margin of 4 cm [m]."""
+
+
+_AHEAD = 5.0
+"""So much farther than needed it is looked what stands around a body, so that it need not be looked each time [m]."""
 
 
 def substeps_per_tick(dt: float, physics_rate: float) -> int:
@@ -49,6 +54,8 @@ class Physics:
         self._substeps = substeps
         self._slack = _MARGIN + 0.5 * _HARDEST * dt * dt
         self._searchable = False
+        self._free: dict[str, tuple[tuple[float, float], float]] = {}
+        """Where each body was when it was last looked how far around it nothing stands, and how far that is [m]."""
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=self.step, deterministicOverlappingPairs=1, physicsClientId=client
         )
@@ -56,6 +63,10 @@ class Physics:
     def changed(self) -> None:
         """Bodies were put in or taken out, or moved."""
         self._searchable = False
+
+    def scenery_changed(self) -> None:
+        """Something was put up that does not move."""
+        self._free.clear()
 
     def refresh(self, bodies: Iterable[Body]) -> None:
         """Let pybullet's search structure know where the bodies are; placing them does not tell it."""
@@ -127,7 +138,7 @@ class Physics:
         reaches = {name: body.radius + travels[name] + _BLOW * self._dt for name, body in bodies.items()}
         for name, body in driven.items():
             x, y, own = body.centre_x, body.centre_y, reaches[name]
-            near = self._scenery.near(x, y, own)
+            near = self._stands_near(name, x, y, own)
             for other_name, other in bodies.items():
                 dx, dy, reach = other.centre_x - x, other.centre_y - y, own + reaches[other_name]
                 if dx * dx + dy * dy <= reach * reach and other is not body:
@@ -141,7 +152,7 @@ class Physics:
     def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
         """Whether a driven body may touch anything in this tick."""
         x, y, radius, own = body.centre_x, body.centre_y, body.radius, travels[body.name]
-        if self._scenery.near(x, y, radius + own):
+        if self._stands_near(body.name, x, y, radius + own):
             return True
         for name, other in bodies.items():
             way = own + travels[name]
@@ -149,6 +160,15 @@ class Physics:
             if dx * dx + dy * dy <= reach * reach and other is not body and box_distance(body.box, other.box) <= way:
                 return True
         return False
+
+    def _stands_near(self, name: str, x: float, y: float, reach: float) -> bool:
+        """Whether anything that does not move may be within reach of a body's middle [m]."""
+        there, free = self._free.get(name, ((x, y), -math.inf))
+        if reach + math.dist(there, (x, y)) < free:
+            return False
+        free = self._scenery.clearance(x, y, reach + _AHEAD)
+        self._free[name] = (x, y), free
+        return free <= reach
 
     def _note_touches(
         self,

@@ -126,12 +126,12 @@ class Scenery:
         """The greatest number that pybullet gave to any of these bodies; -1 without any."""
         return max([*self._names, *self._obstacle_handles], default=-1)
 
-    def near(self, x: float, y: float, reach: float) -> bool:
-        """Whether anything that stands may be within reach of a point [m]."""
-        if self._obstacles is not None and self._obstacles.near(x, y, reach):
-            return True
-        around = self._nearby.around(x, y, reach)
-        return bool(around) and any((bx - x) ** 2 + (by - y) ** 2 <= (reach + r) ** 2 for bx, by, r in around)
+    def clearance(self, x: float, y: float, most: float) -> float:
+        """How far from a point nothing stands, at most `most` [m]."""
+        free = most if self._obstacles is None else self._obstacles.clearance(x, y, most)
+        for bx, by, radius in self._nearby.around(x, y, most):
+            free = min(free, math.hypot(bx - x, by - y) - radius)
+        return free
 
     def _add_static(
         self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1

@@ -279,9 +279,10 @@ class World:
         self._changed()
 
     def _changed(self) -> None:
-        """Somebody entered or left: what was prepared for the former actors is void."""
+        """Somebody entered or left, or something was put up: what was prepared for the former actors is void."""
         self._view = None
         self._physics.changed()
+        self._physics.scenery_changed()
         self._cast = None
 
     @property

@@ -137,6 +137,21 @@ def test_a_blow_off_centre_spins_the_car(world: World, car: CarFactory) -> None:
     assert (settled.pitch[1], settled.roll[1]) == (0.0, 0.0)
 
 
+def test_a_car_that_passes_buildings_meets_the_last_one(world: World, car: CarFactory) -> None:
+    """Near to walls and far from them in turn; one that is put up on the way counts at once."""
+    for x in (30.0, 60.0, 90.0):
+        world.add_building(f"Row {x:g}", (x, 9.0, 5.0), (12.0, 12.0, 10.0))
+    world.add(car("Ego"), Placement(0.0, 0.0, speed=20.0), driven=True)
+    met: list[str] = []
+    while world.time < 8.0:
+        if abs(world.time - 5.0) < 1e-6:
+            world.add_building("Barrier", (125.0, 0.0, 1.0), (2.0, 20.0, 2.0))
+        world.step({}, {"Ego": Control(throttle=0.1)})
+        met += [contact.second for contact in world.view().contacts]
+    assert met == ["Barrier"]
+    assert world.view().position[0, 0] < 124.0
+
+
 def test_a_building_stops_a_car(world: World, car: CarFactory) -> None:
     world.add_building("Town hall", (25.0, 0.0, 5.0), (10.0, 20.0, 10.0))
     world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0), driven=True)
