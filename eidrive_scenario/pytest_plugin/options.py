@@ -44,7 +44,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--eidrive-channel",
         metavar="A,B",
-        help="run each scenario with each of these channel profiles (default: the file's own); none: no cooperation",
+        action="append",
+        help="run each scenario with each of these channel profiles (default: the file's own); none: no cooperation; "
+        "may be given several times",
     )
     group.addoption(
         "--eidrive-seeds", metavar="N", type=_count, help="run each scenario with the seeds 1 to N (default: 1)"
@@ -96,18 +98,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_report_header(config: pytest.Config) -> str | None:
     """Say what the options ask for, where they ask for something."""
-    asked = [
-        f"{name} {config.getoption(f'eidrive_{name}')}"
-        for name in ("channel", "detector", "seeds", "out")
-        if config.getoption(f"eidrive_{name}") is not None
-    ]
+    options = {name: config.getoption(f"eidrive_{name}") for name in ("channel", "detector", "seeds", "out")}
+    options["channel"] = ",".join(options["channel"]) if options["channel"] is not None else None
+    asked = [f"{name} {value}" for name, value in options.items() if value is not None]
     return f"eidrive: {', '.join(asked)}" if asked else None
 
 
 def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None) -> Iterator[Arm]:
     """Every channel with every seed; the command line wins over `channels` and `seeds`."""
     given = config.getoption("eidrive_channel")
-    names: Sequence[str | None] = _channels(given) if given else []
+    names: Sequence[str | None] = _channels(",".join(given)) if given else []
     count = config.getoption("eidrive_seeds") or seeds or 1
     for channel in names or channels or (None,):
         for seed in range(1, count + 1):

@@ -90,6 +90,11 @@ def test_a_channel_may_be_written_out_and_none_comes_twice(project: pytest.Pytes
     ]
 
 
+def test_channels_may_be_asked_for_one_by_one(project: pytest.Pytester) -> None:
+    items = collected(project, "data/first.xosc", "--eidrive-channel", "ideal", "--eidrive-channel", "none,ideal")
+    assert [item.split("::")[1] for item in items] == ["first[ideal-seed1]", "first[none-seed1]"]
+
+
 def test_bare_pytest_under_xdist_is_left_alone_too(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess("-n", "1", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1)
