@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 COLOURS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHES = {"none": "8 8", "cooperation": "", "latency": "", "error": "8 8"}
 HORIZON = 12.0
-"""The chart begins where the two cars are this near [m]."""
+"""The chart shows the two cars while they are this near [m]."""
 
 
 @dataclass(frozen=True)
