@@ -8,12 +8,11 @@ from dataclasses import replace
 from lxml import etree
 
 from eidrive_scenario.roads.model import Corner, Repeat, Road, RoadObject, Signal, SignalController, SignalPlace
+from eidrive_scenario.roads.poses import BEYOND
 from eidrive_scenario.roads.reading.findings import Findings
 
 MOST_REPEATED = 100_000
 """How often an object may stand along its road."""
-BEYOND = 0.1
-"""A signal may stand so far beyond its road for rounding [m]."""
 
 
 def read_signals(
