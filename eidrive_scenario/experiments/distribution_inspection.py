@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 from eidrive_scenario.errors import ConstraintError, InputError, Problem
@@ -13,7 +12,6 @@ from eidrive_scenario.experiments.rules import broken_rules
 from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import Combinations, Listed
 from eidrive_scenario.openscenario.lint import Level
-from eidrive_scenario.roads import RoadNetwork
 
 _MOST_LOADED = 1000
 """Runs that are read; the file of a distribution may list more values."""
@@ -68,7 +66,6 @@ class _Gathered:
         }
         self._ignored = ignored
         self._known = {_place(problem) for problem in (*alone.warnings, *alone.notes) if problem.rule}
-        self._load = cache(RoadNetwork.load)
         self._read: set[int] = set()
 
     def read(self, run: ConcreteRun, *, every_value: bool) -> None:
@@ -81,7 +78,7 @@ class _Gathered:
         except InputError as error:
             self._refused(error, every_value)
             return
-        for level, problem in broken_rules(scenario, self._ignored, self._load):
+        for level, problem in broken_rules(scenario, self._ignored):
             if _place(problem) not in self._known:
                 self._known.add(_place(problem))
                 self.told[level][replace(problem, message=f"in run {run.number}: {problem.message}")] = None

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from pathlib import Path
+from collections.abc import Collection, Iterator
 
 from eidrive_scenario.errors import InputError, Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
@@ -14,19 +13,16 @@ from eidrive_scenario.storyboard.lint import ROAD_RULES, RoadSurvey
 ALL_RULES: tuple[Rule[RoadSurvey], ...] = (*RULES, *ROAD_RULES)
 
 
-def broken_rules(
-    scenario: Scenario, ignored: Collection[str] = (), load: Callable[[Path], RoadNetwork] = RoadNetwork.load
-) -> Iterator[tuple[Level, Problem]]:
+def broken_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Problem]]:
     """What the rules find, but for those whose names are ignored; without those on roads where these cannot be read.
 
-    `load` reads the road file; who asks about many scenarios on one map may keep it. Raises SettingError if a rule is
-    to be ignored that does not exist.
+    Raises SettingError if a rule is to be ignored that does not exist.
     """
     check_names(ignored)
     chosen = ALL_RULES
     roads = None
     try:
-        roads = load(scenario.road_file) if scenario.road_file else None
+        roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     except InputError:
         chosen = RULES
     survey = RoadSurvey(scenario, roads)
