@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,7 +152,7 @@ def _mean(rows: list[list[float]]) -> list[float]:
 
 def _mean_of_known(rows: list[list[float]]) -> list[float]:
     """Of the rows without NaN; NaN where all have one."""
-    known = [row for row in rows if not isnan(sum(row))]
+    known = [row for row in rows if not math.isnan(sum(row))]
     if not known:
         return [math.nan] * len(rows[0])
     return known[0] if len(known) == 1 else _mean(known)
