@@ -11,13 +11,14 @@ from eidrive_scenario.api import WorldView, box_distance
 
 
 class MinDistanceSettings(PairSettings):
-    """`{of: Ego, to: Incoming, at_least: 3.5, measure: centre}` [m]; without `at_least` it measures and passes.
+    """`{of: Ego, to: Incoming, at_least: 1.5}` [m]; without `at_least` it measures and passes.
 
-    measure  `centre`: between the centres of the bounding boxes, seen from above (the metric of the EI-Drive paper);
-             `box`: between the nearest points of the boxes, 0 where they touch
+    measure  `box`: between the nearest points of the bodies, 0 if they touch, so that a crash fails every limit;
+             `centre`: between the centres of the bounding boxes in the horizontal plane (the metric of the EI-Drive
+             paper), which stays above 0 in a crash
     """
 
-    measure: Literal["centre", "box"] = "centre"
+    measure: Literal["centre", "box"] = "box"
 
 
 class MinDistance(PairCriterion):

@@ -1,7 +1,7 @@
 """Criteria as scenario files state them.
 
 - ours: `CustomCommandAction type="eidrive.criterion"` with a YAML flow mapping, one criterion or several:
-  `min_distance: {of: Ego, to: Incoming, at_least: 3.5}`
+  `min_distance: {of: Ego, to: Incoming, at_least: 1.5}`
 - ScenarioRunner's: ParameterConditions named `criteria_…` in the Storyboard's StopTrigger, about the ego vehicle
 - scenario_simulator_v2's: CustomCommandActions of the types `exitSuccess` and `exitFailure`
 """
@@ -26,7 +26,7 @@ EXITS = {"exitSuccess": True, "exitFailure": False}
 PREFIX = "criteria_"
 """How the name of a condition begins that ScenarioRunner reads as a criterion."""
 
-_EXAMPLE = "min_distance: {of: Ego, to: Incoming, at_least: 3.5}"
+_EXAMPLE = "min_distance: {of: Ego, to: Incoming, at_least: 1.5}"
 
 
 def parse_criteria(

@@ -20,7 +20,7 @@ def passing(frame: Any, car: Any) -> list[Any]:
 
 
 def test_centre_and_box(frame: Any, car: Any) -> None:
-    distance = criterion()
+    distance = criterion(measure="centre")
     (verdict,) = judge(passing(frame, car), [distance])
     # Square on at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
     assert verdict == Verdict(
@@ -42,6 +42,20 @@ def test_limit(frame: Any, car: Any, measure: str, at_least: float, violated: fl
     assert verdict.passed is (violated is None)
     assert verdict.first_violation == violated
     assert verdict.limit == at_least
+
+
+def test_min_distance_by_default_measures_between_bodies(frame: Any, car: Any) -> None:
+    (verdict,) = judge(passing(frame, car), [criterion(at_least=2.5)])
+    assert (verdict.passed, verdict.first_violation) == (False, 2.0)
+    assert verdict.value == pytest.approx(2.0)
+    assert verdict.reason == "Ego and Incoming came within 2.00 m (box to box) at 2.00 s"
+
+
+def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: Any) -> None:
+    """Square on the middle of the other's side: the centers stay 3 m apart."""
+    crash = [frame(0.0, {"Ego": car(0), "Incoming": car(3, 0, math.pi / 2)})]
+    assert [verdict.passed for verdict in judge(crash, [criterion(at_least=0.01)])] == [False]
+    assert [verdict.passed for verdict in judge(crash, [criterion(at_least=2.9, measure="centre")])] == [True]
 
 
 def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
