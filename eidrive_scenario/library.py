@@ -44,15 +44,29 @@ def resolve_scenario(name: str | Path) -> Path:
     if _is_file(path):
         _check_letters(path)
         return path
-    if not path.is_absolute() and path.name:
-        inside = library_path() / path
-        for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
-            if _is_file(candidate) and candidate.suffix == _SUFFIX:
-                return candidate
+    inside = _inside(path)
+    if inside is not None:
+        return inside
     if str(name) and os.path.isdir(path):
         raise SettingError(Problem(f"{str(name)!r} is a folder", "give one .xosc file"))
     remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
     raise SettingError(Problem(f"no scenario {str(name)!r}: neither a file nor in the library", remedy))
+
+
+def from_library(name: str | Path) -> Path:
+    """The file of the library's scenario of that name; the path itself if it is a file or no such name."""
+    path = Path(name)
+    return path if _is_file(path) else _inside(path) or path
+
+
+def _inside(path: Path) -> Path | None:
+    if path.is_absolute() or not path.name or ".." in path.parts:
+        return None
+    inside = library_path() / path
+    for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
+        if _is_file(candidate) and candidate.suffix == _SUFFIX:
+            return candidate
+    return None
 
 
 def name_of(path: Path) -> str:

@@ -15,6 +15,9 @@ from eidrive_scenario.v2x.books import LinkStatistics
 PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
 """Exit codes of a run."""
 
+DEFAULT_SEED = 1
+"""Seed of a run for which none is given, in Python, in pytest and on the command line."""
+
 
 @dataclass(frozen=True)
 class RunSettings:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
 from typing import Self
 
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.errors import Together, suggestion
-from eidrive_scenario.library import name_of
-from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.openscenario.parameters import Assignment
-from eidrive_scenario.openscenario.parsing import Source
+from eidrive_scenario.library import name_of, resolve_scenario
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
+from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.recording.criteria_text import (
     exit_verdict,
@@ -25,7 +26,16 @@ from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.run import BROKEN, FAILED, PASSED, WRONG_INPUT, Observer, RunResult, RunSettings
+from eidrive_scenario.run import (
+    BROKEN,
+    DEFAULT_SEED,
+    FAILED,
+    PASSED,
+    WRONG_INPUT,
+    Observer,
+    RunResult,
+    RunSettings,
+)
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
@@ -36,6 +46,7 @@ from eidrive_scenario.world.weather_of import weather_of
 
 __all__ = [
     "BROKEN",
+    "DEFAULT_SEED",
     "FAILED",
     "PASSED",
     "WRONG_INPUT",
@@ -51,22 +62,27 @@ __all__ = [
 class Simulation:
     """One scenario, one seed, one run. A second run needs a second Simulation.
 
+    source     a loaded Scenario, or whatever `load_for_seed` takes
+    seed       of all randomness; parameters that the file varies are drawn for it
+    settings   its parameters win over those that the Scenario was loaded with, and these over drawn ones
+
     Raises InputError while it is built if the scenario, its roads or the settings are wrong.
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        source: Scenario | Source | ConcreteRun,
         *,
-        seed: int = 0,
+        seed: int = DEFAULT_SEED,
         settings: RunSettings | None = None,
         observers: Sequence[Observer] = (),
     ) -> None:
-        self.scenario = scenario
         self.seed = seed
         self.settings = settings or RunSettings()
-        self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
+        self._run = source.number if isinstance(source, ConcreteRun) else None
         together = Together()
+        self.scenario = scenario = _load_for_run(source, seed, self.settings.parameters, together)
+        self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
         with together:
             check_commands(scenario)
         with together:
@@ -271,28 +287,68 @@ class Simulation:
                 dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings), *self._mistaken_values()])
             ),
             parameters=dict(self.scenario.parameters),
+            run=self._run,
             links=dict(self.stations.link_statistics(frame.view.time)),
         )
 
 
 def run_file(
-    source: Source,
+    source: Scenario | Source | ConcreteRun,
     *,
-    seed: int = 0,
+    seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
     observers: Sequence[Observer] = (),
 ) -> RunResult:
-    """Load a scenario with the parameters that its file draws for this seed, and play it.
+    """Run a scenario to its end: the same run as `eidrive run` and the pytest plugin make of file, seed and settings.
 
-    Parameters given in `settings` win over drawn ones. Raises InputError for a wrong file or setting.
+    source  what `load_for_seed` takes: a path, a library name such as `coop/scenario_1`, one run of a distribution, …
+
+    Raises InputError for a wrong file or setting.
     """
-    settings = settings or RunSettings()
-    scenario = load_for_seed(source, seed, settings.parameters)
-    return Simulation(scenario, seed=seed, settings=settings, observers=observers).run()
+    return Simulation(source, seed=seed, settings=settings, observers=observers).run()
 
 
-def load_for_seed(source: Source, seed: int, parameters: Mapping[str, str | Assignment]) -> Scenario:
-    """The scenario as this seed has it: parameters of `eidrive.variation` drawn, those of the caller kept."""
-    scenario = load_scenario(source, parameters)
-    drawn = {name: value for name, value in drawn_parameters(scenario, seed).items() if name not in parameters}
-    return load_scenario(source, {**drawn, **parameters}) if drawn else scenario
+def load_for_seed(
+    source: Scenario | Source | ConcreteRun, seed: int, parameters: Mapping[str, str | Assignment] | None = None
+) -> Scenario:
+    """Load a scenario with the parameters that its `eidrive.variation` commands draw for this seed.
+
+    source      path, library name, one run of a distribution, a Scenario that is loaded already (returned as it is if
+                no parameter changes), or any other source of `load_scenario`
+    parameters  values that win over drawn ones and over those of the distribution
+
+    Raises ScenarioError for a wrong file, SettingError for a wrong variation.
+    """
+    scenario = _load(source, parameters)
+    return _draw(scenario, seed, parameters)
+
+
+def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str | Assignment] | None) -> Scenario:
+    if isinstance(source, Scenario):
+        return source
+    if isinstance(source, ConcreteRun):
+        return load_scenario(source.scenario, {**source.assignments, **(parameters or {})})
+    return load_scenario(resolve_scenario(source) if isinstance(source, str | Path) else source, parameters)
+
+
+def _draw(scenario: Scenario, seed: int, parameters: Mapping[str, str | Assignment] | None) -> Scenario:
+    """The scenario with what the caller assigns and the seed draws; loaded again only if that changes a value."""
+    given = {**scenario.assigned, **as_assignments(parameters)}
+    drawn = {name: Assignment(text) for name, text in drawn_parameters(scenario, seed).items() if name not in given}
+    wanted = {**drawn, **given}
+    if all(scenario.parameters.get(name) == value.text for name, value in wanted.items()):
+        return scenario
+    return replace(load_scenario(scenario.source, wanted), assigned=given)
+
+
+def _load_for_run(
+    source: Scenario | Source | ConcreteRun,
+    seed: int,
+    parameters: Mapping[str, str | Assignment],
+    together: Together,
+) -> Scenario:
+    """As `load_for_seed`; a wrong variation is one of several mistakes that are reported at once."""
+    scenario = _load(source, parameters)
+    with together:
+        scenario = _draw(scenario, seed, parameters)
+    return scenario

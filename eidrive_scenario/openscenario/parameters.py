@@ -63,6 +63,19 @@ class Assignment:
     origin: Problem | None = None
 
 
+def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
+    """Values of parameters by name, each as an Assignment."""
+    return {
+        name: value if isinstance(value, Assignment) else Assignment(_typed(value))
+        for name, value in (values or {}).items()
+    }
+
+
+def _typed(value: object) -> str:
+    """A value as a caller in Python gives it: `True` is `true` in a file."""
+    return written(value) if isinstance(value, bool) else str(value)
+
+
 @dataclass
 class Scope:
     """The parameters that are visible at a place; those of the surrounding scopes are too."""

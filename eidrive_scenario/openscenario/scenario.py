@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.library import from_library
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.document import read_root
 from eidrive_scenario.openscenario.findings import Findings
@@ -29,7 +30,7 @@ from eidrive_scenario.openscenario.model import (
     VariableDeclarations,
     Vehicle,
 )
-from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
 from eidrive_scenario.openscenario.parsing import Source, open_document
 from eidrive_scenario.openscenario.participants import scenario_objects
 from eidrive_scenario.openscenario.roadfile import find_road_file
@@ -52,6 +53,8 @@ class Scenario:
     road_file    None if the scenario names none
     text         of a scenario that came without a file
     warnings     what the file's version of the standard deprecates
+    source       of this scenario, to load it again with other values
+    assigned     values that the caller gave to parameters; they win over drawn ones
     """
 
     name: str
@@ -67,6 +70,8 @@ class Scenario:
     external: Mapping[str, ExternalObjectReference]
     entries: Mapping[CatalogReference, Element] = field(repr=False)
     text: bytes | None = field(repr=False, default=None)
+    source: Source = field(repr=False, default=b"")
+    assigned: Mapping[str, Assignment] = field(repr=False, default_factory=dict)
 
     @property
     def storyboard(self) -> Storyboard:
@@ -82,20 +87,19 @@ class Scenario:
 def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | None = None) -> Scenario:
     """Reads a scenario, with other values for its parameters.
 
-    source        a file's path; the bytes of a file; an XML tree of lxml or of Python's ElementTree; or an object whose
-                  `get_element()` gives such a tree, as a Scenario of scenariogeneration. Relative paths in a scenario
-                  without a file count from the current folder
+    source        a file's path, or the library name of a scenario; the bytes of a file; an XML tree of lxml or of
+                  Python's ElementTree; or an object whose `get_element()` gives such a tree, as a Scenario of
+                  scenariogeneration. Relative paths in a scenario without a file count from the current folder
     parameters    values by name; an Assignment also knows the file and line that gave the value
 
     Raises ScenarioError with everything that is wrong with the file and its catalogs, each as file:line; it is a
     ConstraintError where all of it is that parameters have values outside their constraints.
     """
+    if isinstance(source, str | Path):
+        source = from_library(source)
     document = open_document(source)
     findings = Findings()
-    assignments = {
-        name: value if isinstance(value, Assignment) else Assignment(str(value))
-        for name, value in (parameters or {}).items()
-    }
+    assignments = as_assignments(parameters)
     read = read_root(document, findings, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
         findings.settle()
@@ -121,6 +125,8 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         warnings=warnings,
         entries=library.entries,
         text=document.text,
+        source=source,
+        assigned=assignments,
     )
 
 

@@ -90,7 +90,7 @@ class Unfolding(Sequence[ConcreteRun]):
         return sorted(index * step % len(self) for index in range(count))
 
 
-def load_distribution(source: Source, *, seed: float = 0) -> Unfolding:
+def load_distribution(source: Source, *, seed: float = 1) -> Unfolding:
     """Reads a parameter value distribution.
 
     seed    of the draws where a stochastic distribution names no randomSeed itself
