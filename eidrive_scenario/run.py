@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.books import LinkStatistics
 
 PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
@@ -69,6 +70,10 @@ class RunResult:
     """Its number among the runs of a parameter value distribution, from 0 on."""
     links: Mapping[tuple[str, str], LinkStatistics] = field(default_factory=dict)
     """The books of the radio, by (sender, receiver)."""
+    settings: ResolvedSettings = field(default_factory=ResolvedSettings)
+    """All settings that determined the run."""
+    folder: Path | None = None
+    """Folder of `result.json` and the recording, where the run has left one."""
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -99,6 +104,8 @@ class RunResult:
             "trace_hash": self.trace_hash,
             "simulated_s": self.simulated_s,
             "wall_s": self.wall_s,
+            "settings": self.settings.as_json(),
+            "settings_sha256": self.settings.digest,
         }
 
 

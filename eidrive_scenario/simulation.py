@@ -25,6 +25,7 @@ from eidrive_scenario.recording.criteria_text import (
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
+from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.run import (
     BROKEN,
@@ -36,6 +37,7 @@ from eidrive_scenario.run import (
     RunResult,
     RunSettings,
 )
+from eidrive_scenario.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
@@ -119,15 +121,24 @@ class Simulation:
         self._exit: Verdict | None = None
         try:
             self._apply(self.storyboard.initial())
+            resolved = resolve_settings(scenario, seed, self.settings, self.stations, self._weather)
         except BaseException:
             self.world.close()
             raise
+        if isinstance(source, ConcreteRun):
+            resolved = resolved.of_distribution(source.number, source.assignments)
+        self.resolved: ResolvedSettings = resolved
+        """All settings of this run."""
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def add_observer(self, observer: Observer) -> None:
+        """Show the frames of all ticks from now on to this observer too, and close it with the run."""
+        self._observers = (*self._observers, observer)
 
     def close(self) -> None:
         """Free the world and finish what the observers write, each of them, whatever another one meets at it."""
@@ -289,6 +300,7 @@ class Simulation:
             parameters=dict(self.scenario.parameters),
             run=self._run,
             links=dict(self.stations.link_statistics(frame.view.time)),
+            settings=self.resolved,
         )
 
 

@@ -12,6 +12,7 @@ from eidrive_scenario.driving.building import build_agent, build_rig
 from eidrive_scenario.driving.declared import declared_detectors, declared_encoders, declared_settings
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
@@ -24,7 +25,7 @@ from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_events import LinkEvents
 from eidrive_scenario.v2x.message import LinkEvent, Received
-from eidrive_scenario.v2x.profile import NO_COOPERATION, build_channel, load_profile
+from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.surroundings import Surroundings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -75,11 +76,18 @@ class Stations:
         self._lookouts: dict[str, SignalLookout] = {}
         self._held: dict[str, HeldControls] = {}
         self._settings = declared_settings(scenario, detector, cooperate)
+        self.channel_profile: ChannelProfile | None = None
+        """The profile of the channel; None where there is none."""
         self._detectors = declared_detectors(scenario, self._settings, detector)
         """Built beforehand, as what they cannot work with shall be told before the run."""
         self._encoders = declared_encoders(scenario, self._settings)
         if channel is not None:
             self._set_channel(channel, origin="--channel", line=None)
+
+    @property
+    def settings(self) -> Mapping[str, AgentSettings]:
+        """The settings of every station of the scenario, options applied, whether it is in the world or not."""
+        return self._settings
 
     @property
     def drivers(self) -> frozenset[str]:
@@ -226,6 +234,7 @@ class Stations:
         self._channel = build_channel(profile, self._seed, previous=before)
         self._silenced = before if self._channel is None else None
         self._books = None
+        self.channel_profile = profile
         self.channel_name = profile.name if profile is not None else NO_COOPERATION
         for agent in self._agents.values():
             agent.own_perception = self._own_perception and agent.listens

@@ -73,6 +73,13 @@ class CatalogLibrary:
                     self.entries[reference] = entry
             self._check_kind(one)
 
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each catalog file that an entry was taken from, by the name of the file."""
+        used = {entry.source for entry in self.entries.values()}
+        documents = [catalog.document for catalog in self._files.values() if catalog is not None]
+        return {document.name: document.digest for document in documents if document.name in used}
+
     def _entry(self, found: FoundReference, active: tuple[tuple[str, str], ...]) -> Element | None:
         reference = found.reference
         catalog = self._catalog(found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
@@ -41,6 +42,7 @@ class Document:
     path    where it lies; None where it was handed in otherwise
     folder  what its relative paths start from
     text    what it was parsed from, where there is no file to read again
+    digest  SHA-256 of the content, as hexadecimal digits
     """
 
     root: etree._Element
@@ -48,6 +50,7 @@ class Document:
     path: Path | None
     folder: Path
     text: bytes | None = None
+    digest: str = ""
 
 
 class _PrologEnds(Exception):
@@ -57,7 +60,7 @@ class _PrologEnds(Exception):
 def open_document(source: Source) -> Document:
     """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
     if isinstance(source, bytes):
-        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source)
+        return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, _digest(source))
     if not isinstance(source, str | Path):
         return _from_tree(source)
     path = Path(source)
@@ -68,7 +71,7 @@ def open_document(source: Source) -> Document:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise ScenarioError(Problem(f"cannot be read: {reason}", "check the path", str(source))) from error
-    return Document(parse(content, str(source)), str(source), path, path.parent)
+    return Document(parse(content, str(source)), str(source), path, path.parent, digest=_digest(content))
 
 
 def text_of(source: Source) -> bytes:
@@ -90,13 +93,14 @@ def _from_tree(source: Any) -> Document:
         root = root.getroot()
     if isinstance(root, etree._Element):
         base = Path(root.base) if root.base else None
-        return Document(root, str(base or "<element>"), base, base.parent if base else Path())
+        digest = _digest(etree.tostring(root))
+        return Document(root, str(base or "<element>"), base, base.parent if base else Path(), digest=digest)
     if not isinstance(root, ElementTree.Element):
         what = "this is neither a path nor XML"
         remedy = "give a path, bytes, an XML tree, or an object with get_element()"
         raise ScenarioError(Problem(what, remedy, name))
     text = _as_written(root, name)
-    return Document(parse(text, name), name, None, Path(), text)
+    return Document(parse(text, name), name, None, Path(), text, _digest(text))
 
 
 def _element_of(source: WrittenInPython, name: str) -> Any:
@@ -151,6 +155,10 @@ def parse(content: bytes, name: str) -> etree._Element:
         problem = Problem(f"elements are nested more than {MAX_DEPTH} deep", "flatten them", name, line_of(too_deep))
         raise ScenarioError(problem)
     return root
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def line_of(node: etree._Element) -> int | None:

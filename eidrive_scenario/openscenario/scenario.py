@@ -55,6 +55,8 @@ class Scenario:
     warnings     what the file's version of the standard deprecates
     source       of this scenario, to load it again with other values
     assigned     values that the caller gave to parameters; they win over drawn ones
+    digest       SHA-256 of the scenario's content, as hexadecimal digits
+    catalogs     the same of each catalog file that is used, by its path
     """
 
     name: str
@@ -72,6 +74,8 @@ class Scenario:
     text: bytes | None = field(repr=False, default=None)
     source: Source = field(repr=False, default=b"")
     assigned: Mapping[str, Assignment] = field(repr=False, default_factory=dict)
+    digest: str = ""
+    catalogs: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def storyboard(self) -> Storyboard:
@@ -127,6 +131,8 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         text=document.text,
         source=source,
         assigned=assignments,
+        digest=document.digest,
+        catalogs=library.digests,
     )
 
 
