@@ -24,6 +24,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -65,10 +66,10 @@ class Trace:
     driven: frozenset[str] = frozenset()
 
     def note(self, function: Callable[..., Any], given: tuple[Any, ...], options: dict[str, Any]) -> None:
-        """One call; arrays are copied."""
+        """One call; arrays and lists are copied."""
         calls = self.setup if function.__name__ in SETUP else self.ticks[-1]
         kept = tuple(value.copy() if isinstance(value, np.ndarray) else value for value in given)
-        calls.append((function, kept, options))
+        calls.append((function, kept, {key: deepcopy(value) for key, value in options.items()}))
 
     def observe(self, frame: Frame) -> None:
         """The observer's half: what follows belongs to the next tick."""

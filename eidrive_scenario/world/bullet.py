@@ -48,3 +48,8 @@ def connect() -> int:
     if client < 0:
         raise SimulationError("pybullet gives no further client: close the worlds that are no longer used")
     return client
+
+
+def disconnect(client: int) -> None:
+    """Free a client with all its bodies."""
+    bullet.disconnect(physicsClientId=client)

@@ -16,6 +16,7 @@ from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTI
 from eidrive_scenario.world.bullet import bullet
 from eidrive_scenario.world.furniture import Fixture
 from eidrive_scenario.world.nearby import SQUARE, Nearby
+from eidrive_scenario.world.triangle_shape import create_triangle_shape
 
 Array = NDArray[np.float64]
 
@@ -124,14 +125,8 @@ def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterat
     for start in range(0, len(boxes), MOST_FACES // len(_FACES)):
         table = np.array(boxes[start : start + MOST_FACES // len(_FACES)])
         vertices = _corners(table)
-        faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1)
-        shape = bullet.createCollisionShape(
-            bullet.GEOM_MESH,
-            vertices=vertices.reshape(-1, 3).tolist(),
-            indices=faces.tolist(),
-            flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
-            **here,
-        )
+        faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
+        shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
         handle = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **here)
         bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
         bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)

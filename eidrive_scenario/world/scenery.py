@@ -17,6 +17,7 @@ from eidrive_scenario.world.furniture import Fixture, fixtures
 from eidrive_scenario.world.ground import is_level
 from eidrive_scenario.world.nearby import Nearby, squares
 from eidrive_scenario.world.obstacles import MOST_FACES, Obstacles
+from eidrive_scenario.world.triangle_shape import create_triangle_shape
 
 GROUND = "ground"
 STOREY = 3.2
@@ -91,13 +92,7 @@ class Scenery:
                 continue
             for start in range(0, len(mesh.faces), MOST_FACES):
                 used, faces = np.unique(mesh.faces[start : start + MOST_FACES], return_inverse=True)
-                shape = bullet.createCollisionShape(
-                    bullet.GEOM_MESH,
-                    vertices=mesh.vertices[used].tolist(),
-                    indices=faces.ravel().tolist(),
-                    flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
-                    **here,
-                )
+                shape = create_triangle_shape(self._client, mesh.vertices[used], faces)
                 self._add_static(shape, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
         return True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import TracebackType
 
@@ -14,7 +15,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body, ScriptedBody
-from eidrive_scenario.world.bullet import bullet, connect
+from eidrive_scenario.world.bullet import connect, disconnect
 from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
 from eidrive_scenario.world.cast import Cast
 from eidrive_scenario.world.contacts import ContactTracker
@@ -37,7 +38,8 @@ class World:
     """Actors on roads, in one pybullet client without a window.
 
     `step` moves scripted actors exactly to their placements and driven ones by their controls, in physics steps of
-    1 / `physics_rate` seconds. Everything is deterministic. Close it after use, or use it in a `with` statement.
+    1 / `physics_rate` seconds. Everything is deterministic. Close it after use, or use it in a `with` statement;
+    otherwise its client is freed when it is collected.
 
     entities  ids of the road network's objects that come as actors, and so are no part of the scenery
     """
@@ -54,6 +56,7 @@ class World:
         self.tick = 0
         substeps = substeps_per_tick(dt, physics_rate)
         self._client = connect()
+        self._release = weakref.finalize(self, disconnect, self._client)
         self._roads = roads
         self._bodies: dict[str, Body] = {}
         self._driven: dict[str, DrivenBody] = {}
@@ -83,9 +86,8 @@ class World:
     def close(self) -> None:
         """Give the pybullet client back; the world cannot be used any more."""
         self._visuals = None
-        if self._client >= 0:
-            bullet.disconnect(physicsClientId=self._client)
-            self._client = -1
+        self._client = -1
+        self._release()
 
     @property
     def time(self) -> float:
