@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.recording.recorder import Recording
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
+from eidrive_scenario.roads.poses import lateral_axis
 from eidrive_scenario.roads.reading.document import parse_road_map
 
 Array = NDArray[np.float64]
@@ -89,8 +90,9 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
     for s in stations:
         x, y, heading, _, _ = road.reference.at(s)
         t = road.lane_offset.value(s) + lane.side * width.value(s - section.s)
-        across = t * math.cos(road.superelevation.value(s))
-        points.append((x - across * math.sin(heading), y + across * math.cos(heading)))
+        ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
+        sin, cos = t * math.sin(heading), t * math.cos(heading)
+        points.append((x + ahead * cos - left * sin, y + ahead * sin + left * cos))
     return np.array(points)
 
 

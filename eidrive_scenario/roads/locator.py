@@ -133,15 +133,22 @@ class Locator:
     def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
         """s, t and the distance beyond an end of the road, by Newton's method from a guess of s."""
         curves, length = self._tables.curves, self._tables.length[road]
-        s, across, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
+        s, t, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
         open_ = np.arange(len(s))
         for _ in range(10):
             px, py, h, curvature, speed = curves.at(road[open_], s[open_])
             cos, sin = np.cos(h), np.sin(h)
             dx, dy = x[open_] - px, y[open_] - py
             along, left = cos * dx + sin * dy, cos * dy - sin * dx
-            across[open_] = left
-            step = along / (np.maximum(speed, 1e-3) * np.maximum(1.0 - curvature * left, 0.2))
+            t[open_] = left
+            if self._tables.banked:
+                ahead, level, _, _ = self._tables.lateral_axis(road[open_], s[open_])
+                t[open_] = left / level
+                along = along - t[open_] * ahead
+                stretch = self._tables.stretch_at(road[open_], s[open_], t[open_], curvature, speed)
+            else:
+                stretch = speed * (1.0 - curvature * left)
+            step = along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
             moved = np.clip(s[open_] + step, 0.0, length[open_])
             change = np.abs(moved - s[open_])
             s[open_] = moved
@@ -150,8 +157,7 @@ class Locator:
             open_ = open_[change > 1e-6]
             if not open_.size:
                 break
-        roll = self._tables.superelevation.value(road, s)
-        return s, across / np.cos(roll), beyond
+        return s, t, beyond
 
 
 def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:

@@ -63,6 +63,11 @@ class Polynomials:
         ds = s - start
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
 
+    def to_second_order(self, s: float) -> tuple[float, float, float]:
+        """Return the function and its first two derivatives at s."""
+        value, slope, half_bend, _ = self.coefficients_at(s)
+        return value, slope, 2.0 * half_bend
+
     def coefficients_at(self, s: float) -> tuple[float, float, float, float]:
         """The coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
         start, a, b, c, d = self.pieces[max(bisect_right(self.starts, s) - 1, 0)]
@@ -140,6 +145,19 @@ class PolynomialTable:
         ds = s - self._starts[piece]
         b, c, d = self._b[piece], self._c[piece], self._d[piece]
         return self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+
+    def to_second_order(self, function: Integers, s: Array) -> tuple[Array, Array, Array]:
+        """Return the functions and their first two derivatives."""
+        piece = self._piece(function, s)
+        ds = s - self._starts[piece]
+        b, c, d = self._b[piece], self._c[piece], self._d[piece]
+        value, slope = self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+        return value, slope, 2.0 * c + 6.0 * ds * d
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether all functions are 0 everywhere."""
+        return self._constant and not self._a.any()
 
 
 def spread(spans: Sequence[float]) -> Array:

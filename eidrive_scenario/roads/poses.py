@@ -1,11 +1,13 @@
 """Road and lane coordinates to poses, one at a time: plain floats, as fast as Python goes.
 
-Superelevation turns the cross section about the reference line, so t runs along the inclined surface.
+The t-axis is turned by heading, slope and superelevation, in this order (OpenDRIVE 1.8, 8.3): z-y'-x''. It lies in the
+inclined surface. Where a road climbs and is banked, the cross section is not vertical: it leans back by t·sin·sin.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from eidrive_scenario.errors import Problem, suggestion
 from eidrive_scenario.roads.location import Pose, PositionError
@@ -28,8 +30,57 @@ def road_pose_at(road: Road, s: float, t: float) -> Pose:
     if road.superelevation.is_zero:
         return Pose(x - t * math.sin(h), y + t * math.cos(h), z, h, pitch, 0.0)
     roll = road.superelevation.value(s)
-    across = t * math.cos(roll)
-    return Pose(x - across * math.sin(h), y + across * math.cos(h), z + t * math.sin(roll), h, pitch, roll)
+    sin, cos = math.sin(h), math.cos(h)
+    ahead, left, up = lateral_axis(slope, roll)
+    ahead, left = t * ahead, t * left
+    return Pose(x + ahead * cos - left * sin, y + ahead * sin + left * cos, z + t * up, h, pitch, roll)
+
+
+def lateral_axis(slope: float, roll: float) -> tuple[float, float, float]:
+    """Return the unit vector of the t-axis: ahead along the reference line, to its left, and up."""
+    steep = math.hypot(1.0, slope)
+    sin = math.sin(roll)
+    return -sin * slope / steep, math.cos(roll), sin / steep
+
+
+class Tangent(NamedTuple):
+    """A point of a lane on a banked road and the change of its place per metre of s.
+
+    The axes are those of the reference line seen from above: ahead, to the left, and up [m].
+    """
+
+    ahead: float
+    left: float
+    z: float
+    along: float
+    sideways: float
+    climb: float
+    roll: float
+
+
+def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: float, speed: float) -> Tangent:
+    """Return the place and tangent of a lane at t that changes by `sideways` per metre of s.
+
+    `curvature` and `speed` are those of the reference line at s.
+    """
+    z, slope, bend = road.elevation.to_second_order(s)
+    roll, twist = road.superelevation.value_and_slope(s)
+    sin, cos = math.sin(roll), math.cos(roll)
+    square = 1.0 + slope * slope
+    level = 1.0 / math.sqrt(square)
+    steep, steeper = slope * level, bend * level / square
+    rise = sideways * sin + t * cos * twist
+    ahead, left = -t * sin * steep, t * cos
+    along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
+    aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+    climb = slope + rise * level - t * sin * slope * steeper
+    along = max(along, LEAST_STRETCH)
+    # The surface's normal is the product of the tangent and the t-axis, which is (-sin·steep, cos, sin·level).
+    nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+    nz = along * cos + aside * sin * steep
+    left_z = nx * aside - ny * along
+    lean = math.atan2(left_z, nz * math.sqrt(along * along + aside * aside + climb * climb))
+    return Tangent(ahead, left, z + t * sin * level, along, aside, climb, lean)
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
@@ -41,22 +92,21 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
     t, sideways = lane_t(road, section, lane, s)
     t += offset
     x, y, h, curvature, speed = road.reference.at(s)
-    z, climb = road.elevation.value_and_slope(s)
-    roll, across = 0.0, t
-    if not road.superelevation.is_zero:
-        roll, twist = road.superelevation.value_and_slope(s)
-        cos, sin = math.cos(roll), math.sin(roll)
-        across, z = t * cos, z + t * sin
-        climb += sideways * sin + t * cos * twist
-        sideways = sideways * cos - t * sin * twist
-    along = speed * (1.0 - curvature * across)
-    if along < LEAST_STRETCH:
-        along = LEAST_STRETCH
+    ahead, left, roll = 0.0, t, 0.0
+    if road.superelevation.is_zero:
+        z, climb = road.elevation.value_and_slope(s)
+        along = max(speed * (1.0 - curvature * t), LEAST_STRETCH)
+        if sideways and climb:
+            length = math.sqrt(along * along + sideways * sideways + climb * climb)
+            roll = math.atan2(-climb * sideways, along * length)
+    else:
+        ahead, left, z, along, sideways, climb, roll = banked_tangent(road, s, t, sideways, curvature, speed)
     if lane.heights:
         z += lane_height(lane, s - section.s, offset)
+    sin, cos = math.sin(h), math.cos(h)
     return Pose(
-        x - across * math.sin(h),
-        y + across * math.cos(h),
+        x + ahead * cos - left * sin,
+        y + ahead * sin + left * cos,
         z,
         h + math.atan2(sideways, along) if sideways else h,
         -math.atan2(climb, math.hypot(along, sideways)) if climb else 0.0,
@@ -124,18 +174,26 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
     Newton's method on the distance to the reference line.
     """
     length = road.length
-    along = across = 0.0
+    along = across = t = 0.0
+    banked = not road.superelevation.is_zero
     for _ in range(12):
         px, py, h, curvature, speed = road.reference.at(s)
         cos, sin = math.cos(h), math.sin(h)
         along, across = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)
-        step = along / (max(speed, 1e-3) * max(1.0 - curvature * across, 0.2))
+        t = across
+        if banked:
+            ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
+            t = across / left
+            along -= t * ahead
+            stretch = banked_tangent(road, s, t, 0.0, curvature, speed).along
+        else:
+            stretch = speed * (1.0 - curvature * across)
+        step = along / max(stretch, 0.2 * speed, 2e-4)
         before, s = s, min(max(s + step, 0.0), length)
         if abs(s - before) < 1e-7:
             break
-    r = road.superelevation.value(s)
     beyond = abs(along) if s <= 0.0 or s >= length else 0.0
-    return s, across / math.cos(r) if r else across, beyond if beyond > 1e-6 else 0.0
+    return s, t, beyond if beyond > 1e-6 else 0.0
 
 
 def off_road(road: Road, s: float) -> PositionError:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.links import LaneEnd, LaneLinks, end_section, side_at
 from eidrive_scenario.roads.location import LaneKey
 from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
+from eidrive_scenario.roads.poses import lateral_axis
 
 JUMP = 0.01
 """Between a geometry's end and the next one's start [m]; also in s."""
@@ -179,7 +181,7 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[Flaw]:
     """Linked lanes of two roads that do not meet: cars jump there. The reference lines need not meet."""
-    ends: dict[tuple[str, int], tuple[float, float, float, float, float]] = {}
+    ends: dict[tuple[str, int], RoadEnd] = {}
     for one, other in links.between_roads():
         road, beyond = roads[one.lane.road], roads[other.lane.road]
         lane = road.sections[one.lane.section].lanes[one.lane.lane]
@@ -194,20 +196,30 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[Flaw]:
             yield Flaw("road-jump", "linked lanes that do not meet", what, "let the roads meet there", lane.line)
 
 
-def _lane_end(
-    road: Road, end: LaneEnd, known: dict[tuple[str, int], tuple[float, float, float, float, float]]
-) -> tuple[float, float]:
+class RoadEnd(NamedTuple):
+    """An end of a road: its point, the change of x and y per metre of t, and the lane offset [m]."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+    offset: float
+
+
+def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -> tuple[float, float]:
     """Where the middle of a lane ends; `known` keeps what is the same for all lanes of an end of a road."""
     found = known.get((road.id, end.side))
     if found is None:
         s = road.length if end.side > 0 else 0.0
         x, y, heading, *_ = road.reference.at(s)
-        found = known[road.id, end.side] = x, y, math.sin(heading), math.cos(heading), road.lane_offset.value(s)
-    x, y, sin, cos, offset = found
+        ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
+        sin, cos = math.sin(heading), math.cos(heading)
+        dx, dy = ahead * cos - left * sin, ahead * sin + left * cos
+        found = known[road.id, end.side] = RoadEnd(x, y, dx, dy, road.lane_offset.value(s))
     section = road.sections[end.lane.section]
     lane = section.lanes[end.lane.lane]
-    t = offset + lane.side * lane.centre.value(section.length if end.side > 0 else 0.0)
-    return x - t * sin, y + t * cos
+    t = found.offset + lane.side * lane.centre.value(section.length if end.side > 0 else 0.0)
+    return found.x + t * found.dx, found.y + t * found.dy
 
 
 def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[Flaw]:

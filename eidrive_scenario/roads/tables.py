@@ -31,6 +31,8 @@ class RoadTables:
         self.curves = CurveTable([road.reference for road in roads])
         self.elevation = PolynomialTable([road.elevation for road in roads], spans)
         self.superelevation = PolynomialTable([road.superelevation for road in roads], spans)
+        self.banked = not self.superelevation.is_zero
+        """Whether any road is superelevated."""
         self.lane_offset = PolynomialTable([road.lane_offset for road in roads], spans)
         self._index_sections()
 
@@ -110,9 +112,21 @@ class RoadTables:
         """Poses at road coordinates (N,); headings of the reference lines."""
         x, y, h, _, _ = self.curves.at(road, s)
         z, slope = self.elevation.value_and_slope(road, s)
+        pitch = -np.arctan(slope)
+        sin, cos = np.sin(h), np.cos(h)
+        if not self.banked:
+            t = t + np.zeros_like(s)
+            return Poses(x - t * sin, y + t * cos, z + np.zeros_like(t), h, pitch, np.zeros_like(s))
+        ahead, left, up, roll = self.lateral_axis(road, s)
+        ahead, left = t * ahead, t * left
+        return Poses(x + ahead * cos - left * sin, y + ahead * sin + left * cos, z + t * up, h, pitch, roll)
+
+    def lateral_axis(self, road: Integers, s: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the unit vectors of the t-axes (ahead, left, up) and the superelevation [rad], each (N,)."""
+        slope = self.elevation.value_and_slope(road, s)[1]
         roll = self.superelevation.value(road, s)
-        across = t * np.cos(roll)
-        return Poses(x - across * np.sin(h), y + across * np.cos(h), z + t * np.sin(roll), h, -np.arctan(slope), roll)
+        steep, sin = np.hypot(1.0, slope), np.sin(roll)
+        return -sin * slope / steep, np.cos(roll), sin / steep, roll
 
     def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
         """Poses at the centre lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
@@ -121,29 +135,59 @@ class RoadTables:
         t, sideways = self.lane_t(row, s)
         t = t + offset
         x, y, h, curvature, speed = self.curves.at(road, s)
-        z, climb = self.elevation.value_and_slope(road, s)
-        roll, twist = self.superelevation.value_and_slope(road, s)
-        cos, sin = np.cos(roll), np.sin(roll)
-        across, z = t * cos, z + t * sin
-        climb = climb + sideways * sin + t * cos * twist
-        sideways = sideways * cos - t * sin * twist
-        along = np.maximum(speed * (1.0 - curvature * across), LEAST_STRETCH)
+        if self.banked:
+            ahead, left, z, along, sideways, climb, roll = self._banked_tangent(road, s, t, sideways, curvature, speed)
+        else:
+            z, climb = self.elevation.value_and_slope(road, s)
+            ahead, left, along = np.zeros_like(t), t, np.maximum(speed * (1.0 - curvature * t), LEAST_STRETCH)
+            length = np.sqrt(along * along + sideways * sideways + climb * climb)
+            roll = np.arctan2(-climb * sideways, along * length) + 0.0
         for n in np.flatnonzero(self._lifted[row]):
             z[n] += lane_height(self.lanes[row[n]], float(s[n] - self.section_start[section[n]]), float(offset[n]))
+        sin, cos = np.sin(h), np.cos(h)
         return Poses(
-            x - across * np.sin(h),
-            y + across * np.cos(h),
+            x + ahead * cos - left * sin,
+            y + ahead * sin + left * cos,
             z,
             h + np.arctan2(sideways, along),
             -np.arctan2(climb, np.hypot(along, sideways)),
             roll,
         )
 
+    def _banked_tangent(
+        self, road: Integers, s: Array, t: Array, sideways: Array, curvature: Array, speed: Array
+    ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+        """`poses.banked_tangent` over arrays."""
+        z, slope, bend = self.elevation.to_second_order(road, s)
+        roll, twist = self.superelevation.value_and_slope(road, s)
+        sin, cos = np.sin(roll), np.cos(roll)
+        square = 1.0 + slope * slope
+        level = 1.0 / np.sqrt(square)
+        steep, steeper = slope * level, bend * level / square
+        rise = sideways * sin + t * cos * twist
+        ahead, left = -t * sin * steep, t * cos
+        along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
+        along = np.maximum(along, LEAST_STRETCH)
+        aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+        climb = slope + rise * level - t * sin * slope * steeper
+        nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+        nz = along * cos + aside * sin * steep
+        lean = np.arctan2(nx * aside - ny * along, nz * np.sqrt(along * along + aside * aside + climb * climb))
+        return ahead, left, z + t * sin * level, along, aside, climb, lean
+
+    def stretch_at(self, road: Integers, s: Array, t: Array, curvature: Array, speed: Array) -> Array:
+        """Return the metres ahead per metre of s at a constant t, (N,), on roads that may be banked."""
+        return self._banked_tangent(road, s, t, np.zeros_like(s), curvature, speed)[3]
+
     def stretch(self, row: Integers, s: Array) -> Array:
         """Metres of path per metre of s along lanes' centre lines, in plan view."""
         t, slope = self.lane_t(row, s)
-        curvature, speed = self.curves.bend(self.section_road[self.lane_section[row]], s)
-        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
+        road = self.section_road[self.lane_section[row]]
+        curvature, speed = self.curves.bend(road, s)
+        along = speed * (1.0 - curvature * t)
+        if self.banked:
+            along, slope = self._banked_tangent(road, s, t, slope, curvature, speed)[3:5]
+        return np.asarray(np.maximum(np.hypot(along, slope), LEAST_STRETCH))
 
     def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
         """All lanes with their running numbers."""

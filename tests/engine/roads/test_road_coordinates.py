@@ -136,8 +136,9 @@ def test_bank_and_slope(road: Text, map_of: Text) -> None:
     rising = '<elevationProfile><elevation s="0" a="2" b="0.05" c="0" d="0"/></elevationProfile>'
     extra = f"{rising}<lateralProfile>{BANKED}</lateralProfile>"
     network = RoadNetwork.parse(map_of(road(extra=extra)))
-    pose = network.road_pose_at("1", 20.0, 3.0)
-    assert pose == pytest.approx((20.0, 3 * math.cos(0.1), 3.0 + 3 * math.sin(0.1), 0.0, -math.atan(0.05), 0.1))
+    pose, slope = network.road_pose_at("1", 20.0, 3.0), math.atan(0.05)
+    leans, rises = 3 * math.sin(0.1) * math.sin(slope), 3 * math.sin(0.1) * math.cos(slope)
+    assert pose == pytest.approx((20.0 - leans, 3 * math.cos(0.1), 3.0 + rises, 0.0, -slope, 0.1))
     back = network.road_pose_at("1", 20.0, 3.0).turned(math.pi)
     assert (back.h, back.p, back.r) == pytest.approx((math.pi, math.atan(0.05), -0.1))
     aside = network.road_pose_at("1", 20.0, 0.0).turned(math.pi / 2)

@@ -1,0 +1,105 @@
+"""Roads that climb and are superelevated: the t-axis is turned by heading, slope and bank, in this order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from eidrive_scenario.roads import RoadNetwork
+
+Text = Callable[..., str]
+
+
+def lane(width: float, offset: float = 0.0) -> str:
+    return (
+        f'<laneOffset s="0" a="{offset}" b="0" c="0" d="0"/><laneSection s="0"><center><lane id="0"/></center>'
+        f'<right><lane id="-1" type="driving"><width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane></right>'
+        "</laneSection>"
+    )
+
+
+def profiles(elevation: str, bank: float, twist: float = 0.0) -> str:
+    return (
+        f'<elevationProfile><elevation s="0" {elevation}/></elevationProfile><lateralProfile>'
+        f'<superelevation s="0" a="{bank}" b="{twist}" c="0" d="0"/></lateralProfile>'
+    )
+
+
+CLIMB = 'a="0" b="0.1" c="0" d="0"'
+CREST = 'a="0" b="0" c="0.15" d="-0.005"'
+
+
+@pytest.fixture
+def climbing(road: Text, map_of: Text) -> RoadNetwork:
+    """A slope of 10 %, banked by 0.4 rad, with one lane of 6 m: the road of esmini's slope_up_leaning_right."""
+    return RoadNetwork.parse(map_of(road(length=50.0, lanes=lane(6.0), extra=profiles(CLIMB, 0.4))))
+
+
+@pytest.fixture
+def crest(road: Text, map_of: Text) -> RoadNetwork:
+    """A crest to the north, banked by 45°, with one lane whose middle is at t = -2.5: esmini's tilted_crest."""
+    lanes, extra = lane(3.0, -1.0), profiles(CREST, math.pi / 4)
+    return RoadNetwork.parse(map_of(road(length=20.0, hdg=math.pi / 2, lanes=lanes, extra=extra)))
+
+
+def test_lane_pose_on_banked_slope_leans_as_in_esmini(climbing: RoadNetwork, crest: RoadNetwork) -> None:
+    """Values of the tests of esmini 3.6.0: x = 10.116 at s = 10, and y = 1.4845 at s = 1."""
+    assert climbing.lane_pose_at("1", -1, 10.0).x == pytest.approx(10.116, abs=5e-4)
+    assert crest.lane_pose_at("1", -1, 1.0).y == pytest.approx(1.4845, abs=5e-5)
+
+
+@pytest.mark.parametrize("s", [1.0, 7.0, 13.0])
+def test_road_pose_equals_product_of_rotations(crest: RoadNetwork, s: float) -> None:
+    slope = 0.3 * s - 0.015 * s * s
+    turned = Rotation.from_euler("ZYX", [math.pi / 2, -math.atan(slope), math.pi / 4])
+    expected = np.array([0.0, s, 0.15 * s * s - 0.005 * s**3]) + turned.apply([0.0, -2.5, 0.0])
+    pose = crest.road_pose_at("1", s, -2.5)
+    assert pose[:3] == pytest.approx(tuple(expected), abs=1e-12)
+    assert Rotation.from_euler("ZYX", pose[3:]).as_matrix() == pytest.approx(turned.as_matrix(), abs=1e-12)
+
+
+def surface_frame(network: RoadNetwork, s: float, offset: float) -> np.ndarray:
+    """Columns forward, left, up of the lane's surface, by finite differences."""
+    h = 1e-5
+    place = [network.lane_pose_at("1", -1, s + ds, offset + dt)[:3] for ds, dt in ((h, 0), (-h, 0), (0, h), (0, -h))]
+    along, across = np.subtract(place[0], place[1]), np.subtract(place[2], place[3])
+    up = np.cross(along, across)
+    columns = [along, np.cross(up, along), up]
+    return np.column_stack([column / np.linalg.norm(column) for column in columns])
+
+
+@pytest.mark.parametrize("offset", [-1.0, 0.0, 1.2])
+@pytest.mark.parametrize("twist", [0.0, 0.02])
+def test_lane_pose_lies_in_the_surface(road: Text, map_of: Text, twist: float, offset: float) -> None:
+    bend = '<geometry s="0" x="3" y="4" hdg="0.7" length="20"><arc curvature="0.03"/></geometry>'
+    text = road(length=20.0, geometry=bend, lanes=lane(3.0, -1.0), extra=profiles(CREST, 0.5, twist))
+    network = RoadNetwork.parse(map_of(text))
+    for s in (2.0, 9.0, 16.0):
+        pose = network.lane_pose_at("1", -1, s, offset)
+        body = Rotation.from_euler("ZYX", pose[3:]).as_matrix()
+        assert body == pytest.approx(surface_frame(network, s, offset), abs=1e-6)
+        many = network.lane_pose("1", -1, np.array([s]), offset)
+        assert [float(axis[0]) for axis in many] == pytest.approx(list(pose), abs=1e-12)
+
+
+@pytest.mark.parametrize("s", [0.5, 1.0, 6.0, 10.0, 17.0])
+def test_point_on_banked_slope_is_located_where_it_was(crest: RoadNetwork, s: float) -> None:
+    pose = crest.lane_pose_at("1", -1, s, 0.4)
+    hint = crest.location("1", -1, min(s + 1.0, 20.0))
+    for found in (crest.locate_at(pose.x, pose.y), crest.locate_at(pose.x, pose.y, hint)):
+        assert found is not None
+        assert (found.s, found.offset) == pytest.approx((s, 0.4), abs=1e-5)
+
+
+def test_steps_along_banked_lane_add_up_to_its_length_seen_from_above(crest: RoadNetwork) -> None:
+    s = np.linspace(2.0, 18.0, 4001)
+    points = np.column_stack(crest.lane_pose("1", -1, s)[:2])
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    ahead, back = crest.location("1", -1, 2.0), crest.location("1", -1, 18.0)
+    for _ in range(64):
+        ahead, back = crest.advance(ahead, length / 64) or ahead, crest.advance(back, -length / 64) or back
+    assert (ahead.s, back.s) == pytest.approx((18.0, 2.0), abs=2e-3)
