@@ -130,6 +130,8 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
     rule = element.get("rule", "RHT")
     if rule not in ("RHT", "LHT"):
         findings.add(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
+    reference = read_reference_line(element, length, findings)
+    length = reference.length
     lanes = element.find("lanes")
     lane_offset = Polynomials()
     sections: tuple[LaneSection, ...] = ()
@@ -151,7 +153,7 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
         length=length,
         rule="LHT" if rule == "LHT" else "RHT",
         junction_id=None if junction in ("-1", "") else junction,
-        reference=read_reference_line(element, length, findings),
+        reference=reference,
         elevation=_profile(element, "elevationProfile/elevation", findings),
         superelevation=_profile(element, "lateralProfile/superelevation", findings),
         lane_offset=lane_offset,

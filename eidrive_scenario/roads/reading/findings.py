@@ -67,6 +67,25 @@ class Findings:
         self.add(element, f"<{element.tag}> has {name}={text!r}", remedy)
         return 0.0
 
+    def mark_number(self, element: etree._Element, name: str, default: float | None) -> float | None:
+        """Return a number of a road mark. It is paint only: one that cannot be read is a warning, and the default."""
+        text = element.get(name)
+        if text is None:
+            return default
+        try:
+            value = float(text) if _plain(text) else math.nan
+        except ValueError:
+            value = math.nan
+        if abs(value) <= LARGEST:
+            return value
+        self.doubt_mark(element, f"<{element.tag}> has {name}={text!r}")
+        return default
+
+    def doubt_mark(self, element: etree._Element, what: str) -> None:
+        """Remember what is missing or wrong in a road mark."""
+        message, remedy = f"{what}, and is drawn without it", "correct it, or take the element out"
+        self.doubt(element, "road-mark", "road marks that are not complete", message, remedy)
+
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
         """A piece of a cubic: its start and a, b, c, d."""
         return (

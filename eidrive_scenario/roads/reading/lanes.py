@@ -220,24 +220,36 @@ def _linked(link: etree._Element | None, name: str, findings: Findings) -> tuple
 def _read_marks(element: etree._Element, begin: float, findings: Findings) -> Iterable[RoadMark]:
     for mark in element.iterfind("roadMark"):
         weight = mark.get("weight", "standard")
-        width = findings.number(mark, "width", None)
-        lines = []
-        for line in mark.iterfind("type/line"):
-            lines.append(
-                RoadMarkLine(
-                    length=findings.number(line, "length"),
-                    space=findings.number(line, "space"),
-                    t_offset=findings.number(line, "tOffset", 0.0),
-                    s_offset=findings.number(line, "sOffset", 0.0),
-                    width=findings.number(line, "width", 0.0) or width or MARK_WIDTHS.get(weight, 0.12),
-                )
-            )
+        width = findings.mark_number(mark, "width", None)
+        lines = (
+            _read_line(line, width or MARK_WIDTHS.get(weight, 0.12), findings) for line in mark.iterfind("type/line")
+        )
+        if mark.get("type") is None:
+            findings.doubt_mark(mark, "<roadMark> lacks the attribute 'type'")
         yield RoadMark(
-            s_offset=findings.number(mark, "sOffset", 0.0) + begin,
-            type=findings.text(mark, "type", "none"),
+            s_offset=(findings.mark_number(mark, "sOffset", 0.0) or 0.0) + begin,
+            type=mark.get("type", "none"),
             weight=weight,
             color=mark.get("color", "standard"),
             width=width or MARK_WIDTHS.get(weight, 0.12),
             lane_change=mark.get("laneChange", "both"),
-            lines=tuple(lines),
+            lines=tuple(line for line in lines if line is not None),
         )
+
+
+def _read_line(line: etree._Element, usual: float, findings: Findings) -> RoadMarkLine | None:
+    """A line of a road mark; None where its dashes are not given, as the type of the mark then says how it looks."""
+    length, space = (findings.mark_number(line, name, None) for name in ("length", "space"))
+    missing = [name for name in ("length", "space") if line.get(name) is None]
+    if missing:
+        names = " and ".join(repr(name) for name in missing)
+        findings.doubt_mark(line, f"<line> lacks the attribute {names}")
+    if length is None or space is None:
+        return None
+    return RoadMarkLine(
+        length=length,
+        space=space,
+        t_offset=findings.mark_number(line, "tOffset", 0.0) or 0.0,
+        s_offset=findings.mark_number(line, "sOffset", 0.0) or 0.0,
+        width=findings.mark_number(line, "width", 0.0) or usual,
+    )

@@ -19,7 +19,10 @@ SHORTEST = 1e-9
 
 
 def read_reference_line(road: etree._Element, length: float, findings: Findings) -> ReferenceLine:
-    """The reference line of a <road>."""
+    """The reference line of a <road>.
+
+    Its length is that of the geometry where the road states one that differs by more than 1 %.
+    """
     plan = road.find("planView")
     if plan is None:
         findings.add(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
@@ -33,11 +36,11 @@ def read_reference_line(road: etree._Element, length: float, findings: Findings)
     found.sort(key=lambda curve: curve.s)
     covered = found[-1].s + found[-1].length
     if abs(covered - length) > max(0.01 * length, 0.1):
-        findings.add(
-            road,
-            f"road {road.get('id')!r} has length {length:g} m, but its geometry ends at {covered:g} m",
-            "correct the length or complete the geometry",
-        )
+        there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
+        what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
+        remedy = "correct the length or complete the geometry"
+        findings.doubt(road, "road-jump", "lengths that are not those of the geometry", what, remedy)
+        length = covered
     return ReferenceLine(found, length)
 
 

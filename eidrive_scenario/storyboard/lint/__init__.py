@@ -25,6 +25,7 @@ ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
         "heights across a road that are not read, or too steep",
         road_file.doubts_about("road-surface"),
     ),
+    Rule("road-mark", Level.WARNING, "a road mark that is not complete", road_file.doubts_about("road-mark")),
     Rule(
         "signal-off-road",
         Level.WARNING,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, RoadError
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import RoadNetwork, surface_meshes
 
 Text = Callable[..., str]
 
@@ -108,10 +108,53 @@ def test_a_road_that_leads_to_no_junction_ends_there(road: Text, map_of: Text) -
     assert network.advance(network.location("1", -1, 90.0), 20.0) is None
 
 
-def test_a_length_that_the_geometry_does_not_cover(road: Text, map_of: Text) -> None:
+@pytest.mark.parametrize(("length", "there"), [(100.0, "20 m before"), (50.0, "30 m after")])
+def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
+    road: Text, map_of: Text, length: float, there: str
+) -> None:
     short = '<geometry s="0" x="0" y="0" hdg="0" length="80"><line/></geometry>'
-    (found,) = problems(map_of(road(geometry=short)))
-    assert "road '1' has length 100 m, but its geometry ends at 80 m; correct the length" in found
+    one_lane = (
+        '<laneSection s="0"><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>'
+        '<{}cessor id="-1"/></link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
+    )
+    link = '<{}cessor elementType="road" elementId="{}" contactPoint="{}"/>'
+    first = road(geometry=short, length=length, link=link.format("suc", 2, "start"), lanes=one_lane.format("suc"))
+    second = road("2", x=80.0, link=link.format("prede", 1, "end"), lanes=one_lane.format("prede"))
+    network = RoadNetwork.parse(map_of(first, second), "town.xodr")
+    assert network.roads["1"].length == 80.0
+    assert [(doubt.rule, doubt.message) for doubt in network.doubts] == [
+        ("road-jump", f"road '1' has length {length:g} m, but its geometry ends {there} that: the geometry counts")
+    ]
+    ahead = network.advance(network.location("1", -1, 70.0), 25.0)
+    assert ahead is not None
+    assert (ahead.road, ahead.s) == ("2", pytest.approx(15.0))
+    assert surface_meshes(network)
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ('space="6"', "<line> lacks the attribute 'length'"),
+        ('length="3"', "<line> lacks the attribute 'space'"),
+        ('length="3m" space="6"', "<line> has length='3m'"),
+        ('length="3" space="nan"', "<line> has space='nan'"),
+    ],
+)
+def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
+    road: Text, map_of: Text, line: str, what: str
+) -> None:
+    """A broken line of 3 m dashes at a pitch of 9 m on 100 m: 12 dashes, the last of 1 m."""
+    lanes = (
+        '<laneSection s="0"><center><lane id="0" type="none"><roadMark sOffset="0" type="broken" width="0.2">'
+        f'<type name="x"><line {line}/></type></roadMark></lane></center><right><lane id="-1" type="driving">'
+        '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
+    )
+    network = RoadNetwork.parse(map_of(road(lanes=lanes)), "town.xodr")
+    (doubt,) = network.doubts
+    assert (doubt.rule, doubt.line) == ("road-mark", 1)
+    assert doubt.message == f"{what}, and is drawn without it"
+    paint = next(mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
+    assert len(paint.faces) == 2 * 12
 
 
 def test_a_namespace_is_no_obstacle(road: Text, map_of: Text) -> None:
