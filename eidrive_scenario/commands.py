@@ -24,10 +24,19 @@ def check_commands(scenario: Scenario) -> None:
     monitors = [one.name for one in declared.monitor_declaration] if declared is not None else []
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
         CHANNEL: lambda command: load_profile(
-            command.content, (library_path() / "channels",), origin=command.source, line=command.line
+            command.content,
+            (library_path() / "channels",),
+            origin=command.source,
+            line=command.line,
+            scope=command.scope,
         ),
         CRITERION: lambda command: parse_criteria(
-            command.content, source=command.source, line=command.line, entities=scenario.entities, monitors=monitors
+            command.content,
+            source=command.source,
+            line=command.line,
+            entities=scenario.entities,
+            monitors=monitors,
+            scope=command.scope,
         ),
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }

@@ -139,7 +139,30 @@ def _tagged(member: Any, tag: int | str) -> bool:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML's safe loader, which by itself keeps the last of several equal keys."""
+    """YAML's safe loader, which by itself keeps the last of several equal keys.
+
+    An expression `${…}` is one text, inside braces and brackets too, where YAML takes its brace for a mapping.
+    """
+
+    def scan_plain(self) -> yaml.ScalarToken:
+        """Scan a scalar without quotes."""
+        if self.flow_level and self.prefix(2) == "${":
+            length = self._length_of_expression()
+            if length:
+                start = self.get_mark()
+                text = self.prefix(length)
+                self.forward(length)
+                self.allow_simple_key = False
+                return yaml.ScalarToken(text, False, start, self.get_mark(), "'")
+        token: yaml.ScalarToken = super().scan_plain()
+        return token
+
+    def _length_of_expression(self) -> int:
+        """Number of characters up to its closing brace; 0 if there is none in this line."""
+        length = 2
+        while self.peek(length) not in "\0\r\n{}":
+            length += 1
+        return length + 1 if self.peek(length) == "}" else 0
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen = set()
@@ -183,7 +206,7 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
     """The line of each key of valid YAML, the first line having the number `first`. Keys inside others have dots, and
     entries of lists numbers: `delay`, `delay.seconds`, `limits.0`."""
     lines: dict[str, int] = {}
-    waiting = [("", yaml.compose(text, Loader=yaml.SafeLoader))]
+    waiting = [("", yaml.compose(text, Loader=_Loader))]
     seen: set[int] = set()
     while waiting:
         path, node = waiting.pop()

@@ -92,7 +92,11 @@ def _later_channels(scenario: Scenario) -> Iterator[dict[str, Any] | None]:
     for command in scenario.storyboard.walk():
         if isinstance(command, CustomCommandAction) and command.type == CHANNEL and id(command) not in at_start:
             profile: ChannelProfile | None = load_profile(
-                command.content, (library_path() / "channels",), origin=command.source, line=command.line
+                command.content,
+                (library_path() / "channels",),
+                origin=command.source,
+                line=command.line,
+                scope=command.scope,
             )
             yield _dump(profile)
 

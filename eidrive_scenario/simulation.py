@@ -244,7 +244,7 @@ class Simulation:
             )
 
     def _command_channel(self, command: CustomCommand) -> None:
-        self.stations.use_channel(command.content, source=command.source, line=command.line)
+        self.stations.use_channel(command.content, source=command.source, line=command.line, scope=command.scope)
 
     def _command_criterion(self, command: CustomCommand) -> None:
         self.criteria.extend(
@@ -254,6 +254,7 @@ class Simulation:
                 line=command.line,
                 entities=self.scenario.entities,
                 taken=[criterion.name for criterion in self.criteria],
+                scope=command.scope,
             )
         )
 

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, P
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
+from eidrive_scenario.openscenario.references import resolve_references
 from eidrive_scenario.perception.tracking import TrackerSettings, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
@@ -260,11 +261,16 @@ def agent_settings(controller: Controller) -> AgentSettings:
             continue
         lines[entry.name] = entry.line
         try:
-            data[entry.name] = entry.value if entry.name in _TEXTS else load_yaml(entry.value, source=source)
+            value = entry.value if entry.name in _TEXTS else load_yaml(entry.value, source=source)
         except SettingError as error:
             what = error.problems[0].message
             message = f"property {entry.name!r} is {entry.value!r}, which is {what}"
             problems.append(Problem(message, "check brackets, commas and quotes", source, entry.line))
+            continue
+        try:
+            data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
+        except SettingError as error:
+            problems += error.problems
     for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
         known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
         if name in data and data[name] not in known:

@@ -16,6 +16,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
@@ -82,7 +83,7 @@ class Stations:
         """Built beforehand, as what they cannot work with shall be told before the run."""
         self._encoders = declared_encoders(scenario, self._settings)
         if channel is not None:
-            self._set_channel(channel, origin="--channel", line=None)
+            self._set_channel(channel, origin="--channel", line=None, scope=scenario.scope)
 
     @property
     def settings(self) -> Mapping[str, AgentSettings]:
@@ -127,10 +128,10 @@ class Stations:
         self._lookouts.pop(name, None)
         self._held.pop(name, None)
 
-    def use_channel(self, profile: str, *, source: str, line: int) -> None:
+    def use_channel(self, profile: str, *, source: str, line: int, scope: Scope | None = None) -> None:
         """The file asks for a channel, at the start or on a trigger; an option given by the caller wins."""
         if not self._fixed_channel:
-            self._set_channel(profile, origin=source, line=line)
+            self._set_channel(profile, origin=source, line=line, scope=scope)
 
     def act(self, world: World, view: WorldView) -> dict[str, AgentStep]:
         """Sensors read, messages that have arrived are heard, every agent acts."""
@@ -228,8 +229,8 @@ class Stations:
     def _own_perception(self) -> bool:
         return self._channel is not None and self._channel.own_perception
 
-    def _set_channel(self, source: str | Path, *, origin: str, line: int | None) -> None:
-        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line)
+    def _set_channel(self, source: str | Path, *, origin: str, line: int | None, scope: Scope | None) -> None:
+        profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
         before = self._channel or self._silenced
         self._channel = build_channel(profile, self._seed, previous=before)
         self._silenced = before if self._channel is None else None

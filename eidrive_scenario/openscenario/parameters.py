@@ -115,6 +115,24 @@ class Scope:
             raise ExpressionError(f"{text!r} holds characters that an expression may not have", expressions.HELP)
         return self._evaluated(text[2:-1], scalar)
 
+    def evaluate(self, text: str) -> Value:
+        """The value of `$name` or `${expression}` by its own type, for texts that are no attributes.
+
+        Raises ExpressionError.
+        """
+        match = REFERENCE.fullmatch(text)
+        if match:
+            parameter = self.find(match.group(1))
+            return parameter.value if isinstance(parameter.value, bool | int | float | str) else parameter.text
+        body = text[2:-1]
+        used = {name: self.find(name) for name in expressions.parameters_of(body)}
+        operands = {name: parameter.operand for name, parameter in used.items()}
+        if expressions.joins_text(body, operands):
+            return expressions.concatenate(body, {name: parameter.text for name, parameter in used.items()})
+        if not EXPRESSION.fullmatch(text):
+            raise ExpressionError(f"{text!r} holds characters that an expression may not have", expressions.HELP)
+        return expressions.evaluate(body, operands)
+
     def _evaluated(self, text: str, scalar: Scalar) -> Any:
         used = {name: self.find(name) for name in expressions.parameters_of(text)}
         operands = {name: parameter.operand for name, parameter in used.items()}

@@ -15,11 +15,13 @@ from eidrive_scenario.openscenario.model import (
     Action,
     Catalog,
     CatalogReference,
+    CustomCommandAction,
     Element,
     Enumeration,
     ObjectController,
     ParameterDeclaration,
     ParameterDeclarations,
+    Property,
 )
 from eidrive_scenario.openscenario.parameters import REFERENCE, Assignment, Parameter, Scope, declare
 from eidrive_scenario.openscenario.parsing import line_of
@@ -95,6 +97,8 @@ class Reader:
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
         self._attributes(node, known, scope, values)
         self._text(node, known, values)
+        if cls is Property or cls is CustomCommandAction:
+            _keep_scope(node, scope, values)
         repeated: dict[str, list[Element]] = {}
         for child in below:
             self._child(node, child, known, scope, values, repeated)
@@ -261,6 +265,14 @@ class Reader:
     def _error(self, message: str, remedy: str, node: etree._Element) -> None:
         self._flaws += 1
         self.findings.error(message, remedy, source=self.source, line=line_of(node))
+
+
+def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
+    """Keeps the visible parameters for references inside a text; a value that begins with one is resolved already."""
+    content = values.get("content")
+    text = content if isinstance(content, str) else (node.get("value") or "")
+    if "$" in text and (content is not None or not text.startswith("$")):
+        values["scope"] = scope
 
 
 def make(cls: type[Element], values: Mapping[str, Any]) -> Element:

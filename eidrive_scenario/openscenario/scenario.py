@@ -30,7 +30,7 @@ from eidrive_scenario.openscenario.model import (
     VariableDeclarations,
     Vehicle,
 )
-from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
+from eidrive_scenario.openscenario.parameters import Assignment, Scope, as_assignments
 from eidrive_scenario.openscenario.parsing import Source, open_document
 from eidrive_scenario.openscenario.participants import scenario_objects
 from eidrive_scenario.openscenario.roadfile import find_road_file
@@ -57,6 +57,7 @@ class Scenario:
     assigned     values that the caller gave to parameters; they win over drawn ones
     digest       SHA-256 of the scenario's content, as hexadecimal digits
     catalogs     the same of each catalog file that is used, by its path
+    scope        its parameters with their types, for references in settings that are given beside the file
     """
 
     name: str
@@ -76,6 +77,7 @@ class Scenario:
     assigned: Mapping[str, Assignment] = field(repr=False, default_factory=dict)
     digest: str = ""
     catalogs: Mapping[str, str] = field(default_factory=dict)
+    scope: Scope | None = field(repr=False, default=None)
 
     @property
     def storyboard(self) -> Storyboard:
@@ -133,6 +135,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         assigned=assignments,
         digest=document.digest,
         catalogs=library.digests,
+        scope=Scope(parameters=dict(read.parameters)),
     )
 
 

@@ -11,7 +11,7 @@ from eidrive_scenario.openscenario import model, scalars
 from eidrive_scenario.openscenario.matching import Automaton, Group, Leaf, automaton
 from eidrive_scenario.openscenario.model import Element, Enumeration
 from eidrive_scenario.openscenario.model.content import All, Changed, Choice, Content, Sequence
-from eidrive_scenario.openscenario.model.element import USAGE, Usage, alternatives
+from eidrive_scenario.openscenario.model.element import ABOUT, USAGE, Usage, alternatives
 from eidrive_scenario.openscenario.model.scalars import Limits, NameOf
 from eidrive_scenario.openscenario.scalars import Scalar, Version, is_known, parsed
 
@@ -91,7 +91,7 @@ def _read(cls: type[Element], version: Version) -> Rules:
     text_field = ""
     for entry in fields(cls):
         usage: Usage = entry.metadata.get(USAGE, _PLAIN)
-        if entry.name in ("line", "source"):
+        if entry.name in ABOUT:
             continue
         if usage.text:
             text_field = entry.name

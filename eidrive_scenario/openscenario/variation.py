@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model import CustomCommandAction
+from eidrive_scenario.openscenario.references import resolve_references, without
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
@@ -49,8 +50,11 @@ class Distribution(Settings):
 
 
 def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
-    """The parameters that this scenario draws for `seed`. Raises SettingError with file:line."""
-    drawn: dict[str, str] = {}
+    """The parameters that this scenario draws for `seed`. Raises SettingError with file:line.
+
+    The bounds may refer to other parameters (`{normal: [$Mean, 0.5]}`), but to none that is drawn itself.
+    """
+    found: list[tuple[CustomCommandAction, dict[Any, Any]]] = []
     for action in _commands(scenario):
         data = load_yaml(action.content, source=action.source, line=action.line)
         if not isinstance(data, dict):
@@ -62,7 +66,13 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
                     action.line,
                 )
             )
-        for name, spec in data.items():
+        found.append((action, data))
+    names = {str(name) for _, data in found for name in data}
+    drawn: dict[str, str] = {}
+    for action, data in found:
+        scope = without(action.scope, names)
+        bounds = resolve_references(data, scope, source=action.source, line=action.line)
+        for name, spec in bounds.items():
             drawn[name] = repr(_distribution(scenario, action, str(name), spec).draw(seed, str(name)))
     return drawn
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, Protocol
 
-import yaml
-
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
+from eidrive_scenario.openscenario.parameters import Scope
+from eidrive_scenario.openscenario.references import resolve_references
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.registry import registry
-from eidrive_scenario.settings import load_yaml, parse_settings
+from eidrive_scenario.settings import key_lines, load_yaml, parse_settings
 
 EXITS = {"exitSuccess": True, "exitFailure": False}
 """Types of scenario_simulator_v2's commands, and whether the run passes with them."""
@@ -37,12 +37,14 @@ def parse_criteria(
     entities: Collection[str] | None = None,
     monitors: Collection[str] | None = None,
     taken: Collection[str] = (),
+    scope: Scope | None = None,
 ) -> list[Criterion]:
     """The criteria that a command's text declares, in its order.
 
     entities  names of the scenario's entities, to check the actors against
     monitors  names of the scenario's monitors, to check those against that are read
     taken     names of criteria that the run already has; a criterion that would repeat one gets a number after it
+    scope     parameters to which settings refer as `$name` or `${expression}`
 
     Raises SettingError with the file and line of every mistake.
     """
@@ -56,6 +58,7 @@ def parse_criteria(
     for kind, settings, lines in _items(entries, text, line):
         here = lines.get("", line)
         try:
+            settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
             criterion = _build(kind, settings, source, here, lines)
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
@@ -72,17 +75,21 @@ def parse_criteria(
 
 def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
     """Each criterion's kind and settings, with the lines of its settings and under the empty name its own."""
-    first = 1 if line is None else line
-    root: Any = yaml.compose(text, Loader=yaml.SafeLoader)
-    nodes = root.value if isinstance(root, yaml.SequenceNode) else [root]
-    for entry, node in zip(entries, nodes, strict=True):
-        lines = {}
-        for key, value in node.value:
-            keys = [key for key, _ in value.value] if isinstance(value, yaml.MappingNode) else []
-            places = {"": first + key.start_mark.line, **{str(k.value): first + k.start_mark.line for k in keys}}
-            lines[str(key.value)] = places
-        for kind, settings in entry.items():
-            yield str(kind), settings, lines.get(str(kind), {})
+    known = key_lines(text, 1 if line is None else line)
+    several = "0" in known
+    paths = {
+        f"{place}.{kind}" if several else str(kind): (str(kind), settings)
+        for place, entry in enumerate(entries)
+        for kind, settings in entry.items()
+    }
+    lines: dict[str, dict[str, int]] = {path: {"": known[path]} if path in known else {} for path in paths}
+    for key, number in known.items():
+        for dot in (place for place, sign in enumerate(key) if sign == "."):
+            if key[:dot] in lines:
+                lines[key[:dot]][key[dot + 1 :]] = number
+                break
+    for path, (kind, settings) in paths.items():
+        yield kind, settings, lines[path]
 
 
 def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> Criterion:

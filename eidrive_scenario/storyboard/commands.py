@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.overrides import Overrides
 from eidrive_scenario.driving.step import Goal
+from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
@@ -14,12 +15,16 @@ from eidrive_scenario.world.environment import Environment
 
 @dataclass(frozen=True)
 class CustomCommand:
-    """A CustomCommandAction that started: its type, its text, and where the file says so."""
+    """A CustomCommandAction that started: its type, its text, and where the file says so.
+
+    `scope` holds the parameters that are visible there, if the text refers to any.
+    """
 
     type: str
     content: str
     line: int
     source: str
+    scope: Scope | None = None
 
 
 @dataclass

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
+from eidrive_scenario.openscenario.parameters import Scope
+from eidrive_scenario.openscenario.references import is_reference, resolve_references
 from eidrive_scenario.registry import registry
 from eidrive_scenario.settings import Settings, key_lines, load_yaml, load_yaml_file, parse_settings
 from eidrive_scenario.v2x.channel import Channel
@@ -38,15 +40,22 @@ def load_profile(
     *,
     origin: str = "",
     line: int | None = None,
+    scope: Scope | None = None,
 ) -> ChannelProfile | None:
     """A checked profile: by name, by path, from YAML text, or from a mapping. None stands for no cooperation.
 
     A text that is a mapping in YAML (`{delay: {kind: constant, seconds: 0.3}}`) is read as such; any other is the name
     of a `.yaml` file in one of `folders` (first match), or a path, relative to them or to the working directory.
-    `origin` and `line` say where the source itself was written. Raises SettingError with file, line and key.
+    `origin` and `line` say where the source itself was written; `scope` holds the parameters to which settings refer as
+    `$name` or `${expression}`, or the text itself, which then is a name or a path. Raises SettingError with file, line
+    and key.
     """
     if isinstance(source, Mapping):
-        return _parse(source, "custom", origin or "channel", line, {})
+        return _parse(source, "custom", origin or "channel", line, {}, scope)
+    if isinstance(source, str) and is_reference(source.strip()) and scope is not None:
+        source = Path(str(resolve_references(source.strip(), scope, source=origin, line=line)).strip())
+        if str(source) == NO_COOPERATION:
+            return None
     if isinstance(source, str):
         text = source.strip()
         if text == NO_COOPERATION:
@@ -54,7 +63,7 @@ def load_profile(
         if "{" in text or "\n" in text or ": " in text:
             data = load_yaml(source, source=origin or "channel", line=line)
             lines = {} if line is None else key_lines(source, line)
-            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines)
+            return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
         if not text:
             raise SettingError(Problem("the channel has no name", "write `ideal`, or `none`", origin, line))
         source = Path(text)
@@ -67,8 +76,7 @@ def load_profile(
             what, remedy = f"the file {str(source)!r} is no channel profile", "give one that ends in .yaml"
         raise SettingError(Problem(what, remedy, origin, line))
     data, lines = load_yaml_file(path)
-    placed = _with_paths(_mapping(data, str(path), 1), path.parent)
-    return _parse(placed, path.stem, str(path), 1, lines)
+    return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
 
 
 def profile_names(folder: Path) -> tuple[str, ...]:
@@ -120,8 +128,16 @@ def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
 
 
 def _parse(
-    data: Mapping[str, Any], name: str, source: str, line: int | None, lines: Mapping[str, int]
+    data: Mapping[str, Any],
+    name: str,
+    source: str,
+    line: int | None,
+    lines: Mapping[str, int],
+    scope: Scope | None,
+    folder: Path | None = None,
 ) -> ChannelProfile:
+    data = resolve_references(data, scope, source=source, line=line, lines=lines)
+    data = _with_paths(data, folder) if folder is not None else data
     model = data.get("model", ChannelProfile.model_fields["model"].default)
     models = registry("channels")
     if not isinstance(model, str) or model not in models:

@@ -16,7 +16,9 @@ class CustomCommandAction(ActionBehaviour):
     def update(self) -> Status:
         """Hand it on."""
         action = self.action
-        self.stage.commands.custom.append(CustomCommand(action.type, action.content, action.line, action.source))
+        self.stage.commands.custom.append(
+            CustomCommand(action.type, action.content, action.line, action.source, action.scope)
+        )
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -15,6 +15,9 @@ from eidrive_scenario.openscenario.model.content import SEQUENCE, Changed, Choic
 
 USAGE = "usage"
 
+ABOUT = frozenset({"line", "source", "scope"})
+"""Fields that say where an element stands instead of what it holds."""
+
 
 @dataclass(frozen=True)
 class Usage:
@@ -86,6 +89,14 @@ def text() -> Any:
     return field(default="", metadata={USAGE: Usage(text=True)})
 
 
+def visible_parameters() -> Any:
+    """A field for the parameters (a Scope) that are visible to the references inside a text of the element.
+
+    None where the text has no reference, or was one as a whole, which is resolved when the file is read.
+    """
+    return field(default=None, compare=False, repr=False)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Element:
     """An element of a file. `line` and `source` say where it stands; they do not count when elements are compared."""
@@ -130,10 +141,10 @@ class Element:
 
 
 def field_names(cls: type[Element]) -> tuple[str, ...]:
-    """The fields of a class but for `line` and `source`."""
+    """The fields of a class that stand in a file: all but those of `ABOUT`."""
     known = _FIELD_NAMES.get(cls)
     if known is None:
-        known = tuple(entry.name for entry in fields(cls) if entry.name not in ("line", "source"))
+        known = tuple(entry.name for entry in fields(cls) if entry.name not in ABOUT)
         _FIELD_NAMES[cls] = known
     return known
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
-from eidrive_scenario.openscenario.model.element import Element, child, text
+from eidrive_scenario.openscenario.model.element import Element, child, text, visible_parameters
 from eidrive_scenario.openscenario.model.environment import EnvironmentAction
 from eidrive_scenario.openscenario.model.positions import Position
 from eidrive_scenario.openscenario.model.scalars import EntityName, MonitorName, ParameterName, VariableName
@@ -151,6 +152,7 @@ class CustomCommandAction(Element):
 
     type: str
     content: str = text()
+    scope: Any = visible_parameters()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from eidrive_scenario.openscenario.model.element import Element, children, text
+from eidrive_scenario.openscenario.model.element import Element, children, text, visible_parameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,6 +14,7 @@ class Property(Element):
 
     name: str
     value: str
+    scope: Any = visible_parameters()
 
 
 @dataclass(frozen=True, kw_only=True)

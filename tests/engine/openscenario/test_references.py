@@ -1,0 +1,114 @@
+"""References to parameters inside YAML settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
+from eidrive_scenario.openscenario.parameters import Scope, declare
+from eidrive_scenario.openscenario.references import resolve_references, without
+from eidrive_scenario.settings import key_lines, load_yaml
+
+
+def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:
+    scope, findings = Scope(), Findings()
+    for name, (kind, value) in parameters.items():
+        declare(scope, ParameterDeclaration(name=name, parameter_type=kind, value=value), None, findings)
+    assert not findings.problems
+    return scope
+
+
+SCOPE = scope_of(
+    Latency=(ParameterType.DOUBLE, "0.2"),
+    Count=(ParameterType.INTEGER, "3"),
+    On=(ParameterType.BOOLEAN, "true"),
+    Side=(ParameterType.STRING, "left"),
+    Digits=(ParameterType.STRING, "0.5"),
+    Forged=(ParameterType.STRING, "0.1}, loss: {kind: bernoulli, probability: 1.0"),
+)
+
+
+def resolved(text: str, scope: Scope | None = SCOPE) -> Any:
+    return resolve_references(load_yaml(text, source="a.xosc", line=10), scope, source="a.xosc", lines=key_lines(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("{seconds: $Latency}", 0.2),
+        ("seconds: $Latency", 0.2),
+        ("{seconds: '$Latency'}", 0.2),
+        ("{seconds: ${$Latency * 2}}", 0.4),
+        ("{seconds: ${max($Latency, 1, 0.5)}}", 1),
+        ("{seconds: [${$Count - 1}, $Latency]}", [2, 0.2]),
+        ("seconds: ${$Latency / 4}", 0.05),
+        ("{seconds: $Count}", 3),
+        ("{seconds: $On}", True),
+        ("{seconds: ${not $On}}", False),
+        ("{seconds: $Side}", "left"),
+        ("{seconds: ${lane_ + $Side}}", "lane_left"),
+        ("{seconds: $Digits}", "0.5"),
+        ("{seconds: ${$Digits * 2}}", 1.0),
+        ("{seconds: 5 $}", "5 $"),
+        ("{seconds: $5}", "$5"),
+    ],
+)
+def test_reference_has_value_and_type_of_parameter(text: str, value: object) -> None:
+    found = resolved(text)
+    assert found == {"seconds": pytest.approx(value) if isinstance(value, float) else value}
+    assert type(found["seconds"]) is type(value)
+
+
+def test_text_that_looks_like_yaml_stays_one_text() -> None:
+    assert resolved("{delay: {seconds: $Forged}}") == {
+        "delay": {"seconds": "0.1}, loss: {kind: bernoulli, probability: 1.0"}
+    }
+    assert resolved("{$Side: 1}") == {"$Side": 1}
+
+
+def test_value_of_a_parameter_is_not_resolved_again() -> None:
+    scope = scope_of(First=(ParameterType.STRING, "$Second"), Second=(ParameterType.STRING, "secret"))
+    assert resolved("{name: $First}", scope) == {"name": "$Second"}
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("{a: 1,\n b: {c: $Latncy}}", "a.xosc:2: setting 'b.c': unknown parameter $Latncy; did you mean 'Latency'?"),
+        ("[1,\n $Sid]", "a.xosc:2: setting '1': unknown parameter $Sid; did you mean 'Side'?"),
+        ("{a: ${$Latency +}}", "a.xosc:1: setting 'a': '$Latency +' is not an expression"),
+        ("{a: ${1 / 0}}", "a.xosc:1: setting 'a': the expression '1 / 0' has no value"),
+        ("{a: ${2 ** 3}}", "a.xosc:1: setting 'a': "),
+    ],
+)
+def test_wrong_reference_is_reported_with_line_and_key(text: str, problem: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        resolved(text)
+    assert str(caught.value).startswith(problem)
+
+
+def test_all_wrong_references_are_reported_together() -> None:
+    with pytest.raises(SettingError) as caught:
+        resolved("{a: $X, b: [$Y, $Latency]}")
+    assert [problem.message.split(":")[0] for problem in caught.value.problems] == ["setting 'a'", "setting 'b.0'"]
+
+
+def test_settings_without_scope_stay_as_they_are() -> None:
+    assert resolved("{a: $X}", None) == {"a": "$X"}
+
+
+def test_hidden_parameter_is_unknown() -> None:
+    inner = Scope(SCOPE)
+    assert without(inner, ["Side"]).evaluate("$Latency") == 0.2  # type: ignore[union-attr]
+    with pytest.raises(SettingError, match=r"unknown parameter \$Side"):
+        resolved("{a: $Side}", without(inner, ["Side"]))
+
+
+@pytest.mark.parametrize("text", ["{a: ${1 + 2}", "{a: ${1 + 2, b: 3}", "{a: ${{}}}", "{a: ${1}2}"])
+def test_unclosed_expression_is_invalid_yaml(text: str) -> None:
+    with pytest.raises(SettingError, match="not valid YAML"):
+        load_yaml(text, source="a.xosc")

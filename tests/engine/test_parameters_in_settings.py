@@ -1,0 +1,180 @@
+"""Parameters of a scenario in channels, criteria, variations and controller properties."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from eidrive_scenario.cli import app
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, load_for_seed, run_file
+
+LINK = ("RSU", "Ego")
+Make = Callable[..., Path]
+DECLARED = {
+    "Latency": ("double", "0.1"),
+    "Loss": ("double", "0"),
+    "Gap": ("double", "1"),
+    "Profile": ("string", "ideal"),
+    "Own": ("boolean", "false"),
+}
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Scenario 1 with parameters for its channel, and any texts replaced."""
+
+    def write(channel: str, *edits: tuple[str, str]) -> Path:
+        source = resolve_scenario("coop/scenario_1")
+        text = source.read_text().replace('"../', f'"{source.parent.parent}/')
+        declared = "".join(
+            f'<ParameterDeclaration name="{name}" parameterType="{kind}" value="{value}"/>'
+            for name, (kind, value) in DECLARED.items()
+        )
+        for old, new in (
+            ("<ParameterDeclarations>", f"<ParameterDeclarations>{declared}"),
+            ('"eidrive.channel">ideal<', f'"eidrive.channel">{channel}<'),
+            *edits,
+        ):
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = tmp_path / "varied.xosc"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def delays(path: Path, **parameters: str) -> RunResult:
+    return run_file(path, settings=RunSettings(parameters=parameters, time_limit=3.0))
+
+
+DELAY = "{delay: {kind: constant, seconds: $Latency}, loss: {kind: bernoulli, probability: ${$Loss / 100}}}"
+
+
+@pytest.mark.parametrize("latency", ["0.1", "0.25"])
+def test_parameter_sets_the_delay_of_every_message(make: Make, latency: str) -> None:
+    result = delays(make(DELAY), Latency=latency)
+    assert result.links[LINK].mean_delay == pytest.approx(float(latency))
+    assert result.parameters["Latency"] == latency
+
+
+def test_expression_sets_the_loss(make: Make) -> None:
+    path = make(DELAY)
+    assert delays(path, Loss="100").links[LINK].received == 0
+    assert delays(path, Loss="0").links[LINK].lost == 0
+
+
+def test_distribution_varies_delay_and_results_tell_runs_apart(make: Make, tmp_path: Path) -> None:
+    distribution = tmp_path / "latencies.xosc"
+    make(DELAY)
+    distribution.write_text(
+        """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
+        <ParameterValueDistribution><ScenarioFile filepath="varied.xosc"/><Deterministic>
+        <DeterministicSingleParameterDistribution parameterName="Latency"><DistributionRange stepWidth="0.2">
+        <Range lowerLimit="0.0" upperLimit="0.4"/></DistributionRange></DeterministicSingleParameterDistribution>
+        </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
+    )
+    printed = CliRunner().invoke(app, ["run", str(distribution), "--json", "--time-limit", "3"]).stdout
+    runs = [json.loads(line) for line in printed.splitlines()]
+    assert [float(run["parameters"]["Latency"]) for run in runs] == pytest.approx([0.0, 0.2, 0.4])
+    links = [next(link for link in run["links"] if (link["sender"], link["receiver"]) == LINK) for run in runs]
+    # Nothing arrives in the tick in which it was sent, but the books state the delay of the channel itself.
+    assert [link["mean_delay"] for link in links] == pytest.approx([0.0, 0.2, 0.4])
+
+
+def test_whole_channel_is_a_parameter(make: Make) -> None:
+    path = make("$Profile")
+    assert delays(path).channel == "ideal"
+    assert delays(path, Profile="latency_300ms").channel == "latency_300ms"
+    assert delays(path, Profile="none").channel == "none"
+    with pytest.raises(InputError, match=r"varied.xosc:\d+: no channel profile '\{delay"):
+        delays(path, Profile="{delay: {kind: constant, seconds: 0.3}}")
+
+
+def test_channel_file_refers_to_parameters_of_the_scenario(make: Make, tmp_path: Path) -> None:
+    profile = tmp_path / "mine.yaml"
+    profile.write_text("model: composed\ndelay:\n  kind: constant\n  seconds: ${$Latency + 0.05}\n")
+    settings = RunSettings(channel=profile, time_limit=2.0, parameters={"Latency": "0.15"})
+    assert run_file(make("ideal"), settings=settings).links[LINK].mean_delay == pytest.approx(0.2)
+    profile.write_text("model: composed\ndelay:\n  kind: constant\n  seconds: $Latncy\n")
+    with pytest.raises(InputError, match=r"mine.yaml:4: setting 'delay.seconds': unknown parameter \$Latncy; did you"):
+        run_file(make("ideal"), settings=settings)
+
+
+def test_text_parameter_cannot_add_settings(make: Make) -> None:
+    path = make("{delay: {kind: constant, seconds: $Profile}}")
+    forged = "0.1}, loss: {kind: bernoulli, probability: 1.0"
+    with pytest.raises(InputError, match=r"setting 'delay.constant.seconds' is '0.1}, loss"):
+        delays(path, Profile=forged)
+
+
+def test_criterion_takes_parameters(make: Make) -> None:
+    path = make("none", ("at_least: 3.5, measure: centre", "at_least: ${$Gap * 10}, measure: centre"))
+    limits = [
+        verdict.limit
+        for gap in ("1", "2")
+        for verdict in delays(path, Gap=gap).criteria
+        if verdict.name == "min_distance"
+    ]
+    assert limits == [10.0, 20.0]
+
+
+def test_undeclared_parameter_is_reported_by_check_with_its_line(make: Make) -> None:
+    path = make("{delay: {kind: constant,\n seconds: $Latncy}}", ("at_least: 3.5", "at_least: $Gab"))
+    lines = path.read_text().splitlines()
+    delay = next(number for number, line in enumerate(lines, 1) if "$Latncy" in line)
+    gap = next(number for number, line in enumerate(lines, 1) if "$Gab" in line)
+    printed = CliRunner().invoke(app, ["check", str(path)]).stdout
+    assert f"{path}:{delay}: setting 'delay.seconds': unknown parameter $Latncy; did you mean 'Latency'?" in printed
+    assert f"{path}:{gap}: setting 'at_least': unknown parameter $Gab; did you mean 'Gap'?" in printed
+
+
+def test_variation_takes_bounds_from_parameters_that_are_not_drawn(make: Make) -> None:
+    fixed = make("ideal", ("EgoOffset: {uniform: [-0.15, 0.15]}", "EgoOffset: {uniform: [$Gap, ${$Gap + 1}]}"))
+    drawn = float(load_for_seed(fixed, 3, {"Gap": "5"}).parameters["EgoOffset"])
+    assert 5.0 <= drawn <= 6.0
+    drawn_from_drawn = make("ideal", ("uniform: [-0.15, 0.15]", "uniform: [-1, $IncomingOffset]"))
+    with pytest.raises(InputError, match=r"unknown parameter \$IncomingOffset"):
+        load_for_seed(drawn_from_drawn, 3)
+
+
+def test_controller_property_refers_inside_its_yaml(make: Make) -> None:
+    area = ('value="[29.0, 32.0, 4.5, 10.5]"', 'value="[$Gap, 32.0, ${$Gap * 4.5}, 10.5]"')
+    latency = (
+        '<Property name="conflict_area"',
+        '<Property name="detector_latency" value="$Latency"/><Property name="conflict_area"',
+    )
+    path = make("ideal", area, latency)
+    for gap in (1.0, 2.0):
+        scenario = load_scenario(path, {"Gap": str(gap)})
+        with Simulation(scenario, settings=RunSettings(parameters={"Latency": "0.3"})) as simulation:
+            settings = simulation.stations._settings["Ego"]
+        assert settings.conflict_area is not None
+        assert settings.conflict_area[0][0] == (gap, 4.5 * gap)
+        assert settings.detector_latency == 0.3
+    wrong = make("ideal", (area[0], 'value="[$Gab, 32.0, 4.5, 10.5]"'))
+    with pytest.raises(InputError, match=r"setting 'conflict_area.0': unknown parameter \$Gab; did you mean 'Gap'"):
+        run_file(wrong)
+
+
+def test_command_of_a_later_event_takes_parameters(make: Make) -> None:
+    path = make(
+        "ideal",
+        (
+            "</ManeuverGroup>",
+            '<Maneuver name="Jam"><Event name="Jam" priority="parallel"><Action name="Jam"><UserDefinedAction>'
+            f'<CustomCommandAction type="eidrive.channel">{DELAY}</CustomCommandAction></UserDefinedAction></Action>'
+            '<StartTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>'
+            '<SimulationTimeCondition value="1.0" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>'
+            "</StartTrigger></Event></Maneuver></ManeuverGroup>",
+        ),
+    )
+    result = delays(path, Latency="0.5")
+    assert 0.1 < result.links[LINK].mean_delay < 0.5
