@@ -19,6 +19,7 @@ from eidrive_scenario.errors import (
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
 from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.trajectory_times import has_times
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.surroundings import Surroundings
@@ -154,6 +155,7 @@ __all__ = [
     "footprint_distance",
     "frame_of",
     "generator",
+    "has_times",
     "in_words",
     "is_ours",
     "judge",

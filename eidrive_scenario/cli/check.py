@@ -30,7 +30,7 @@ def check(
     Findings end with the rule that made them: `eidrive list checks` names all rules.
     """
     from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
-    from eidrive_scenario.experiments.inspection import inspect_roads, inspect_scenario
+    from eidrive_scenario.experiments.inspection import inspect_catalog, inspect_roads, inspect_scenario
 
     missing: list[Problem] = []
     broken: list[Exception] = []
@@ -42,9 +42,8 @@ def check(
         try:
             kind = definition(path)
             if kind == "catalog":
-                typer.echo(f"{path}: a catalog, checked with the scenarios that use it")
-                continue
-            if kind == "roads" or path.suffix == _ROADS:
+                findings = inspect_catalog(path, ignored)
+            elif kind == "roads" or path.suffix == _ROADS:
                 findings = inspect_roads(path, ignored)
             else:
                 findings = (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)

@@ -9,6 +9,7 @@ from pathlib import Path
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.experiments.rules import broken_rules, check_names
 from eidrive_scenario.openscenario import Source, load_scenario
+from eidrive_scenario.openscenario.catalog_check import check_catalog
 from eidrive_scenario.openscenario.findings import in_order
 from eidrive_scenario.openscenario.lint import Level
 from eidrive_scenario.recording.criteria_text import unbuilt_criteria
@@ -48,6 +49,15 @@ def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
         found[Level.ERROR] += [problem for problem in error.problems if problem not in known]
     problems, warnings, notes = (tuple(in_order(problems)) for problems in found.values())
     return Findings(problems, warnings, notes=notes)
+
+
+def inspect_catalog(path: Path, ignored: Collection[str] = ()) -> Findings:
+    """Read a catalog file, each entry with the defaults of its parameters. No rule applies to a catalog by itself.
+
+    Raises SettingError for an unknown name in `ignored`.
+    """
+    check_names(ignored)
+    return Findings(*check_catalog(path))
 
 
 def inspect_roads(path: Path, ignored: Collection[str] = ()) -> Findings:

@@ -28,6 +28,8 @@ class CatalogFile:
     document: Document
     version: Version
     entries: dict[str, etree._Element]
+    twins: Mapping[str, Problem]
+    """The error for each name that several entries have."""
 
 
 class CatalogLibrary:
@@ -92,6 +94,9 @@ class CatalogLibrary:
                 f"the catalog {catalog.name!r} has no entry {reference.entry_name!r}",
                 suggestion(reference.entry_name, catalog.entries),
             )
+            return None
+        if reference.entry_name in catalog.twins:
+            self._findings.problems.append(catalog.twins[reference.entry_name])
             return None
         rule = rules(Catalog, catalog.version).children.get(node.tag)
         if rule is None:
@@ -210,7 +215,20 @@ def _read(path: Path, findings: Findings) -> CatalogFile | None:
         return None
     catalog = without_slips(catalog, document.name, version, findings)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
-    return CatalogFile(catalog.get("name", path.stem), document, version, entries)
+    return CatalogFile(catalog.get("name", path.stem), document, version, entries, twins_in(catalog, document.name))
+
+
+def twins_in(catalog: etree._Element, source: str) -> dict[str, Problem]:
+    """Return an error for each name that several entries of a catalog have, at the second of them."""
+    first: dict[str, etree._Element] = {}
+    found: dict[str, Problem] = {}
+    for child in catalog.iterchildren(etree.Element):
+        name = child.get("name")
+        if name is None or first.setdefault(name, child) is child or name in found:
+            continue
+        message = f"the catalog has a second entry {name!r}; the first is at line {line_of(first[name])}"
+        found[name] = Problem(message, "give each entry its own name", source, line_of(child))
+    return found
 
 
 def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 
 from eidrive_scenario.openscenario.model import (
+    AngleCondition,
+    AnimationAction,
     Axle,
     Clothoid,
     ClothoidSplineSegment,
@@ -14,14 +16,28 @@ from eidrive_scenario.openscenario.model import (
     DynamicConstraints,
     DynamicsDimension,
     Element,
+    EndOfRoadCondition,
     Fog,
+    FollowTrajectoryAction,
+    LaneOffsetActionDynamics,
+    LightState,
+    LightStateAction,
+    OffroadCondition,
     Performance,
     Phase,
     Precipitation,
     Range,
+    ReachPositionCondition,
+    RelativeAngleCondition,
+    RelativeClearanceCondition,
     RoadCondition,
     SpeedProfileEntry,
+    StandStillCondition,
     Stochastic,
+    SynchronizeAction,
+    TargetDistanceSteadyState,
+    TargetTimeSteadyState,
+    TrafficSignalController,
     TrafficSinkAction,
     TransitionDynamics,
     Wind,
@@ -42,6 +58,8 @@ UNLIMITED: tuple[type[Element], ...] = (
 )
 """Whose numbers are bounds, so that one may be infinite: there is no bound."""
 NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
+    AngleCondition: ("angle_tolerance",),
+    AnimationAction: ("animation_duration",),
     Dimensions: ("length", "width", "height"),
     DynamicConstraints: (
         "max_speed",
@@ -50,6 +68,12 @@ NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
         "max_acceleration_rate",
         "max_deceleration_rate",
     ),
+    EndOfRoadCondition: ("duration",),
+    FollowTrajectoryAction: ("initial_distance_offset",),
+    LaneOffsetActionDynamics: ("max_lateral_acc",),
+    LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
+    LightStateAction: ("transition_time",),
+    OffroadCondition: ("duration",),
     Performance: (
         "max_speed",
         "max_acceleration",
@@ -57,9 +81,18 @@ NOT_NEGATIVE: Mapping[type[Element], tuple[str, ...]] = {
         "max_acceleration_rate",
         "max_deceleration_rate",
     ),
+    Phase: ("duration",),
     Precipitation: ("intensity", "precipitation_intensity"),
+    ReachPositionCondition: ("tolerance",),
+    RelativeAngleCondition: ("angle_tolerance",),
+    RelativeClearanceCondition: ("distance_forward", "distance_backward"),
     RoadCondition: ("friction_scale_factor",),
     SpeedProfileEntry: ("time",),
+    StandStillCondition: ("duration",),
+    SynchronizeAction: ("target_tolerance", "target_tolerance_master"),
+    TargetDistanceSteadyState: ("distance",),
+    TargetTimeSteadyState: ("time",),
+    TrafficSignalController: ("delay",),
     Wind: ("speed",),
 }
 """Attributes that the standard's reference counts from 0 on."""

@@ -30,6 +30,9 @@ TYPES: Mapping[ParameterType, Scalar] = {
     ParameterType.UNSIGNED_SHORT: whole_number(Limits(0, 2**16 - 1)),
 }
 
+TEXTUAL = (STRING, DOUBLE, BOOLEAN, DATE_TIME)
+"""Types whose texts are read as they stand. Whole numbers may be written with a fraction of zero, as -5.0."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -143,7 +146,7 @@ class Scope:
 
     def _convert(self, text: str, scalar: Scalar, what: str) -> Any:
         try:
-            return scalar.convert(text if scalar in (STRING, DOUBLE, BOOLEAN) else _whole(text))
+            return scalar.convert(text if scalar in TEXTUAL else _whole(text))
         except ValueError as error:
             raise ExpressionError(f"{what}, which is not {scalar.name}", str(error)) from error
 
@@ -162,7 +165,8 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
     scalar = TYPES[declaration.parameter_type]
     place = (assignment and assignment.origin) or Problem("", "", declaration.source, declaration.line)
     name, text = declaration.name, assignment.text if assignment else declaration.value
-    if not fits_type(declaration.value, scalar):
+    text = _without_fraction(text, scalar)
+    if not fits_type(_without_fraction(declaration.value, scalar), scalar):
         findings.warn(
             f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{declaration.value!r}",
@@ -212,7 +216,9 @@ def fits_type(text: str, scalar: Scalar) -> bool:
 
 
 def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
-    return all(compare(value, one.rule, scalar.convert(one.value)) for one in group.value_constraint)
+    return all(
+        compare(value, one.rule, scalar.convert(_without_fraction(one.value, scalar))) for one in group.value_constraint
+    )
 
 
 def compare(left: Any, rule: Rule, right: Any) -> bool:
@@ -230,6 +236,11 @@ _COMPARISONS = {
     Rule.LESS_THAN: lambda left, right: left < right,
     Rule.LESS_OR_EQUAL: lambda left, right: left <= right,
 }
+
+
+def _without_fraction(text: str, scalar: Scalar) -> str:
+    """Return a text that is no whole number, where one is expected, without its fraction of zero: -5.0 is -5."""
+    return text if scalar in TEXTUAL or fits_type(text, scalar) else _whole(text)
 
 
 def _whole(text: str) -> str:

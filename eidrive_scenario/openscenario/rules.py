@@ -39,6 +39,13 @@ def check_rules(
 ) -> None:
     """Reports whatever breaks a rule in a scenario or in the catalog entries that it uses."""
     elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
+    check_values(elements, version, findings)
+    check_types(elements, findings)
+    check_names(root, elements, version, entries, findings)
+
+
+def check_values(elements: Sequence[Element], version: Version, findings: Findings) -> None:
+    """Report elements whose values exclude each other, or cannot be calculated with."""
     flawed = {(problem.source, problem.line) for problem in findings.problems}
     for element in elements:
         check = _CHECKS.get(type(element))
@@ -49,8 +56,6 @@ def check_rules(
             what = "Orientation says nothing, which by the standard means the heading 0 of the world"
             remedy = 'leave it out, or write type="relative", to look along the road'
             findings.warn(what, remedy, source=element.source, line=element.line)
-    check_types(elements, findings)
-    check_names(root, elements, version, entries, findings)
 
 
 def _distance(action: LongitudinalDistanceAction) -> str:

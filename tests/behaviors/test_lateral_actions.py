@@ -223,10 +223,27 @@ def test_in_the_mode_follow_speeds_change_evenly(scene: Any) -> None:
     assert played.at(0.5).x == pytest.approx(107.5)
 
 
-def test_timing_without_times_is_an_error(scene: Any) -> None:
+@pytest.mark.parametrize("later", [False, True])
+def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Any, later: bool) -> None:
+    """At 20 m/s from x = 110 on, in an event as in Init: after 2 s, x = 150."""
     timing = '<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>'
-    with pytest.raises(ScenarioError, match="has no times"):
-        scene(1, ("Ego", trajectory(CORNER, timing)))
+    action = trajectory([(110.0, -2.0, None), (500.0, -2.0, None)], timing)
+    warnings: list[str] = []
+
+    def look(simulation: Any, frame: Any) -> None:
+        warnings[:] = [str(problem) for problem in simulation.storyboard.stage.warnings]
+
+    if later:
+        played = run(3, ("Ego", action, after(0.45)), driven=False, during=look)
+    else:
+        played = run(3, driven=False, init=f'<Private entityRef="Ego">{action}</Private>', during=look)
+    start = 0.5 if later else 0.0
+    for frame, x in zip(played.frames, played.x("Ego"), strict=True):
+        if frame.view.time > start + 0.1:
+            assert x == pytest.approx(110.0 + 20.0 * (frame.view.time - start), abs=1e-6)
+    (warning,) = [text for text in warnings if "nothing to scale" in text]
+    assert "scene.xosc:" in warning
+    assert warning.endswith("give each vertex a time, or write <None/> for the TimeReference")
 
 
 def test_a_trajectory_takes_the_lateral_domain_and_leaves_the_speed_to_others(scene: Any) -> None:

@@ -9,7 +9,19 @@ import numpy as np
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvature, wheelbase_of
-from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Layout, Place, Pose, Stage, lay_out, model, resolve
+from eidrive_scenario.api import (
+    ActionBehaviour,
+    Domain,
+    Goal,
+    Layout,
+    Place,
+    Pose,
+    Stage,
+    has_times,
+    lay_out,
+    model,
+    resolve,
+)
 
 TINY = 1e-6
 APART = 1.0
@@ -47,10 +59,17 @@ class FollowTrajectoryAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, stage, actor=actor, parent=parent)
-        self._timing = action.time_reference.timing
         self._pursuit: Pursuit | None = None
         self._run: Tracker | None = None
         self._trajectory = self._found()
+        self._timing = action.time_reference.timing
+        if self._timing is not None and not has_times(self._trajectory.shape.chosen()):
+            self._timing = None
+            remedy = (
+                f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
+            )
+            what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
+            stage.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").problems
         self._followed: Layout | None = None
 
     @property
@@ -66,11 +85,6 @@ class FollowTrajectoryAction(ActionBehaviour):
     def initialise(self) -> None:
         """Lay the trajectory out; positions relative to entities mean where those are now."""
         self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)
-        if self._timing is not None and self._layout.times is None:
-            timed = next(
-                remedy for shape, remedy in TIMED.items() if getattr(self._trajectory.shape, shape) is not None
-            )
-            raise self.problem("has a Timing, but the trajectory has no times", f"give {timed}, or say None")
         self.actor.trajectory = self._followed = self._layout
         self._s = self.action.initial_distance_offset or 0.0
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0

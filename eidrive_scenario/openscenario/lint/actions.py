@@ -13,6 +13,8 @@ from eidrive_scenario.openscenario.model import (
     AbsoluteSpeed,
     AbsoluteTargetSpeed,
     Action,
+    Clothoid,
+    ClothoidSpline,
     Element,
     Event,
     FollowTrajectoryAction,
@@ -20,6 +22,7 @@ from eidrive_scenario.openscenario.model import (
     LaneOffsetAction,
     LateralDistanceAction,
     LongitudinalDistanceAction,
+    Nurbs,
     Polyline,
     SpeedAction,
     SpeedProfileAction,
@@ -29,6 +32,7 @@ from eidrive_scenario.openscenario.model import (
     TransitionDynamics,
     Vehicle,
 )
+from eidrive_scenario.openscenario.trajectory_times import has_times
 
 _DOMAINS: Mapping[type[Element], str] = {
     SpeedAction: "longitudinal",
@@ -41,6 +45,13 @@ _DOMAINS: Mapping[type[Element], str] = {
     FollowTrajectoryAction: "lateral",
 }
 """Actions that take time, and what of an entity they control (ASAM OpenSCENARIO XML, control strategies)."""
+
+TIME_ATTRIBUTES: Mapping[type[Element], str] = {
+    Clothoid: "startTime and stopTime",
+    ClothoidSpline: "timeEnd",
+    Nurbs: "each control point a time",
+}
+"""By shape, the attributes that state its times."""
 
 
 def conflicting_actions(survey: Survey) -> Iterator[Problem]:
@@ -114,15 +125,20 @@ def untimed_trajectories(survey: Survey) -> Iterator[Problem]:
         if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
         trajectory = _trajectory(element, survey)
-        shape = trajectory.shape.polyline if trajectory is not None else None
+        shape = trajectory.shape.chosen() if trajectory is not None else None
         if isinstance(shape, Polyline):
             yield from _times(shape)
+        elif shape is not None and not has_times(shape):
+            name = type(shape).__name__
+            what = f"the Timing has nothing to scale: this {name} has no times, so the actor keeps its own speed"
+            yield at(shape, what, f"give {TIME_ATTRIBUTES[type(shape)]}, or write <None/> for the TimeReference")
 
 
 def _times(shape: Polyline) -> Iterator[Problem]:
     for vertex in shape.vertex:
         if vertex.time is None:
-            yield at(vertex, "a trajectory is followed by its times, and this vertex has none", "give it a time")
+            what = "the Timing has nothing to scale: this vertex has no time, so the actor keeps its own speed"
+            yield at(vertex, what, "give each vertex a time")
     known = [vertex.time for vertex in shape.vertex if vertex.time is not None]
     if len(known) == len(shape.vertex) and all(time == known[0] for time in known):
         yield at(shape, f"all its vertices have the time {known[0]:g} s", "say when each vertex is passed")

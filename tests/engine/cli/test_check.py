@@ -1,5 +1,6 @@
 """`eidrive check`: every mistake of every file."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -197,3 +198,42 @@ def test_selections_in_a_circle_are_a_problem(eidrive: Eidrive, folder: Callable
     result = eidrive("check", broken)
     assert result.exit_code == 2, result.output
     assert "the selection 'a' is a member of itself" in result.stdout
+
+
+CATALOG = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-31T12:00:00" description="" author=""/>
+<Catalog name="boxes">
+{entries}
+</Catalog></OpenSCENARIO>
+"""
+ENTRY = """<MiscObject name="{name}" miscObjectCategory="obstacle" mass="10">{declared}
+<BoundingBox><Center x="{x}" y="0" z="0"/><Dimensions length="1" width="1" height="1"/></BoundingBox></MiscObject>"""
+DECLARED = """<ParameterDeclarations><ParameterDeclaration name="Limit" parameterType="{kind}" value="{value}"/>
+</ParameterDeclarations>"""
+
+
+@pytest.mark.parametrize(
+    ("entries", "line", "message"),
+    [
+        ([("a", "", "1"), ("b", "", "1"), ("a", "", "1")], 7, "has a second entry 'a'; the first is at line 3"),
+        ([("a", "", "$Limit")], 4, "unknown parameter .Limit"),
+        ([("a", DECLARED.format(kind="double", value=""), "$Limit")], 5, "\\$Limit is '', which is not a number"),
+        ([("a", DECLARED.format(kind="dbl", value="1"), "$Limit")], 3, "'dbl'"),
+    ],
+)
+def test_catalog_is_checked_by_itself(
+    eidrive: Eidrive, tmp_path: Path, entries: list[tuple[str, str, str]], line: int, message: str
+) -> None:
+    path = tmp_path / "boxes.xosc"
+    text = "\n".join(ENTRY.format(name=name, declared=declared, x=x) for name, declared, x in entries)
+    path.write_text(CATALOG.format(entries=text), encoding="utf-8")
+    result = eidrive("check", path)
+    assert result.exit_code == 2, result.output
+    assert re.search(rf"^{re.escape(str(path))}:{line}: .*({message})", result.stdout, re.MULTILINE), result.stdout
+
+
+def test_sound_catalog_has_no_problems(eidrive: Eidrive, tmp_path: Path) -> None:
+    path = tmp_path / "boxes.xosc"
+    declared = DECLARED.format(kind="double", value="2")
+    path.write_text(CATALOG.format(entries=ENTRY.format(name="a", declared=declared, x="$Limit")), encoding="utf-8")
+    result = eidrive("check", path)
+    assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")

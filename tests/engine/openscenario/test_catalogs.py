@@ -123,6 +123,20 @@ def test_what_is_not_there_is_named_at_the_reference(
     assert [(problem.source, problem.line) for problem in caught.value.problems] == [(str(path), line)]
 
 
+def test_entry_name_that_occurs_twice_is_an_error_with_both_lines(
+    shelf: Callable[..., Path], scene: Callable[..., Path]
+) -> None:
+    """Another entry of the same catalog can be used all the same."""
+    named = '<Controller name="{}"><Properties/></Controller>\n'
+    catalog = shelf("Drivers.xosc", "Drivers", "".join(map(named.format, ("calm", "wild", "calm"))))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(scene(reference("Drivers", "calm")))
+    (problem,) = caught.value.problems
+    assert (problem.source, problem.line) == (str(catalog), 4)
+    assert problem.message == "the catalog has a second entry 'calm'; the first is at line 2"
+    load_scenario(scene(reference("Drivers", "wild")))
+
+
 def test_no_place_for_catalogs_is_named(scene: Callable[..., Path]) -> None:
     path = scene(reference("Drivers", "driver"))
     path.write_text(path.read_text().replace(LOCATIONS.format(kind="Controller", path="catalogs"), ""))

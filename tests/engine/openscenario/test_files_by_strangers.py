@@ -20,6 +20,12 @@ TIMED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory nam
 <Vertex time="1"><Position><WorldPosition x="9" y="0"/></Position></Vertex></Polyline></Shape></Trajectory>
 </TrajectoryRef><TimeReference><Timing domainAbsoluteRelative="relative" scale="{scale}" offset="0"/></TimeReference>
 <TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+FOG_LIGHTS = """<AppearanceAction><LightStateAction {more}><LightType><VehicleLight vehicleLightType="fogLights"/>
+</LightType><LightState mode="on" {state}/></LightStateAction></AppearanceAction>"""
+TOGETHER = """<SynchronizeAction masterEntityRef="Other" {more}><TargetPositionMaster><WorldPosition x="1" y="0"/>
+</TargetPositionMaster><TargetPosition><WorldPosition x="1" y="0"/></TargetPosition>
+<FinalSpeed><AbsoluteSpeed value="3"><TargetDistanceSteadyState distance="{steady}"/></AbsoluteSpeed></FinalSpeed>
+</SynchronizeAction>"""
 TELEPORT = '<TeleportAction><Position><WorldPosition x="{x}" y="0"/></Position></TeleportAction>'
 LIMITED = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="false" freespace="false"
  distance="5"><DynamicConstraints maxAcceleration="{limit}"/></LongitudinalDistanceAction></LongitudinalAction>"""
@@ -120,6 +126,10 @@ def test_numbers_as_the_schema_has_them(scenario_xml: Build, story_xml: Text, wr
         (curve(2, 2, "0 0 1 1", 'weight="0"'), "weight of ControlPoint is 0; give a number above 0"),
         (TIMED.format(scale=0), "Timing has the scale 0"),
         (TIMED.format(scale=-2), "Timing has the scale -2"),
+        (FOG_LIGHTS.format(more='transitionTime="-1.2"', state=""), "transitionTime of LightStateAction is -1.2; give"),
+        (FOG_LIGHTS.format(more="", state='flashingOnDuration="-1"'), "flashingOnDuration of LightState is -1; give"),
+        (TOGETHER.format(more="", steady=-3), "distance of TargetDistanceSteadyState is -3; give"),
+        (TOGETHER.format(more='targetTolerance="-1"', steady=3), "targetTolerance of SynchronizeAction is -1; give"),
     ],
 )
 def test_numbers_that_mean_nothing_are_refused(

@@ -72,6 +72,41 @@ def test_constraints(scenario_xml: Build, kind: str, value: str, rule: str, limi
 
 
 @pytest.mark.element("ConstraintGroup")
+@pytest.mark.parametrize(
+    ("value", "rule", "limit", "fits"),
+    [
+        ("-5.0", "equalTo", "-5", True),
+        ("-5", "equalTo", "-5.0", True),
+        ("-5.0", "equalTo", "-5.0", True),
+        ("5e0", "lessThan", "6.0", True),
+        ("-5.0", "equalTo", "5", False),
+    ],
+)
+def test_whole_parameter_with_fraction_of_zero_meets_constraints_as_a_number(
+    scenario_xml: Build, value: str, rule: str, limit: str, fits: bool
+) -> None:
+    declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="{{}}">
+    <ConstraintGroup><ValueConstraint rule="{rule}" value="{limit}"/></ConstraintGroup>
+    </ParameterDeclaration></ParameterDeclarations>"""
+    xml = scenario_xml(declarations=declared.format(value))
+    as_default, assigned = (xml, {}), (xml, {"P": value})
+    for text, values in (as_default, assigned):
+        if fits:
+            scenario = load_scenario(text, values)
+            assert float(scenario.parameters["P"]) == float(value)
+            assert not any("declared as" in problem.message for problem in scenario.warnings)
+        else:
+            with pytest.raises(ScenarioError, match="outside its constraints"):
+                load_scenario(text, values)
+
+
+def test_whole_parameter_with_a_true_fraction_is_refused(scenario_xml: Build, parameters_xml: Text) -> None:
+    xml = scenario_xml(declarations=parameters_xml(Lane=("int", "-1")))
+    with pytest.raises(ScenarioError, match=r"the parameter 'Lane' is '-1\.5', which is not a whole number"):
+        load_scenario(xml, {"Lane": "-1.5"})
+
+
+@pytest.mark.element("ConstraintGroup")
 def test_groups_of_constraints_are_alternatives(scenario_xml: Build) -> None:
     group = '<ConstraintGroup><ValueConstraint rule="equalTo" value="{}"/></ConstraintGroup>'
     declared = f"""<ParameterDeclarations><ParameterDeclaration name="P" parameterType="int" value="2">

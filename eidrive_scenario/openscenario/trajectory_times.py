@@ -1,0 +1,26 @@
+"""Whether a trajectory says when it is passed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from eidrive_scenario.openscenario.model import Clothoid, ClothoidSpline, Element, Nurbs, Polyline
+
+
+def has_times(shape: Element) -> bool:
+    """Return True if a shape has the times that a Timing scales: all of them, and not all the same."""
+    if isinstance(shape, Polyline):
+        return _ascend([vertex.time for vertex in shape.vertex])
+    if isinstance(shape, Nurbs):
+        return _ascend([point.time for point in shape.control_point])
+    if isinstance(shape, Clothoid):
+        return _ascend([shape.start_time, shape.stop_time])
+    if isinstance(shape, ClothoidSpline):
+        first = shape.clothoid_spline_segment[0].time_start if shape.clothoid_spline_segment else None
+        return _ascend([first or 0.0, shape.time_end])
+    return False
+
+
+def _ascend(times: Sequence[float | None]) -> bool:
+    known = [time for time in times if time is not None]
+    return len(known) == len(times) and len(known) > 1 and known[-1] > known[0]
