@@ -72,8 +72,12 @@ class RunResult:
     """The books of the radio, by (sender, receiver)."""
     settings: ResolvedSettings = field(default_factory=ResolvedSettings)
     """All settings that determined the run."""
+    command: str = ""
+    """Command line that repeats the run; empty for a scenario without a file."""
     folder: Path | None = None
-    """Folder of `result.json` and the recording, where the run has left one."""
+    """Folder of `result.json`, where the run has left one."""
+    recording: Path | None = None
+    """The recording, where the run has left one."""
 
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
@@ -106,6 +110,7 @@ class RunResult:
             "wall_s": self.wall_s,
             "settings": self.settings.as_json(),
             "settings_sha256": self.settings.digest,
+            "command": self.command,
         }
 
 

@@ -62,14 +62,9 @@ def resolve_settings(
 
 def _drawn(scenario: Scenario, seed: int, settings: RunSettings) -> tuple[str, ...]:
     """The parameters that have the value which this seed draws."""
-    drawn = drawn_parameters(scenario, seed)
-    return tuple(
-        sorted(
-            name
-            for name, value in drawn.items()
-            if name not in settings.parameters and scenario.parameters.get(name) == value
-        )
-    )
+    given = {*settings.parameters, *scenario.assigned}
+    drawn = drawn_parameters(scenario, seed).items()
+    return tuple(sorted(name for name, value in drawn if name not in given and scenario.parameters.get(name) == value))
 
 
 def _station(settings: AgentSettings) -> dict[str, Any]:

@@ -29,6 +29,7 @@ class Guarded(TyperGroup):
             raise typer.Exit(WRONG_INPUT) from error
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)
+            tell_notes(error)
             raise typer.Exit(_INTERRUPTED) from error
         except BrokenPipeError as error:
             # The reader, say `head`, has enough. Python would complain once more when it flushes at the end.
@@ -38,6 +39,7 @@ class Guarded(TyperGroup):
             if ctx.params.get("traceback"):
                 raise
             typer.echo(f"the run broke: {error}", err=True)
+            tell_notes(error)
             raise typer.Exit(BROKEN) from error
         except OSError as error:
             if ctx.params.get("traceback"):
@@ -60,9 +62,17 @@ def tell(error: Exception, file: object = None) -> None:
     if isinstance(error, OSError) and error.strerror:
         where = f": {error.filename}" if error.filename is not None else ""
         typer.echo(f"{place}broken off: {error.strerror}{where}", err=True)
+        tell_notes(error)
         return
     typer.echo(f"{place}internal error: {type(error).__name__}: {error}", err=True)
     typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) shows where; please report it", err=True)
+    tell_notes(error)
+
+
+def tell_notes(error: BaseException) -> None:
+    """Print what a run adds to its error: the command that reproduces it, and the path of its recording."""
+    for note in getattr(error, "__notes__", ()):
+        typer.echo(note, err=True)
 
 
 def _from_typer(error: Exception) -> bool:

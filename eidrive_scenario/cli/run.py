@@ -56,7 +56,10 @@ def run(
     ] = None,
     dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
     time_limit: Annotated[float, typer.Option(help="Longest simulated time, in seconds.")] = 120.0,
-    out: Annotated[Path | None, typer.Option(help="Folder for recording.mcap, pictures and result.json.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder in which each run gets one of its own: recording, pictures, result.json."),
+    ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Leave out recording.mcap and pictures.")] = False,
     csv: Annotated[Path | None, typer.Option(help="File for one row per actor and tick.")] = None,
     log: Annotated[
@@ -71,7 +74,7 @@ def run(
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
     from eidrive_scenario.cli.batch import play_all
     from eidrive_scenario.cli.verdicts import show
-    from eidrive_scenario.experiments.single_run import RECORDING, RESULT, as_json_text, play
+    from eidrive_scenario.experiments.single_run import as_json_text, play
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation
     from eidrive_scenario.simulation import RunSettings
@@ -102,7 +105,7 @@ def run(
                 source,
                 seed=each,
                 settings=settings,
-                out=out.joinpath(*mark) if out is not None else None,
+                below=out,
                 record=not no_record,
                 csv=_marked(csv, mark) if csv is not None else None,
                 log=_marked(Path(log), mark) if log is not None and log != PRINTED else log,
@@ -112,14 +115,15 @@ def run(
                 typer.echo(as_json_text(result, ascii_only=not has_all_letters()))
             else:
                 show(result, varied="" if isinstance(source, Path) else str(source))
+            if result.folder is not None:
+                typer.echo(f"files: {result.folder}", err=json)
             for explanation in explanations:
                 typer.echo("\n".join(explanation.lines()), err=json)
             code = max(code, result.exit_code)
         return code
 
     path = resolve_scenario(scenario)
-    kept = {f"--out ({name})": out / name for name in (RECORDING, RESULT)} if out is not None else {}
-    check_places({"--csv": csv, "--log": None if log == PRINTED else log, **kept}, (path, channel, weather))
+    check_places({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
     if definition(path) == "distribution":
         raise typer.Exit(play_all(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
     if max_runs is not None:

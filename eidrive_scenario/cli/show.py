@@ -82,16 +82,15 @@ def view(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """Write a recorded run as an HTML replay."""
-    from eidrive_scenario.experiments.single_run import recording_in, result_of
     from eidrive_scenario.recording import read_recording
-    from eidrive_scenario.recording.output import PARTIAL
+    from eidrive_scenario.recording.run_files import is_partial, recording_in, result_of
     from eidrive_scenario.reporting.replay import write_replay
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
     check_places({"--out": page}, [path])
     write_replay(read_recording(path), page, result_of(path))
-    if path.stem.endswith(PARTIAL):
+    if is_partial(path):
         typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)
     typer.echo(str(page))
     if browser:
@@ -103,7 +102,7 @@ def report(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the report.")],
 ) -> None:
     """Write one page over many runs."""
-    from eidrive_scenario.experiments.single_run import read_results
+    from eidrive_scenario.recording.run_files import read_results
     from eidrive_scenario.reporting.report import write_report
 
     results = read_results(runs)

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from eidrive_scenario.experiments.reproduction import reproduction_lines
 from eidrive_scenario.recording import Verdict
 from eidrive_scenario.simulation import BROKEN, FAILED, PASSED, RunResult
 
@@ -53,6 +54,8 @@ def show(result: RunResult, varied: str = "") -> None:
     speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
     out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
     out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
+    for line in reproduction_lines(result):
+        out.print(Text(line), soft_wrap=True)
     for warning in result.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
 

@@ -4,30 +4,49 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.reproduction import command_of
+from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.output import create, partial, whole
-from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed
+from eidrive_scenario.recording.output import whole
+from eidrive_scenario.recording.run_files import (
+    PICTURES,
+    RECORDING,
+    RESULT,
+    read_results,
+    recording_in,
+    result_of,
+)
+from eidrive_scenario.roads.reading.document import read_road_text
+from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 
-RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
-"""Names of the files in a run's folder."""
+__all__ = [
+    "PICTURES",
+    "RECORDING",
+    "RESULT",
+    "as_json_text",
+    "play",
+    "read_results",
+    "recording_in",
+    "result_of",
+]
 
 
 def play(
     source: Source | ConcreteRun,
     *,
-    seed: int = 1,
+    seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
     out: Path | None = None,
+    below: Path | None = None,
     record: bool = True,
     csv: Path | None = None,
     log: str | Path | None = None,
@@ -37,52 +56,88 @@ def play(
     parameter value distribution.
 
     out     folder for `result.json` and, unless `record` is False, `recording.mcap` and the cameras' `pictures`
+    below   folder in which the run gets such a folder of its own, named after all its settings: see `run_folder`
     csv     file for one row per actor and tick
     log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
     explanations  what shall be explained afterwards; they look on
 
     A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
+    Its exception has notes with that recording and with the command that repeats the run.
 
     Parameters in `settings` win over those of the distribution. Raises InputError for a wrong scenario, setting or
     place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
     settings = settings or RunSettings()
-    number = None
-    if isinstance(source, ConcreteRun):
-        number = source.number
-        settings = replace(settings, parameters={**source.assignments, **settings.parameters})
-        source = source.scenario
-    elif isinstance(source, str | Path):
-        source = resolve_scenario(source)
-    scenario = load_for_seed(source, seed, settings.parameters)
-    observers: list[Observer] = [*explanations]
-    pictures = CameraPictures(out / PICTURES) if out is not None and record else None
-    if pictures is not None:
-        observers.append(pictures)
-    with ExitStack() as stack:
-        if log is not None:
-            observers.append(RunLog(log))
-            stack.callback(observers[-1].close)
-        if csv is not None:
-            observers.append(CsvWriter(stack.enter_context(whole(csv))))
-            stack.callback(observers[-1].close)
-        if out is not None and record:
-            told, attachments = _told(scenario, seed, number, settings), _attachments(source, scenario)
-            recording = stack.enter_context(whole(out / RECORDING))
-            observers.append(Recorder(recording, metadata=told, attachments=attachments))
-            stack.callback(observers[-1].close)
-        simulation = Simulation(scenario, seed=seed, settings=settings, observers=observers)
-        with simulation:
+    command = _command(source, seed, settings)
+    recording: Path | None = None
+    try:
+        with ExitStack() as stack:
+            simulation = stack.enter_context(
+                Simulation(source, seed=seed, settings=settings, observers=tuple(explanations))
+            )
             for explanation in explanations:
                 explanation.watch(simulation.storyboard)
-            if pictures is not None:
-                pictures.watch(simulation.stations)
-            result = simulation.run()
-    result = replace(result, run=number)
-    if out is not None:
-        with create(out / RESULT) as stream:
-            stream.write(as_json_text(result, indent=2).encode() + b"\n")
-    return result
+            place = out if out is not None else below
+            folder = None
+            if place is not None:
+                folder = stack.enter_context(run_folder(place, simulation.resolved, own=out is None))
+            if log is not None:
+                simulation.add_observer(RunLog(log))
+            if csv is not None:
+                simulation.add_observer(CsvWriter(stack.enter_context(whole(csv))))
+            if folder is not None and record:
+                recording = folder.recording
+                _record(simulation, folder, source, settings, command)
+            result = replace(simulation.run(), command=command)
+            return result if folder is None else _keep(result, folder, record)
+    except InputError:
+        raise
+    except BaseException as error:
+        if command:
+            error.add_note(f"reproduce: {command}")
+        if recording is not None and recording.exists():
+            error.add_note(f"recording: {recording}")
+        raise
+
+
+def _command(source: Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
+    """The command line that repeats the run; empty for a scenario without a file."""
+    if isinstance(source, ConcreteRun):
+        settings = replace(settings, parameters={**source.assignments, **settings.parameters})
+        return command_of(source.scenario, seed, settings)
+    return command_of(resolve_scenario(source), seed, settings) if isinstance(source, str | Path) else ""
+
+
+def _record(
+    simulation: Simulation, folder: RunFolder, source: Source | ConcreteRun, settings: RunSettings, command: str
+) -> None:
+    """Let a recorder and a writer of camera images look on."""
+    pictures = CameraPictures(folder.pictures)
+    pictures.watch(simulation.stations)
+    simulation.add_observer(pictures)
+    scenario, resolved = simulation.scenario, simulation.resolved
+    told = _told(scenario, resolved.seed, resolved.run, settings)
+    metadata = {**told, "settings": resolved.canonical, "command": command}
+    text = scenario.text if scenario.text is not None else _text(source)
+    simulation.add_observer(Recorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
+
+
+def _text(source: Source | ConcreteRun) -> bytes:
+    if isinstance(source, ConcreteRun):
+        return text_of(source.scenario)
+    return text_of(resolve_scenario(source) if isinstance(source, str | Path) else source)
+
+
+def _keep(result: RunResult, folder: RunFolder, record: bool) -> RunResult:
+    """Write the result and give all files of the run their own names."""
+    earlier = folder.earlier_trace()
+    folder.commit(as_json_text(result, indent=2).encode() + b"\n")
+    warnings = result.warnings
+    if earlier not in (None, result.trace_hash):
+        what = f"{folder.path}: the result of an earlier run with equal settings was another one, trace {earlier}; "
+        warnings = (*warnings, what + "it is replaced")
+    recording = folder.path / RECORDING if record else None
+    return replace(result, warnings=warnings, folder=folder.path, recording=recording)
 
 
 def as_json_text(result: RunResult, indent: int | None = None, *, ascii_only: bool = False) -> str:
@@ -111,58 +166,9 @@ def _told(scenario: Scenario, seed: int, run: int | None, settings: RunSettings)
     return {"scenario": scenario.name, "seed": str(seed), **texts, "parameters": json.dumps(scenario.parameters)}
 
 
-def _attachments(source: Source, scenario: Scenario) -> dict[str, bytes]:
+def _attachments(text: bytes, scenario: Scenario) -> dict[str, bytes]:
     """The scenario's own text and its road, so that a recording can be shown without the files."""
-    texts = {"scenario.xosc": text_of(source)}
+    texts = {"scenario.xosc": text}
     if scenario.road_file is not None:
-        texts["road.xodr"] = scenario.road_file.read_bytes()
+        texts["road.xodr"] = read_road_text(scenario.road_file)
     return texts
-
-
-def recording_in(place: Path) -> Path:
-    """The recording in a run's folder, or what there is of one whose run did not end; a file as it is.
-
-    Raises InputError for a folder without one.
-    """
-    if not os.path.isdir(place):
-        return place
-    for path in (place / RECORDING, partial(place / RECORDING)):
-        if path.exists():
-            return path
-    below = sorted(place.rglob(RECORDING))
-    remedy = f"there is one in {below[0].parent}" if below else "eidrive run … --out DIR records"
-    raise InputError(Problem(f"no {RECORDING} in this folder", remedy, str(place)))
-
-
-def result_of(recording: Path) -> dict[str, Any] | None:
-    """What the run came to whose recording this is, or None where nobody wrote that down beside it.
-
-    Raises InputError for a file that is no result.
-    """
-    beside = recording.with_name(RESULT)
-    return read_results([beside])[0] if recording.name == RECORDING and beside.is_file() else None
-
-
-def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
-    """The results in these files and folders, and in folders below, in order of their paths; each file once.
-
-    Raises InputError for a file that is no result.
-    """
-    results, taken = [], set()
-    for place in places:
-        for path in sorted(place.rglob(RESULT)) if os.path.isdir(place) else [place]:
-            if (real := os.path.realpath(path)) in taken:
-                continue
-            taken.add(real)
-            try:
-                result = json.loads(path.read_text(encoding="utf-8"))
-            except OSError as error:
-                raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
-            except ValueError as error:
-                raise InputError(Problem(f"not JSON: {error}", f"give a {RESULT}", str(path))) from error
-            if not isinstance(result, dict) or "trace_hash" not in result:
-                raise InputError(
-                    Problem("not the result of a run", "give a file that eidrive run --out wrote", str(path))
-                )
-            results.append(result)
-    return results

@@ -11,6 +11,7 @@ import pytest
 
 from eidrive_scenario.errors import InputError, Problem, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.options import Arm
+from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun, Source
@@ -56,7 +57,6 @@ def _play(
 ) -> RunResult:
     # Imported with the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import play
-    from eidrive_scenario.openscenario import ConcreteRun
     from eidrive_scenario.simulation import RunSettings
 
     known = [field.name for field in fields(RunSettings)]
@@ -65,9 +65,8 @@ def _play(
             raise SettingError(Problem(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
-    place = [*_place(config, file), *([f"run-{source.number}"] if isinstance(source, ConcreteRun) else []), str(arm)]
-    out = Path(config.invocation_params.dir, folder, *place) if folder is not None else None
-    return play(source, seed=arm.seed, settings=RunSettings(**settings), out=out)
+    below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None
+    return play(source, seed=arm.seed, settings=RunSettings(**settings), below=below)
 
 
 def _place(config: pytest.Config, source: Path) -> tuple[str, ...]:
@@ -90,16 +89,29 @@ def properties(result: RunResult) -> Properties:
         if verdict.limit is not None:
             noted.append((f"{verdict.name}.limit", float(verdict.limit)))
     noted += ((name, float(value)) for name, value in result.metrics.items())
+    noted += setting_properties(result.settings)
     return [*noted, ("simulated_s", result.simulated_s), ("trace_hash", result.trace_hash)]
 
 
+def setting_properties(settings: ResolvedSettings) -> Properties:
+    """Each resolved setting as a property of its own, as JSON where it is neither a text nor a number; and the hash."""
+    noted: Properties = []
+    for name, value in settings.as_json().items():
+        plain = isinstance(value, str | int | float) and not isinstance(value, bool)
+        noted.append((f"settings.{name}", value if plain else canonical_json(value)))
+    return [*noted, ("settings_sha256", settings.digest)]
+
+
 def explain(result: RunResult) -> str:
-    """Why a run failed, in words."""
+    """Why a run failed, in words; the command that repeats it, and the path of its recording."""
+    from eidrive_scenario.experiments.reproduction import reproduction_lines
+
     lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
     if not lines:
         lines = [f"ended by its {result.end} after {result.simulated_s:.2f} s"]
     run = "" if result.run is None else f"run {result.run} of "
-    return "\n".join([f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}", *lines])
+    head = f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}"
+    return "\n".join([head, *lines, *reproduction_lines(result)])
 
 
 def _limit(verdict: Verdict) -> str:

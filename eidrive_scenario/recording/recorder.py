@@ -21,6 +21,7 @@ from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.output import create
+from eidrive_scenario.recording.run_files import recording_in
 
 TOPIC = "/frame"
 FORMAT = "1"
@@ -109,8 +110,11 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Open a recording. Raises InputError if it is not there or not a recording of this package."""
-    path = Path(path)
+    """Open a recording, given by its file or by the folder of its run, or one with a single run below.
+
+    Raises InputError if it is not there or not a recording of this package.
+    """
+    path = recording_in(Path(path))
     metadata: dict[str, str] = {}
     attachments: dict[str, bytes] = {}
     for record in _records(path):

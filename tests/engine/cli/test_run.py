@@ -49,9 +49,10 @@ def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_b
 
 def test_out_keeps_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     printed = json.loads(eidrive("run", passing_by, "--json", "--out", tmp_path / "run").stdout)
-    kept = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    (result,) = (tmp_path / "run").rglob("result.json")
+    kept = json.loads(result.read_text(encoding="utf-8"))
     assert kept == printed
-    recording = read_recording(tmp_path / "run" / "recording.mcap")
+    recording = read_recording(result.with_name("recording.mcap"))
     assert recording.seed == 1
     assert recording.attachments["scenario.xosc"] == passing_by.read_bytes()
     frames = list(recording.frames())
@@ -62,7 +63,10 @@ def test_out_keeps_recording_and_result(eidrive: Eidrive, passing_by: Path, tmp_
 def test_no_record_and_a_folder_per_seed(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path, "--no-record", "--repeat", "2", "--csv", tmp_path / "motion.csv")
     files = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file())
-    assert files == ["motion-seed-1.csv", "motion-seed-2.csv", "seed-1/result.json", "seed-2/result.json"]
+    assert files[:2] == ["motion-seed-1.csv", "motion-seed-2.csv"]
+    for seed, file in enumerate(files[2:], 1):
+        assert re.fullmatch(rf"passing_by-none-seed{seed}-[0-9a-f]{{10}}/result\.json", file)
+    assert len(files) == 4
 
 
 def test_csv(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_view_writes_a_page(eidrive: Eidrive, passing_by: Path, tmp_path: Path) 
     eidrive("run", passing_by, "--out", tmp_path)
     result = eidrive("view", tmp_path)
     assert result.exit_code == 0, result.output
-    page = tmp_path / "recording.html"
+    (page,) = tmp_path.rglob("recording.html")
     assert result.stdout.strip() == str(page)
     assert "<html" in page.read_text(encoding="utf-8")
 
@@ -74,7 +74,11 @@ def test_view_of_a_folder_above_those_of_runs(eidrive: Eidrive, passing_by: Path
     assert result.exit_code == 2
     assert f"{tmp_path}: no recording.mcap in this folder; eidrive run … --out DIR records" in result.stderr
     eidrive("run", passing_by, "--out", tmp_path / "one")
-    assert f"; there is one in {tmp_path / 'one'}" in eidrive("view", tmp_path).stderr
+    assert eidrive("view", tmp_path).exit_code == 0, "the only one is meant"
+    eidrive("run", passing_by, "--out", tmp_path / "one", "--seed", "2")
+    result = eidrive("view", tmp_path)
+    assert result.exit_code == 2
+    assert f"{tmp_path}: 2 recordings are below this folder; give one of its folders: one/passing_by-" in result.stderr
 
 
 def test_a_page_that_cannot_be_written(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
@@ -118,13 +122,15 @@ def test_tree_as_a_picture(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -
 def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--param", "OtherY=0", "--out", tmp_path)
     eidrive("view", tmp_path)
-    assert "Ego and Parked hit each other" in (tmp_path / "recording.html").read_text(encoding="utf-8")
-    (tmp_path / "result.json").write_text('{"trace_hash": "00"}')
+    (kept,) = tmp_path.rglob("result.json")
+    page = kept.with_name("recording.html")
+    assert "Ego and Parked hit each other" in page.read_text(encoding="utf-8")
+    kept.write_text('{"trace_hash": "00"}')
     wrong = eidrive("view", tmp_path)
     assert (wrong.exit_code, wrong.stderr.startswith("a result's 'scenario': field required")) == (2, True)
-    (tmp_path / "result.json").unlink()
+    kept.unlink()
     eidrive("view", tmp_path)
-    assert "<h3>Verdict" not in (tmp_path / "recording.html").read_text(encoding="utf-8")
+    assert "<h3>Verdict" not in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("arguments", [["view"], ["report", "-o", "page"]])

@@ -45,10 +45,11 @@ def test_what_is_left_of_a_run_does_not_look_whole(
         arguments = ("run", passing_by, "--out", tmp_path, "--csv", tmp_path / "motion.csv")
         assert eidrive(*arguments).exit_code == code
     assert names(tmp_path) == ["motion.partial.csv", "recording.partial.mcap"]
-    assert read_recording(tmp_path / "recording.partial.mcap").frame_count == 21
+    (partial,) = tmp_path.rglob("recording.partial.mcap")
+    assert read_recording(partial).frame_count == 21
     shown = eidrive("view", tmp_path)
     assert shown.exit_code == 0
-    assert shown.stdout.strip() == str(tmp_path / "recording.partial.html")
+    assert shown.stdout.strip() == str(partial.with_suffix(".html"))
     assert "the run did not end" in shown.stderr
     assert eidrive("report", tmp_path, "-o", tmp_path / "report").exit_code == 2, "it has no result"
 
@@ -61,11 +62,14 @@ def test_an_interrupted_run_leaves_the_files_of_an_earlier_one(
     eidrive: Eidrive, passing_by: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
-    before = (tmp_path / "recording.mcap").read_bytes()
+    (recording,) = tmp_path.rglob("recording.mcap")
+    before = recording.read_bytes()
     break_at(monkeypatch, 1.0, KeyboardInterrupt())
-    eidrive("run", passing_by, "--out", tmp_path, "--seed", "2")
-    assert (tmp_path / "recording.mcap").read_bytes() == before
-    assert "recording.partial.mcap" in names(tmp_path)
+    interrupted = eidrive("run", passing_by, "--out", tmp_path)
+    assert recording.read_bytes() == before
+    assert names(tmp_path) == ["recording.mcap", "recording.partial.mcap", "result.json"]
+    assert f"recording: {recording.with_name('recording.partial.mcap')}" in interrupted.stderr
+    assert f"reproduce: eidrive run {passing_by} --seed 1" in interrupted.stderr
 
 
 def test_wrong_input_leaves_nothing(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:

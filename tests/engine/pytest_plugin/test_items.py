@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 from xml.etree import ElementTree
@@ -75,7 +76,9 @@ def test_out_keeps_every_run(project: pytest.Pytester) -> None:
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(["eidrive: seeds 2, out runs"])
     kept = sorted(path.relative_to(project.path).as_posix() for path in project.path.glob("runs/**/*.*"))
-    assert kept == [f"runs/xosc/far/seed{seed}/{name}" for seed in (1, 2) for name in ("recording.mcap", "result.json")]
+    short = [re.sub(r"-[0-9a-f]{10}/", "/", path) for path in kept]
+    names = ("recording.mcap", "result.json")
+    assert short == [f"runs/xosc/far/far-none-seed{seed}/{name}" for seed in (1, 2) for name in names]
     assert json.loads((project.path / kept[1]).read_text())["passed"] is True
 
 

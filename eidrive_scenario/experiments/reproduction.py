@@ -1,0 +1,80 @@
+"""The command line that repeats a run."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.library import library_path, name_of
+from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.run import RunResult, RunSettings
+from eidrive_scenario.v2x.profile import SUFFIXES
+
+
+def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
+    """Return the `eidrive run` command that repeats this run, quoted for a shell.
+
+    scenario  its file; paths are absolute, so that the command works in any folder
+    """
+    usual = RunSettings()
+    words: list[str] = ["eidrive", "run", _scenario(scenario)]
+    for option, value in (
+        ("--channel", _channel(settings.channel)),
+        ("--detector", settings.detector),
+        ("--weather", _file_or_name(settings.weather)),
+        ("--cooperate", None if settings.cooperate is None else ",".join(settings.cooperate) or "none"),
+    ):
+        if value is not None:
+            words += [f"{option}={value}"] if value.startswith("-") else [option, value]
+    for option, values in (
+        ("--param", settings.parameters),
+        ("--user-value", settings.user_values),
+        ("--stand-in", settings.controllers),
+    ):
+        words += _assignments(option, values)
+    words += ["--seed", str(seed)]
+    for option, number, default in (
+        ("--dt", settings.dt, usual.dt),
+        ("--time-limit", settings.time_limit, usual.time_limit),
+    ):
+        words += [] if number == default else [option, repr(float(number))]
+    return shlex.join(words)
+
+
+def reproduction_lines(result: RunResult) -> list[str]:
+    """The command that repeats a run that did not pass, and the path of its recording, as far as there are any."""
+    if result.passed:
+        return []
+    command = [f"reproduce: {result.command}"] if result.command else []
+    return [*command, *([] if result.recording is None else [f"recording: {result.recording}"])]
+
+
+def _scenario(path: Path) -> str:
+    name = name_of(path)
+    in_library = path.resolve() == (library_path() / f"{name}.xosc").resolve()
+    return name if in_library and not os.path.exists(name) else os.path.abspath(path)
+
+
+def _channel(value: Any) -> str | None:
+    """A profile: its text, its name, or its file by an absolute path."""
+    if isinstance(value, Mapping):
+        return json.dumps(value)
+    return _file_or_name(value) if value is None or Path(value).suffix in SUFFIXES else str(value)
+
+
+def _file_or_name(value: str | Path | None) -> str | None:
+    if value is None:
+        return None
+    return os.path.abspath(value) if os.path.isfile(value) else str(value)
+
+
+def _assignments(option: str, values: Mapping[str, str | Assignment]) -> list[str]:
+    words = []
+    for name, value in values.items():
+        assignment = f"{name}={value.text if isinstance(value, Assignment) else value}"
+        words += [f"{option}={assignment}"] if assignment.startswith("-") else [option, assignment]
+    return words

@@ -1,0 +1,98 @@
+"""Finding and reading what runs have left: results and recordings."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.recording.output import PARTIAL, partial
+
+RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
+"""Names of the files in a run's folder."""
+_LARGEST = 256 * 2**20
+"""Maximum size of a result [bytes]."""
+
+
+def recording_in(place: Path) -> Path:
+    """The recording in a run's folder, or the only one below it; a file as it is.
+
+    Where a run did not end, it is the partial recording. Raises InputError if there is none, or more than one.
+    """
+    if not os.path.isdir(place):
+        return place
+    for found in ([place / RECORDING, partial(place / RECORDING)], _recordings_below(place)):
+        paths = [path for path in found if path.is_file()]
+        if len(paths) == 1 or (paths and paths[0].parent == place):
+            return paths[0]
+        if paths:
+            listed = ", ".join(str(path.parent.relative_to(place)) for path in paths[:5])
+            more = f" and {len(paths) - 5} more" if len(paths) > 5 else ""
+            what = f"{len(paths)} recordings are below this folder"
+            raise InputError(Problem(what, f"give one of its folders: {listed}{more}", str(place)))
+    raise InputError(Problem(f"no {RECORDING} in this folder", "eidrive run … --out DIR records", str(place)))
+
+
+def _recordings_below(place: Path) -> list[Path]:
+    """The recording of each folder; a partial one where there is no other."""
+    found: dict[Path, Path] = {}
+    for path in sorted([*place.rglob(partial(Path(RECORDING)).name), *place.rglob(RECORDING)]):
+        if path.name == RECORDING or path.parent not in found:
+            found[path.parent] = path
+    return list(found.values())
+
+
+def is_partial(recording: Path) -> bool:
+    """Whether a recording's name says that its run did not end."""
+    return recording.stem.endswith(PARTIAL)
+
+
+def result_of(recording: Path) -> dict[str, Any] | None:
+    """The result of the run whose recording this is, or None if there is none beside it.
+
+    Raises InputError for a file that is not a result.
+    """
+    beside = recording.with_name(RESULT)
+    return read_result(beside) if recording.name == RECORDING and beside.exists() else None
+
+
+def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
+    """The results in these files and folders, and in folders below, in order of their paths; each file once.
+
+    Raises InputError for a file that is not a result.
+    """
+    return [read_result(path) for path in result_paths(places)]
+
+
+def result_paths(places: Sequence[Path]) -> Iterator[Path]:
+    """The files of the results in these files and folders, and in folders below; each file once."""
+    taken = set()
+    for place in places:
+        for path in sorted(place.rglob(RESULT)) if os.path.isdir(place) else [place]:
+            real = os.path.realpath(path)
+            if real not in taken:
+                taken.add(real)
+                yield path
+
+
+def read_result(path: Path) -> dict[str, Any]:
+    """A result, as JSON values. Raises InputError if the file is not one."""
+    try:
+        with open(os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise InputError(Problem("not a regular file", f"give a {RESULT}", str(path)))
+            data = stream.read(_LARGEST + 1)
+        if len(data) > _LARGEST:
+            raise InputError(Problem(f"larger than {_LARGEST // 2**20} MiB", f"give a {RESULT}", str(path)))
+        result = load_json(data)
+    except OSError as error:
+        raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
+    except ValueError as error:
+        raise InputError(Problem(f"not JSON: {error}", f"give a {RESULT}", str(path))) from error
+    if not isinstance(result, dict) or "trace_hash" not in result:
+        raise InputError(Problem("not the result of a run", "give a file that eidrive run --out wrote", str(path)))
+    return result

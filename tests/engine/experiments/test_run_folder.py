@@ -1,0 +1,265 @@
+"""The folders of runs: never shared, never mixed, never half written."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.experiments.run_folder import folder_name, run_folder
+from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.recording import TraceHash, read_recording
+from eidrive_scenario.recording.file_lock import FileLock
+from eidrive_scenario.resolved_settings import ResolvedSettings
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+SHORT: dict[str, Any] = {"time_limit": 0.3}
+MAIN = [sys.executable, "-m", "eidrive_scenario"]
+
+
+def run(below: Path, source: Any = PASSING_BY, seed: int = 1, **settings: Any) -> RunResult:
+    return play(source, seed=seed, settings=RunSettings(**{**SHORT, **settings}), below=below)
+
+
+def trace_of(recording: Path) -> str:
+    trace = TraceHash()
+    for frame in read_recording(recording).frames():
+        trace.observe(frame)
+    return trace.hexdigest()
+
+
+def results(below: Path) -> list[dict[str, Any]]:
+    return [json.loads(path.read_text(encoding="utf-8")) for path in sorted(below.rglob("result.json"))]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"parameters": {"OtherY": "6"}},
+        {"channel": "{delay: {kind: constant, seconds: 0.1}}"},
+        {"detector": "lidar"},
+        {"dt": 0.1},
+        {"time_limit": 0.4},
+        {"weather": "storm"},
+        {"user_values": {"mood": "1"}},
+        {"controllers": {"A": "alks"}},
+        {"seed": 2},
+    ],
+)
+def test_run_folder_differs_for_each_setting(tmp_path: Path, changes: dict[str, Any]) -> None:
+    usual, changed = run(tmp_path), run(tmp_path, **changes)
+    assert usual.folder != changed.folder
+    assert len(results(tmp_path)) == 2
+
+
+def test_folder_name_of_odd_and_long_names_is_a_short_file_name() -> None:
+    odd = ResolvedSettings(scenario="a/../" + "ä b\n/" * 100, channel="../x", seed=-3, parameters={"P": "a/b\0"})
+    name = folder_name(odd)
+    assert len(name.encode()) <= 120
+    assert "/" not in name
+    assert not name.startswith((".", "-"))
+    assert folder_name(ResolvedSettings(scenario="")).endswith(ResolvedSettings().short_digest)
+    assert folder_name(replace(odd, seed=-4)) != name
+
+
+def test_odd_values_of_parameters_are_kept_apart(tmp_path: Path) -> None:
+    text = PASSING_BY.read_text(encoding="utf-8").replace(
+        "</ParameterDeclarations>",
+        '<ParameterDeclaration name="Note" parameterType="string" value=""/></ParameterDeclarations>',
+    )
+    scenario = tmp_path / "a b'c.xosc"
+    scenario.write_text(text, encoding="utf-8")
+    values = ["../../x", "a/b", "a_b", "=1+1", "-x", "ü" * 300, "$(rm -rf)", 'it\'s "quoted"', "a\nb", " "]
+    folders = {run(tmp_path / "out", scenario, parameters={"Note": value}).folder for value in values}
+    assert len(folders) == len(values)
+    assert {path.parent for path in folders if path} == {tmp_path / "out"}
+    assert sorted(result["parameters"]["Note"] for result in results(tmp_path / "out")) == sorted(values)
+
+
+def test_a_second_run_with_equal_settings_replaces_the_first(tmp_path: Path) -> None:
+    first, second = run(tmp_path), run(tmp_path)
+    assert first.folder == second.folder
+    assert second.warnings == first.warnings
+    assert len(results(tmp_path)) == 1
+
+
+def test_a_result_that_differs_under_equal_settings_is_reported(tmp_path: Path) -> None:
+    first = run(tmp_path)
+    assert first.folder is not None
+    kept = first.folder / "result.json"
+    kept.write_text(kept.read_text(encoding="utf-8").replace(first.trace_hash, "0" * 64), encoding="utf-8")
+    assert "it is replaced" in run(tmp_path).warnings[-1]
+    assert "it is replaced" not in "".join(run(tmp_path).warnings)
+
+
+def test_a_folder_with_another_result_is_never_overwritten(tmp_path: Path) -> None:
+    first = run(tmp_path)
+    assert first.folder is not None
+    (first.folder / "result.json").write_text("{", encoding="utf-8")
+    second = run(tmp_path)
+    assert second.folder == first.folder.with_name(f"{first.folder.name}-2")
+    assert (first.folder / "result.json").read_text(encoding="utf-8") == "{"
+
+
+def test_an_explicit_folder_with_other_settings_is_refused(tmp_path: Path) -> None:
+    play(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
+    play(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
+    with pytest.raises(SettingError, match="holds the result of a run with other settings"):
+        play(PASSING_BY, seed=2, settings=RunSettings(**SHORT), out=tmp_path)
+
+
+def test_a_locked_folder_gets_a_neighbour_with_a_number(tmp_path: Path) -> None:
+    settings = ResolvedSettings(scenario="x")
+    with run_folder(tmp_path, settings, own=True) as first, run_folder(tmp_path, settings, own=True) as second:
+        assert second.path.name == f"{first.path.name}-2"
+        with (
+            pytest.raises(SettingError, match="another run writes into this folder"),
+            run_folder(first.path, settings, own=False),
+        ):
+            pass
+    assert not list(tmp_path.rglob(".lock"))
+
+
+def _hold(path: Path, ready: Any) -> None:
+    assert FileLock.acquire(path) is not None
+    ready.set()
+    time.sleep(60)
+
+
+def test_the_lock_of_a_killed_process_does_not_block(tmp_path: Path) -> None:
+    path = tmp_path / ".lock"
+    context = multiprocessing.get_context("spawn")
+    ready = context.Event()
+    holder = context.Process(target=_hold, args=(path, ready))
+    holder.start()
+    try:
+        assert ready.wait(60)
+        assert FileLock.acquire(path) is None
+    finally:
+        holder.kill()
+        holder.join()
+    assert path.exists()
+    lock = FileLock.acquire(path)
+    assert lock is not None
+    lock.release()
+    assert not path.exists()
+
+
+def test_a_run_without_recording_leaves_none_of_an_earlier_one(tmp_path: Path) -> None:
+    folder = run(tmp_path).folder
+    assert folder is not None
+    play(PASSING_BY, settings=RunSettings(**SHORT), below=tmp_path, record=False)
+    assert sorted(path.name for path in folder.iterdir()) == ["result.json"]
+
+
+def _commands() -> Iterator[list[str]]:
+    for late in ("0.1", "0.2", "0.1", "0.1"):
+        yield ["--channel", f"{{delay: {{kind: constant, seconds: {late}}}}}", "--time-limit", "2"]
+
+
+def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path: Path) -> None:
+    running = [
+        subprocess.Popen(
+            [*MAIN, "run", "coop/scenario_1", "--out", str(tmp_path), *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for options in _commands()
+    ]
+    outputs = [process.communicate(timeout=100) for process in running]
+    assert [process.returncode for process in running] == [3] * 4, outputs
+    folders = {path.parent for path in tmp_path.rglob("result.json")}
+    assert {
+        Path(line.split(": ", 1)[1]) for out, _ in outputs for line in out.splitlines() if "files: " in line
+    } == folders
+    for folder in folders:
+        kept = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        assert trace_of(folder) == kept["trace_hash"]
+        recorded = json.loads(read_recording(folder).metadata["settings"])
+        assert recorded == kept["settings"]
+    delays = [result["settings"]["channel_profile"]["delay"]["seconds"] for result in results(tmp_path)]
+    assert set(delays) == {0.1, 0.2}
+    assert not list(tmp_path.rglob("*.lock"))
+    assert not list(tmp_path.rglob("*.partial*"))
+
+
+@pytest.mark.parametrize(
+    ("source", "options"),
+    [
+        (PASSING_BY, ["--param", "OtherY=0", "--seed", "7", "--dt", "0.1"]),
+        (PASSING_BY, ["--param", "OtherY=0", "--user-value", "it's=a b", "--stand-in", "X=alks", "--weather", "storm"]),
+        ("coop/scenario_1", ["--channel", "{delay: {kind: constant, seconds: 0.3}}", "--cooperate", "none"]),
+        ("coop/scenario_1", ["--channel", "late.yaml", "--time-limit", "1.5"]),
+    ],
+)
+def test_the_printed_command_reproduces_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str | Path, options: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "late.yaml").write_text("delay: {kind: constant, seconds: 0.4}\n", encoding="utf-8")
+    done = subprocess.run(
+        [*MAIN, "run", str(source), "--out", "out", *options], capture_output=True, text=True, check=False
+    )
+    assert done.returncode in (1, 3), done.stdout + done.stderr
+    (command,) = (line for line in done.stdout.splitlines() if line.startswith("reproduce: "))
+    (recording,) = (line for line in done.stdout.splitlines() if line.startswith("recording: "))
+    (kept,) = results(tmp_path / "out")
+    assert trace_of(Path(recording.removeprefix("recording: "))) == kept["trace_hash"]
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    words = shlex.split(command.removeprefix("reproduce: "))
+    again = subprocess.run([*MAIN, *words[1:], "--json"], capture_output=True, text=True, check=False)
+    printed = json.loads(again.stdout)
+    assert printed["trace_hash"] == kept["trace_hash"]
+    assert printed["settings"] == kept["settings"]
+
+
+def test_a_folder_that_cannot_be_written_is_an_input_error(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(SettingError, match="cannot write"):
+        run(tmp_path / "file")
+    with pytest.raises(SettingError, match="cannot write"):
+        run(Path("/proc/eidrive"))
+
+
+def test_a_full_disk_ends_the_run_with_its_partial_recording(tmp_path: Path) -> None:
+    """A limit on the size of files stands for the disk: writing beyond it fails alike."""
+    code = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000));"
+        "from eidrive_scenario.cli import main; main()"
+    )
+    command = [sys.executable, "-c", code, "run", "coop/scenario_1", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 3, done.stderr
+    assert "broken off: File too large" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "internal error" not in done.stderr
+    assert not list(tmp_path.rglob("result.json"))
+    assert [path.name for path in tmp_path.rglob("*.mcap")] == ["recording.partial.mcap"]
+    assert not list(tmp_path.rglob("*.lock"))
+
+
+def test_an_error_of_the_run_carries_its_command_and_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("physics")
+
+    monkeypatch.setattr(Simulation, "_end", fail)
+    with pytest.raises(ZeroDivisionError) as raised:
+        run(tmp_path)
+    notes = raised.value.__notes__
+    assert notes[0] == f"reproduce: eidrive run {PASSING_BY} --seed 1 --time-limit 0.3"
+    assert os.path.exists(notes[1].removeprefix("recording: "))
