@@ -15,6 +15,9 @@ Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable
 
 _SUFFIX = ".xosc"
 
+LIBRARY_FOLDER = "eidrive_library"
+"""First part of the paths by which scenario files of any folder name what lies in the library."""
+
 
 def library_path() -> Path:
     """The library's folder: package data of an installed wheel, `xosc` in a checkout. Raises SettingError."""
@@ -67,6 +70,20 @@ def _inside(path: Path) -> Path | None:
         if _is_file(candidate) and candidate.suffix == _SUFFIX:
             return candidate
     return None
+
+
+def place_of(path: str | Path, folder: Path) -> Path:
+    """The place of a path that a file in `folder` names.
+
+    A path that begins with `eidrive_library/` is that of a copy of the library beside the file; without such a copy it
+    leads into the library itself, never out of it. Any other path counts from the folder.
+    """
+    named = Path(path)
+    beside = folder / named
+    if named.parts[:1] != (LIBRARY_FOLDER,) or ".." in named.parts or os.path.lexists(beside):
+        return beside
+    inside = library_path().joinpath(*named.parts[1:])
+    return inside if os.path.exists(inside) else beside
 
 
 def name_of(path: Path) -> str:

@@ -16,6 +16,7 @@ class Names(StrEnum):
     """What `eidrive list` can list."""
 
     scenarios = "scenarios"
+    catalogs = "catalogs"
     channels = "channels"
     weather = "weather"
     detectors = "detectors"
@@ -39,6 +40,8 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = [*library.names("channels"), "none"]
     elif what is Names.weather:
         lines = library.names("weather")
+    elif what is Names.catalogs:
+        lines = _catalog_lines()
     elif what is Names.checks:
         from eidrive_scenario.experiments.rules import ALL_RULES
 
@@ -50,6 +53,26 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = [f"{name:<{width}}  {known.value(name)}" for name in known]
     for line in lines:
         typer.echo(line)
+
+
+def _catalog_lines() -> list[str]:
+    """One line per entry, and at the end how a scenario refers to them."""
+    from eidrive_scenario.library import LIBRARY_FOLDER, library_path
+    from eidrive_scenario.openscenario.library_catalogs import CATALOGS, library_catalog_entries
+
+    rows = [("CATALOG", "ENTRY", "KIND", "LENGTH x WIDTH x HEIGHT", "MASS")]
+    for entry in library_catalog_entries():
+        kind = f"{entry.kind} {entry.category}".strip()
+        size = " x ".join(f"{value:.2f}" for value in entry.size) + " m" if entry.size is not None else ""
+        rows.append((entry.catalog, entry.name, kind, size, f"{entry.mass:g} kg" if entry.mass is not None else ""))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    place = f"{LIBRARY_FOLDER}/{CATALOGS}"
+    return [
+        *lines,
+        f'From any folder: <VehicleCatalog><Directory path="{place}"/></VehicleCatalog>',
+        f"For other engines, copy {library_path() / CATALOGS} to {place} beside the scenario.",
+    ]
 
 
 def tree(

@@ -9,6 +9,7 @@ from pathlib import Path
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.library import LIBRARY_FOLDER, library_path, place_of
 from eidrive_scenario.openscenario.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
@@ -52,8 +53,8 @@ class CatalogLibrary:
         for location in locations.children() if locations else ():
             directory = getattr(location, "directory", None)
             if directory is not None and isinstance(directory.path, str):
-                path = Path(directory.path.replace("\\", "/"))
-                self._places[type(location).__name__.removesuffix("CatalogLocation")] = folder / path
+                kind = type(location).__name__.removesuffix("CatalogLocation")
+                self._places[kind] = catalog_place(directory.path, folder)
         self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
         self._unreadable: dict[Path, tuple[Problem, ...]] = {}
@@ -205,6 +206,11 @@ class CatalogLibrary:
         self._findings.error(message, remedy, source=reference.source, line=reference.line)
 
 
+def catalog_place(directory: str, folder: Path) -> Path:
+    """The folder or file that a Directory names; `eidrive_library/catalogs` is the library's from any folder."""
+    return place_of(directory.replace("\\", "/"), folder)
+
+
 def _read(path: Path, findings: Findings) -> CatalogFile | None:
     document = open_document(path)
     catalog = document.root.find("Catalog")
@@ -236,7 +242,10 @@ def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, s
     gone = [str(place) for place in places if not place.exists()]
     message = f"no catalog {name!r} in " + ", ".join(str(place) for place in places)
     if gone:
-        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", "correct the Directory"
+        remedy = "correct the Directory"
+        if (library_path() / "catalogs" / f"{name}.xosc").is_file():
+            remedy += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
+        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", remedy
     return message, suggestion(name, known)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from eidrive_scenario.errors import suggestion
+from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import File, RoadNetwork
 
@@ -44,7 +45,7 @@ def _from(folder: Path) -> str:
 def _candidates(logic: File, folder: Path) -> Iterator[Path]:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     for name in (named, named.with_name(named.name + SUFFIX)) if named.name else ():
-        yield folder / name
+        yield place_of(Path(name), folder)
         for maps in _map_folders():
             yield maps / name.name
 

@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import overload
 
 from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.distributions.deterministic import Combinations, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import Draws, draws_of
 from eidrive_scenario.openscenario.document import read_root
@@ -121,7 +122,7 @@ def _varied(distribution: ParameterValueDistribution, seed: float, findings: Fin
 
 
 def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Path:
-    path = folder / PurePosixPath(given.filepath.strip().replace("\\", "/"))
+    path = place_of(given.filepath.strip().replace("\\", "/"), folder)
     if not path.is_file():
         beside = path.parent.glob("*.xosc") if path.parent.is_dir() else ()
         report(

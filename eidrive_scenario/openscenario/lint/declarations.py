@@ -10,6 +10,7 @@ from typing import cast
 from lxml import etree
 
 from eidrive_scenario.errors import Problem
+from eidrive_scenario.openscenario.catalogs import catalog_place
 from eidrive_scenario.openscenario.lint.rule import at
 from eidrive_scenario.openscenario.lint.survey import Survey
 from eidrive_scenario.openscenario.model import (
@@ -108,7 +109,7 @@ def unused_catalogs(survey: Survey) -> Iterator[Problem]:
         directory = getattr(location, "directory", None)
         if directory is None:
             continue
-        place = (folder / Path(directory.path.replace("\\", "/"))).resolve()
+        place = catalog_place(directory.path, folder).resolve()
         if not any(file == place or file.parent == place for file in used):
             gone = "" if place.exists() else ", which is not there,"
             yield at(location, f"nothing is taken from the {kind} {directory.path!r}{gone}".rstrip(","), "take it out")

@@ -34,6 +34,7 @@ def test_version(eidrive: Eidrive) -> None:
         ("scenarios", "coop/scenario_1"),
         ("channels", "none"),
         ("weather", "foggy_morning"),
+        ("catalogs", "vehicles"),
         ("criteria", "min_distance"),
         ("detectors", "oracle"),
         ("fusion", "average"),

@@ -15,11 +15,11 @@ from eidrive_scenario.world.specs import SHAPES
 
 SIZES = {
     "car": (4.892, 1.837, 1.490), "firetruck": (8.468, 2.891, 3.827), "ambulance": (6.366, 2.351, 2.431),
-    "bus": (10.27, 3.94, 4.25), "van": (5.93, 2.02, 2.62), "truck": (8.3, 2.5, 3.55), "motorbike": (2.2, 0.8, 1.6),
+    "bus": (12.135, 2.55, 3.12), "van": (5.93, 2.02, 2.62), "truck": (8.3, 2.5, 3.55), "motorbike": (2.2, 0.8, 1.6),
     "bicycle": (1.8, 0.65, 1.75), "pedestrian": (0.375, 0.375, 1.86), "rsu": (0.5, 0.5, 5.0), "box": (1.0, 2.0, 0.5),
 }  # fmt: skip
 AXLES = {
-    "car": (2.85, 0.34), "firetruck": (4.7, 0.52), "ambulance": (4.0, 0.38), "bus": (5.8, 0.48),
+    "car": (2.85, 0.34), "firetruck": (4.7, 0.52), "ambulance": (4.0, 0.38), "bus": (5.9, 0.478),
     "van": (3.66, 0.35), "truck": (4.8, 0.5), "motorbike": (1.45, 0.31), "bicycle": (1.05, 0.34),
 }  # fmt: skip
 

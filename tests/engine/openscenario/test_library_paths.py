@@ -1,0 +1,157 @@
+"""Catalogs, roads and scenarios of the library, named from any folder by paths that begin with eidrive_library."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from lxml import etree
+from typer.testing import CliRunner
+
+from eidrive_scenario.cli import app
+from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.library import library_path, place_of
+from eidrive_scenario.openscenario import load_distribution, load_scenario
+from eidrive_scenario.openscenario.library_catalogs import library_catalog_entries
+
+SCENE = """<?xml version="1.0"?>
+<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
+  <CatalogLocations>
+    <VehicleCatalog><Directory path="{catalogs}"/></VehicleCatalog>
+  </CatalogLocations>
+  <RoadNetwork><LogicFile filepath="eidrive_library/roads/coop_1.xodr"/></RoadNetwork>
+  <Entities>
+    <ScenarioObject name="Bus"><CatalogReference catalogName="vehicles" entryName="bus"/></ScenarioObject>
+  </Entities>
+  <Storyboard>
+    <Init><Actions><Private entityRef="Bus"><PrivateAction><TeleportAction><Position>
+      <LanePosition roadId="1" laneId="-1" s="20"/>
+      </Position></TeleportAction></PrivateAction></Private></Actions></Init>
+    <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>
+      <SimulationTimeCondition value="0.5" rule="greaterThan"/></ByValueCondition></Condition></ConditionGroup>
+    </StopTrigger>
+  </Storyboard>
+</OpenSCENARIO>
+"""
+PLACE = "eidrive_library/catalogs"
+
+
+def write(folder: Path, catalogs: str = PLACE) -> Path:
+    path = folder / "scene.xosc"
+    path.write_text(SCENE.format(catalogs=catalogs))
+    return path
+
+
+def width_of_bus(path: Path) -> float:
+    return load_scenario(path).entities["Bus"].bounding_box.dimensions.width
+
+
+@pytest.mark.parametrize("place", [PLACE, f"{PLACE}/vehicles.xosc", "eidrive_library\\catalogs"])
+def test_library_catalog_is_found_from_any_folder(tmp_path: Path, place: str) -> None:
+    path = write(tmp_path, place)
+    assert width_of_bus(path) == 2.55
+    assert load_scenario(path).road_file == library_path() / "roads" / "coop_1.xodr"
+    checked = CliRunner().invoke(app, ["check", str(path)])
+    assert checked.stdout.strip() == "1 file, 0 problems, 0 warnings"
+    assert CliRunner().invoke(app, ["run", str(path)]).exit_code == 0
+
+
+def test_copy_beside_the_scenario_wins(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    shutil.copytree(library_path() / "catalogs", tmp_path / PLACE)
+    copy = tmp_path / PLACE / "vehicles.xosc"
+    copy.write_text(copy.read_text().replace('width="2.55"', 'width="2.4"'))
+    assert width_of_bus(path) == 2.4
+
+
+def test_file_stays_valid_against_the_schema(tmp_path: Path) -> None:
+    corpora = os.environ.get("EIDRIVE_CORPORA")
+    if not corpora:
+        pytest.skip("EIDRIVE_CORPORA is not set: ASAM's schema is not part of the project")
+    schema = etree.XMLSchema(etree.parse(Path(corpora) / "schema" / "OpenSCENARIOv1.3.1.xsd"))
+    schema.assertValid(etree.parse(write(tmp_path)))
+
+
+def test_distribution_names_scenario_of_the_library(tmp_path: Path) -> None:
+    path = tmp_path / "speeds.xosc"
+    path.write_text(
+        """<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>
+        <ParameterValueDistribution><ScenarioFile filepath="eidrive_library/coop/scenario_1.xosc"/><Deterministic>
+        <DeterministicSingleParameterDistribution parameterName="EgoSpeed"><DistributionSet>
+        <Element value="5"/></DistributionSet></DeterministicSingleParameterDistribution>
+        </Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
+    )
+    (run,) = load_distribution(path)
+    assert load_scenario(run.scenario, run.assignments).parameters["EgoSpeed"] == "5"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "eidrive_library/../../etc/passwd",
+        "eidrive_library/catalogs/../../../etc",
+        "eidrive_library/nothing",
+        "eidrive_library2/catalogs",
+        "../eidrive_library/catalogs",
+        "/eidrive_library/catalogs",
+        "catalogs",
+    ],
+)
+def test_other_paths_count_from_the_folder(tmp_path: Path, path: str) -> None:
+    assert place_of(path, tmp_path) == tmp_path / path
+
+
+def test_broken_link_beside_the_scenario_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "eidrive_library").mkdir()
+    (tmp_path / PLACE).symlink_to(tmp_path / "gone")
+    assert place_of(PLACE, tmp_path) == tmp_path / PLACE
+
+
+def test_missing_catalog_is_reported_with_that_of_the_library(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="correct the Directory; that of the library is eidrive_library/catalogs"):
+        load_scenario(write(tmp_path, "../catalogs"))
+
+
+def test_list_catalogs_names_entries_with_sizes_and_the_way_to_refer() -> None:
+    printed = CliRunner().invoke(app, ["list", "catalogs"]).stdout.splitlines()
+    bus = next(line for line in printed if line.split()[1:2] == ["bus"])
+    assert "12.13 x 2.55 x 3.12 m" in bus
+    assert {line.split()[0] for line in printed if line} >= {"vehicles", "pedestrians", "misc_objects", "environments"}
+    assert f'<VehicleCatalog><Directory path="{PLACE}"/></VehicleCatalog>' in printed[-2]
+    assert str(library_path() / "catalogs") in printed[-1]
+
+
+REAL = {
+    "lincoln_mkz": (4.925, 1.864, 1.476),
+    "lincoln_mkz_2017": (4.925, 2.113, 1.476),
+    "fire_engine": (8.040, 2.440, 3.200),
+    "bus": (12.135, 2.550, 3.120),
+    "van": (5.932, 2.020, 2.623),
+}
+"""Length, width, height [m] by the makers; of lincoln_mkz_2017 with mirrors."""
+BLUEPRINTS = {
+    "firetruck": (8.468, 2.891, 3.827),
+    "ambulance": (6.366, 2.351, 2.431),
+    "nissan_patrol": (4.60, 1.93, 1.85),
+    "seat_leon": (4.19, 1.82, 1.47),
+    "tesla_model3": (4.79, 2.16, 1.49),
+}
+"""The same of CARLA 0.9.14, which the entries claim to be."""
+LEGAL_WIDTH, LEGAL_HEIGHT = 2.55, 4.0
+"""EU directive 96/53/EC [m]."""
+
+
+def test_vehicles_have_the_sizes_that_they_claim() -> None:
+    sizes = {entry.name: entry.size for entry in library_catalog_entries() if entry.kind == "Vehicle"}
+    for name, size in REAL.items():
+        assert sizes[name] == pytest.approx(size, rel=0.025), name
+    for name, size in BLUEPRINTS.items():
+        assert sizes[name] == pytest.approx(size, abs=0.005), name
+    for name, found in sizes.items():
+        assert found is not None
+        if name not in BLUEPRINTS:
+            assert found[1] <= LEGAL_WIDTH, name
+            assert found[2] <= LEGAL_HEIGHT, name
