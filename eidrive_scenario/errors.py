@@ -16,6 +16,15 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+MAX_DIAGNOSTICS = 200
+"""Maximum number of diagnostics of one kind that are collected for one file."""
+MAX_TEXT = 1000
+"""Maximum number of characters of a message."""
+_MAX_WORD = 100
+"""Maximum number of characters of a word that is compared with others."""
+_MAX_CANDIDATES = 2000
+"""Maximum number of words that a misspelt one is compared with."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -27,6 +36,11 @@ class Problem:
     line: int | None = None
     rule: str = ""
     """Which rule of `eidrive check` found it, where one did; docs/checks.md says more about it."""
+
+    def __post_init__(self) -> None:
+        if len(self.message) > MAX_TEXT or len(self.remedy) > MAX_TEXT:
+            object.__setattr__(self, "message", shortened(self.message))
+            object.__setattr__(self, "remedy", shortened(self.remedy))
 
     def __str__(self) -> str:
         place = f"{self.source}:{self.line}" if self.line is not None else self.source
@@ -100,16 +114,49 @@ class Together:
             raise InputError(list(dict.fromkeys(self._problems)))
 
 
+def capped(problems: Sequence[Problem]) -> list[Problem]:
+    """The first MAX_DIAGNOSTICS of several diagnostics, and one that counts the others."""
+    shown = list(problems[:MAX_DIAGNOSTICS])
+    if len(problems) > MAX_DIAGNOSTICS:
+        shown.append(Problem(f"{len(problems) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
+    return shown
+
+
+def shortened(text: str, length: int = MAX_TEXT) -> str:
+    """A text of at most `length` characters: the middle of a longer one is left out."""
+    if len(text) <= length:
+        return text
+    half = (length - 3) // 2
+    return f"{text[:half]} … {text[len(text) - half :]}"
+
+
+def quoted(value: object, length: int = 200) -> str:
+    """A value as a message quotes it: its `repr`, shortened, at a cost that does not depend on its size."""
+    if isinstance(value, str | bytes):
+        return repr(shortened(value, length) if isinstance(value, str) else value[:length])
+    if isinstance(value, int) and abs(value) > 10**18:
+        return "an integer beyond 10^18"
+    if isinstance(value, list | tuple) and len(value) > length:
+        return f"{type(value).__name__} of {len(value)} entries"
+    if isinstance(value, dict) and len(value) > length:
+        return f"mapping of {len(value)} keys"
+    return shortened(repr(value), length * 2)
+
+
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """What would be right in place of `word`: the nearest of `known`, or all of them when none is near."""
+    """What would be right in place of `word`: the nearest of `known`, or all of them when none is near.
+
+    A word that is too long to be a misspelling, or one of too many, is not compared: the cost stays small.
+    """
     candidates = sorted(known)
-    near = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
-    if not near:
-        lowered = {candidate.lower(): candidate for candidate in candidates}
-        near = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
-    if near:
-        return f"did you mean {near[0]!r}?"
+    if len(word) <= _MAX_WORD and len(candidates) <= _MAX_CANDIDATES:
+        near = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
+        if not near:
+            lowered = {candidate.lower(): candidate for candidate in candidates}
+            near = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
+        if near:
+            return f"did you mean {near[0]!r}?"
     if not candidates:
         return "none is known here"
-    shown = ", ".join(candidates[:12]) + (", …" if len(candidates) > 12 else "")
-    return f"known: {shown}"
+    shown = ", ".join(shortened(name, _MAX_WORD) for name in candidates[:12])
+    return f"known: {shown}" + (", …" if len(candidates) > 12 else "")

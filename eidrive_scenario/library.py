@@ -6,14 +6,17 @@ import os
 from pathlib import Path
 from typing import Literal
 
-from lxml import etree
-
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import Problem, SettingError, quoted, suggestion
+from eidrive_scenario.files import MIB, absolute, is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.untrusted_xml import first_elements
 
 Kind = Literal["channels", "weather"]
 Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable", "other"]
 
 _SUFFIX = ".xosc"
+_LARGEST = 256 * MIB
+_LOOKED_AT = 100_000
+"""Elements of a file within which it is told what the file defines."""
 
 LIBRARY_FOLDER = "eidrive_library"
 """First part of the paths by which scenario files of any folder name what lies in the library."""
@@ -44,22 +47,22 @@ def resolve_scenario(name: str | Path) -> Path:
     Raises SettingError, with the nearest name, if there is neither.
     """
     path = Path(name)
-    if _is_file(path):
+    if is_regular_file(path):
         _check_letters(path)
         return path
     inside = _inside(path)
     if inside is not None:
         return inside
-    if str(name) and os.path.isdir(path):
-        raise SettingError(Problem(f"{str(name)!r} is a folder", "give one .xosc file"))
+    if str(name) and is_folder(path):
+        raise SettingError(Problem(f"{quoted(str(name))} is a folder", "give one .xosc file"))
     remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
-    raise SettingError(Problem(f"no scenario {str(name)!r}: neither a file nor in the library", remedy))
+    raise SettingError(Problem(f"no scenario {quoted(str(name))}: neither a file nor in the library", remedy))
 
 
 def from_library(name: str | Path) -> Path:
     """The file of the library's scenario of that name; the path itself if it is a file or no such name."""
     path = Path(name)
-    return path if _is_file(path) else _inside(path) or path
+    return path if is_regular_file(path) else _inside(path) or path
 
 
 def _inside(path: Path) -> Path | None:
@@ -67,7 +70,7 @@ def _inside(path: Path) -> Path | None:
         return None
     inside = library_path() / path
     for candidate in (inside.with_name(inside.name + _SUFFIX), inside):
-        if _is_file(candidate) and candidate.suffix == _SUFFIX:
+        if is_regular_file(candidate) and candidate.suffix == _SUFFIX:
             return candidate
     return None
 
@@ -89,7 +92,7 @@ def place_of(path: str | Path, folder: Path) -> Path:
 def name_of(path: Path) -> str:
     """The library's name of a scenario file, such as `coop/scenario_1`; the file's own name for any other."""
     try:
-        return path.resolve().relative_to(library_path().resolve()).with_suffix("").as_posix()
+        return absolute(path).relative_to(absolute(library_path())).with_suffix("").as_posix()
     except ValueError:
         return path.stem
 
@@ -102,14 +105,14 @@ def names(kind: Kind) -> list[str]:
 def resolve(kind: Kind, name: str | Path) -> Path:
     """The file of a channel profile or weather preset given by path or name. Raises SettingError, with the nearest."""
     path = Path(name)
-    if _is_file(path):
+    if is_regular_file(path):
         return path
     inside = library_path() / kind / f"{name}.yaml"
-    if _is_file(inside):
+    if is_regular_file(inside):
         return inside
     singular = "channel profile" if kind == "channels" else "weather preset"
     remedy = suggestion(str(name), names(kind))
-    raise SettingError(Problem(f"no {singular} {str(name)!r}: neither a file nor in the library", remedy))
+    raise SettingError(Problem(f"no {singular} {quoted(str(name))}: neither a file nor in the library", remedy))
 
 
 def _check_letters(path: Path) -> None:
@@ -120,11 +123,6 @@ def _check_letters(path: Path) -> None:
         shown = os.fsencode(path).decode(errors="backslashreplace")
         remedy = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
         raise SettingError(Problem("the name has bytes that are no letters here", remedy, shown)) from None
-
-
-def _is_file(path: Path) -> bool:
-    """False too for a text that is no path at all, as it is too long."""
-    return os.path.isfile(path)
 
 
 def definition(path: Path) -> Definition:
@@ -139,21 +137,17 @@ def definition(path: Path) -> Definition:
         "Entities": "scenario",
         "Storyboard": "scenario",
     }
+    found: list[Definition] = []
+
+    def visit(depth: int, word: str) -> bool:
+        if depth == 1 and word != "OpenSCENARIO":
+            found.append("roads" if word == "OpenDRIVE" else "other")
+        elif depth == 2 and word in kinds:
+            found.append(kinds[word])
+        return bool(found)
+
     try:
-        with path.open("rb") as stream:
-            depth = 0
-            for event, element in etree.iterparse(
-                stream, events=("start", "end"), resolve_entities=False, no_network=True, load_dtd=False
-            ):
-                if event == "end":
-                    depth -= 1
-                    continue
-                depth += 1
-                word = etree.QName(element).localname if isinstance(element.tag, str) else ""
-                if depth == 1 and word != "OpenSCENARIO":
-                    return "roads" if word == "OpenDRIVE" else "other"
-                if depth == 2 and word in kinds:
-                    return kinds[word]
-    except (OSError, etree.XMLSyntaxError):
+        content = read_regular_file(path, _LARGEST)
+        return found[0] if first_elements(content, _LOOKED_AT, visit) else "scenario"
+    except (OSError, ValueError):
         return "unreadable"
-    return "scenario"

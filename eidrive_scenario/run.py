@@ -34,6 +34,7 @@ class RunSettings:
     time_limit      [s] of simulated time, for files that do not end by themselves
     weather         preset or file; it wins over all that the file says of weather and road
     user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
+    allow_torchscript   whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
     """
 
     channel: str | Path | None = None
@@ -45,6 +46,7 @@ class RunSettings:
     controllers: Mapping[str, str] = field(default_factory=dict)
     weather: str | Path | None = None
     user_values: Mapping[str, str] = field(default_factory=dict)
+    allow_torchscript: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Hashable, Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, get_args
 
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import MAX_DIAGNOSTICS, Problem, SettingError, quoted, suggestion
+from eidrive_scenario.yaml_text import key_lines as key_lines
+from eidrive_scenario.yaml_text import load_yaml as load_yaml
+from eidrive_scenario.yaml_text import load_yaml_file as load_yaml_file
+
+MAX_NUMBER = 1e12
+"""Size of a number in settings: no length, time, rate or power comes near it."""
 
 
 class Settings(BaseModel):
@@ -36,20 +41,20 @@ def parse_settings(
     SettingError with one Problem per wrong key.
     """
     try:
-        return model.model_validate(dict(data))
+        settings = model.model_validate(dict(data))
     except ValidationError as error:
         problems = []
-        for finding in error.errors(include_url=False):
+        for finding in error.errors(include_url=False)[:MAX_DIAGNOSTICS]:
             path = _typed_path(finding["loc"], data)
             place = _line_of(finding["loc"], lines or {}, line)
             if finding["type"] == "extra_forbidden":
                 known = _known_keys(model, finding["loc"][:-1])
-                message, remedy = f"unknown setting {path!r}", suggestion(str(finding["loc"][-1]), known)
+                message, remedy = f"unknown setting {quoted(path)}", suggestion(str(finding["loc"][-1]), known)
             elif finding["type"] == "missing":
                 message, remedy = f"setting {path!r} is missing", "add it"
             elif finding["type"] == "union_tag_invalid":
                 word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
-                message = f"setting {path + '.' + key!r} is {word!r}"
+                message = f"setting {quoted(path + '.' + key)} is {quoted(word)}"
                 place = _line_of((*finding["loc"], key), lines or {}, line)
                 remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
             elif finding["type"] == "union_tag_not_found":
@@ -57,13 +62,36 @@ def parse_settings(
                 message = f"setting {path + '.' + key!r} is missing"
                 remedy = suggestion("", _tags(model, finding["loc"], key))
             elif finding["type"] in _NO_MAPPING:
-                message, remedy = f"setting {path!r} is {finding['input']!r}", "a mapping is expected: {key: value, …}"
+                message = f"setting {path!r} is {quoted(finding['input'])}"
+                remedy = "a mapping is expected: {key: value, …}"
             else:
                 own = finding["type"] == "value_error"
                 remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-                message = f"setting {path!r} is {finding['input']!r}" if path else "settings do not fit together"
+                message = f"setting {path!r} is {quoted(finding['input'])}" if path else "settings do not fit together"
             problems.append(Problem(message, remedy, source, place))
         raise SettingError(problems) from error
+    immense = next(_immense(settings), None)
+    if immense is not None:
+        place = _line_of(immense[0], lines or {}, line)
+        path = _typed_path(immense[0], data)
+        what = f"setting {quoted(path)} is {quoted(immense[1])}"
+        raise SettingError(Problem(what, f"give a number within {MAX_NUMBER:g}", source, place))
+    return settings
+
+
+def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:
+    """The numbers beyond MAX_NUMBER in settings, with the keys that lead to them."""
+    if isinstance(value, BaseModel):
+        value = value.__dict__
+    if isinstance(value, int | float):
+        if not abs(value) <= MAX_NUMBER and not (isinstance(value, float) and math.isinf(value)):
+            yield path, value
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _immense(inner, (*path, key if isinstance(key, int) else str(key)))
+    elif isinstance(value, list | tuple):
+        for place, inner in enumerate(value):
+            yield from _immense(inner, (*path, place))
 
 
 _NO_MAPPING = frozenset({"model_type", "model_attributes_type", "dict_type"})
@@ -136,90 +164,3 @@ def _tagged(member: Any, tag: int | str) -> bool:
     """Whether a member of a tagged union is the one of this tag."""
     fields = getattr(member, "model_fields", {})
     return any(tag in get_args(field.annotation) for field in fields.values())
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML's safe loader, which by itself keeps the last of several equal keys.
-
-    An expression `${…}` is one text, inside braces and brackets too, where YAML takes its brace for a mapping.
-    """
-
-    def scan_plain(self) -> yaml.ScalarToken:
-        """Scan a scalar without quotes."""
-        if self.flow_level and self.prefix(2) == "${":
-            length = self._length_of_expression()
-            if length:
-                start = self.get_mark()
-                text = self.prefix(length)
-                self.forward(length)
-                self.allow_simple_key = False
-                return yaml.ScalarToken(text, False, start, self.get_mark(), "'")
-        token: yaml.ScalarToken = super().scan_plain()
-        return token
-
-    def _length_of_expression(self) -> int:
-        """Number of characters up to its closing brace; 0 if there is none in this line."""
-        length = 2
-        while self.peek(length) not in "\0\r\n{}":
-            length += 1
-        return length + 1 if self.peek(length) == "}" else 0
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(None, None, "a key is a single word", key.start_mark)
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"{key.value!r} stands here twice", key.start_mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
-def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:
-    """YAML without object tags; a key that stands twice is a mistake, as one of its values would be lost.
-
-    Raises SettingError with the line of the mistake, counted from `line` if given.
-    """
-    try:
-        return yaml.load(text, _Loader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = (line or 1) + mark.line if mark is not None else line
-        what = getattr(error, "problem", None) or str(error)
-        raise SettingError(Problem(f"not valid YAML: {what}", "check the syntax there", source, place)) from error
-    except ValueError as error:  # what looks like a date and is none
-        raise SettingError(Problem(f"not valid YAML: {error}", "put it in quotes", source, line)) from error
-    except RecursionError as error:
-        raise SettingError(Problem("not valid YAML: nested too deeply", "close the brackets", source, line)) from error
-
-
-def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
-    """A YAML file and the line of each of its keys. Raises SettingError."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingError(Problem(f"cannot read: {error}", "give the path of a YAML file", str(path))) from error
-    return load_yaml(text, source=str(path)), key_lines(text)
-
-
-def key_lines(text: str, first: int = 1) -> dict[str, int]:
-    """The line of each key of valid YAML, the first line having the number `first`. Keys inside others have dots, and
-    entries of lists numbers: `delay`, `delay.seconds`, `limits.0`."""
-    lines: dict[str, int] = {}
-    waiting = [("", yaml.compose(text, Loader=_Loader))]
-    seen: set[int] = set()
-    while waiting:
-        path, node = waiting.pop()
-        if id(node) in seen:
-            continue  # an alias
-        seen.add(id(node))
-        entries: list[tuple[str, yaml.Node, yaml.Node]] = []
-        if isinstance(node, yaml.MappingNode):
-            entries = [(str(key.value), key, value) for key, value in node.value]
-        elif isinstance(node, yaml.SequenceNode):
-            entries = [(str(place), value, value) for place, value in enumerate(node.value)]
-        for name, where, value in entries:
-            inner = f"{path}.{name}" if path else name
-            lines[inner] = first + where.start_mark.line
-            waiting.append((inner, value))
-    return lines

@@ -78,6 +78,7 @@ class Simulation:
         seed: int = DEFAULT_SEED,
         settings: RunSettings | None = None,
         observers: Sequence[Observer] = (),
+        load_weights: bool = True,
     ) -> None:
         self.seed = seed
         self.settings = settings or RunSettings()
@@ -100,6 +101,8 @@ class Simulation:
                 channel=self.settings.channel,
                 detector=self.settings.detector,
                 cooperate=self.settings.cooperate,
+                load_weights=load_weights,
+                allow_torchscript=self.settings.allow_torchscript,
             )
         with together:
             self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))

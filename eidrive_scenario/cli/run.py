@@ -69,6 +69,14 @@ def run(
         list[str] | None,
         typer.Option(metavar="EVENT", help="Say why an event or act started, or why not; repeatable."),
     ] = None,
+    allow_torchscript: Annotated[
+        bool,
+        typer.Option(
+            "--allow-torchscript",
+            envvar="EIDRIVE_ALLOW_TORCHSCRIPT",
+            help="Load TorchScript weights, which can execute any code with your rights.",
+        ),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run, nothing else.")] = False,
 ) -> None:
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
@@ -93,6 +101,7 @@ def run(
         controllers=_assigned("--stand-in", stand_in or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
+        allow_torchscript=allow_torchscript,
     )
 
     def play_seeds(source: Path | ConcreteRun) -> int:

@@ -13,7 +13,9 @@ from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
+from eidrive_scenario.settings import load_yaml
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.world.specs import actor_spec
 
@@ -71,10 +73,15 @@ def _has_wheels(scenario: Scenario, name: str) -> bool:
 
 
 def declared_detectors(
-    scenario: Scenario, settings: Mapping[str, AgentSettings], option: str | None
+    scenario: Scenario,
+    settings: Mapping[str, AgentSettings],
+    option: str | None,
+    *,
+    load_weights: bool = True,
+    allow_torchscript: bool = False,
 ) -> dict[str, Detector]:
-    """The detector of every station. Raises SettingError with all that is wrong with any of them, their sensors or
-    their methods of fusion."""
+    """The detector of every station, with its weights unless `load_weights` is False. Raises SettingError with all that
+    is wrong with any of them, their sensors or their methods of fusion."""
     problems: list[Problem] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
@@ -84,6 +91,8 @@ def declared_detectors(
         line = None if by_option else _line(controller, "detector_settings", "detector")
         try:
             found[name] = build_detector(station, source=source, line=line)
+            if load_weights:
+                found[name].load_weights(allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
             station.rig_sensors(found[name].needs, found[name].usual_sensors)
             line = _line(controller, "fusion_settings", "fusion")
@@ -95,6 +104,23 @@ def declared_detectors(
     if problems:
         raise SettingError(list(dict.fromkeys(problems)))
     return found
+
+
+def torchscript_warnings(scenario: Scenario) -> list[Problem]:
+    """A warning for each controller whose detector names TorchScript weights, which a run may refuse."""
+    warnings = []
+    for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
+        entries = controller.properties.property if controller.properties is not None else ()
+        for entry in entries if is_agent(controller) else ():
+            if entry.name != "detector_settings":
+                continue
+            given = load_yaml(entry.value, source=controller.source, line=entry.line)
+            weights = given.get("weights") if isinstance(given, dict) else None
+            if isinstance(weights, str) and Path(weights).suffix == TORCHSCRIPT_SUFFIX:
+                message = "the run is refused: its TorchScript weights can execute any code"
+                remedy = f"export the model to ONNX, or allow it by --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
+                warnings.append(Problem(message, remedy, controller.source, entry.line))
+    return warnings
 
 
 def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:

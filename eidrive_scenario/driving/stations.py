@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.building import build_agent, build_rig
+from eidrive_scenario.driving.building import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.declared import declared_detectors, declared_encoders, declared_settings
 from eidrive_scenario.driving.overrides import HeldControls, Overrides
 from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
@@ -39,6 +39,8 @@ class Stations:
     channel    profile that wins over what the file says; None leaves it to the file
     detector   for all stations; None leaves it to their controllers
     cooperate  the senders whom listening stations hear; None leaves it to their controllers
+    load_weights       whether detectors load their weights, which `eidrive check` does not
+    allow_torchscript  whether weights may be TorchScript, which can execute any code
 
     Raises SettingError if a controller's properties, the channel or one of these options is wrong.
     """
@@ -53,6 +55,8 @@ class Stations:
         channel: str | Path | None = None,
         detector: str | None = None,
         cooperate: tuple[str, ...] | None = None,
+        load_weights: bool = True,
+        allow_torchscript: bool = False,
     ) -> None:
         self._scenario = scenario
         self._roads = roads
@@ -79,7 +83,11 @@ class Stations:
         self._settings = declared_settings(scenario, detector, cooperate)
         self.channel_profile: ChannelProfile | None = None
         """The profile of the channel; None where there is none."""
-        self._detectors = declared_detectors(scenario, self._settings, detector)
+        self._load_weights = load_weights
+        self._allow_torchscript = allow_torchscript
+        self._detectors = declared_detectors(
+            scenario, self._settings, detector, load_weights=load_weights, allow_torchscript=allow_torchscript
+        )
         """Built beforehand, as what they cannot work with shall be told before the run."""
         self._encoders = declared_encoders(scenario, self._settings)
         if channel is not None:
@@ -105,6 +113,9 @@ class Stations:
         if settings is None:
             return
         self._rigs[spec.name] = build_rig(settings, spec, seed=self._seed)
+        detector = self._detectors.pop(spec.name, None) or build_detector(settings)
+        if self._load_weights:
+            detector.load_weights(allow_torchscript=self._allow_torchscript)
         self._agents[spec.name] = build_agent(
             settings,
             spec,
@@ -112,7 +123,7 @@ class Stations:
             seed=self._seed,
             dt=self._dt,
             own_perception=self._own_perception,
-            detector=self._detectors.pop(spec.name, None),
+            detector=detector,
             encoder=self._encoders.get(spec.name),
         )
         unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.sees_signals

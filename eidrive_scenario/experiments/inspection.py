@@ -6,7 +6,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.driving.declared import torchscript_warnings
+from eidrive_scenario.errors import InputError, Problem, capped
 from eidrive_scenario.experiments.rules import broken_rules, check_names
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.openscenario.catalog_check import check_catalog
@@ -43,11 +44,12 @@ def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
     for level, problem in broken_rules(scenario, ignored):
         found[level].append(problem)
     try:
-        Simulation(scenario).close()
+        Simulation(scenario, load_weights=False).close()
+        found[Level.WARNING] += torchscript_warnings(scenario)
     except InputError as error:
         known = [replace(problem, rule="") for problem in found[Level.ERROR]]
         found[Level.ERROR] += [problem for problem in error.problems if problem not in known]
-    problems, warnings, notes = (tuple(in_order(problems)) for problems in found.values())
+    problems, warnings, notes = (tuple(capped(in_order(problems))) for problems in found.values())
     return Findings(problems, warnings, notes=notes)
 
 
@@ -71,4 +73,4 @@ def inspect_roads(path: Path, ignored: Collection[str] = ()) -> Findings:
     except InputError as error:
         return Findings(error.problems)
     doubts = [problem for problem in roads.doubts if problem.rule not in ignored]
-    return Findings((), tuple(sorted(doubts, key=lambda problem: problem.line or 0)))
+    return Findings((), tuple(capped(sorted(doubts, key=lambda problem: problem.line or 0))))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.errors import Problem, ScenarioError, quoted, shortened, suggestion
+from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import LIBRARY_FOLDER, library_path, place_of
+from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
 from eidrive_scenario.openscenario.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
@@ -67,7 +70,11 @@ class CatalogLibrary:
             if not all(isinstance(name, str) for name in names):
                 continue
             if names in active:
-                self._wrong(reference, f"the catalog entry {names[1]!r} refers to itself", "break the circle")
+                self._wrong(reference, f"the catalog entry {quoted(names[1])} refers to itself", "break the circle")
+                self._circular.add(reference)
+                continue
+            if len(active) >= MAX_NESTED_REFERENCES:
+                self._wrong(reference, f"entries of catalogs are nested more than {len(active)} deep", "flatten them")
                 self._circular.add(reference)
                 continue
             if reference not in self.entries:
@@ -92,7 +99,7 @@ class CatalogLibrary:
         if node is None:
             self._wrong(
                 reference,
-                f"the catalog {catalog.name!r} has no entry {reference.entry_name!r}",
+                f"the catalog {quoted(catalog.name)} has no entry {quoted(reference.entry_name)}",
                 suggestion(reference.entry_name, catalog.entries),
             )
             return None
@@ -103,12 +110,17 @@ class CatalogLibrary:
         if rule is None:
             self._wrong(reference, f"{node.tag} is nothing that a catalog may hold", str(catalog.document.name))
             return None
+        try:
+            self._findings.budget.enter_catalog_element(sum(1 for _ in node.iter()))
+        except BudgetError as error:
+            problem = Problem(str(error), "use fewer or smaller entries", reference.source, reference.line)
+            raise ScenarioError([*self._findings.problems, problem]) from error
         reader = Reader(catalog.document.name, catalog.version, self._findings)
-        lent = Scope(parameters=dict(self._parameters), lent=set())
+        lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._findings.budget)
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
         for name in sorted(lent.lent or ()):
             self._findings.warn(
-                f"the catalog entry {reference.entry_name!r} uses the scenario's parameter {name!r}",
+                f"the catalog entry {quoted(reference.entry_name)} uses the scenario's parameter {quoted(name)}",
                 "declare it in the entry and assign it where the entry is used",
                 source=entry.source,
                 line=entry.line,
@@ -122,7 +134,7 @@ class CatalogLibrary:
             wanted = " or ".join(kind.__name__ for kind in found.kinds)
             self._wrong(
                 found.reference,
-                f"the catalog entry {found.reference.entry_name!r} is of the kind {type(entry).__name__}",
+                f"the catalog entry {quoted(found.reference.entry_name)} is of the kind {type(entry).__name__}",
                 f"{wanted} is wanted here",
             )
 
@@ -132,7 +144,7 @@ class CatalogLibrary:
         places = self._ordered_places(found.kinds)
         if not places:
             wanted = " or ".join(f"{kind.__name__}Catalog" for kind in found.kinds)
-            self._wrong(found.reference, f"no place is given for the catalog {name!r}", f"add {wanted}")
+            self._wrong(found.reference, f"no place is given for the catalog {quoted(name)}", f"add {wanted}")
             return None
         catalogs: dict[Path, CatalogFile] = {}
         unreadable: list[Problem] = []
@@ -149,15 +161,15 @@ class CatalogLibrary:
             return None
         for path, catalog in catalogs.items():
             if path.stem == name:
-                message = f"the catalog in {path.name} is named {catalog.name!r}"
+                message = f"the catalog in {path.name} is named {quoted(catalog.name)}"
                 line = line_of(catalog.document.root)
-                self._findings.warn(message, f"name it {name!r}", source=catalog.document.name, line=line)
+                self._findings.warn(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
                 return catalog
         beside = self._beside(name)
         if beside is not None:
             place = Path(beside.document.name).parent
             self._findings.warn(
-                f"the catalog {name!r} lies in none of the places given, but in {place}",
+                f"the catalog {quoted(name)} lies in none of the places given, but in {place}",
                 f"name that place, {place}",
                 source=found.reference.source,
                 line=found.reference.line,
@@ -171,13 +183,13 @@ class CatalogLibrary:
         folders = {
             folder
             for place in self._places.values()
-            if place.is_dir()
+            if is_folder(place)
             for folder in place.parent.iterdir()
-            if folder.is_dir() and folder not in self._places.values()
+            if is_folder(folder) and folder not in self._places.values()
         }
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
-            catalog = self._file(path) if path.is_file() else None
+            catalog = self._file(path) if is_regular_file(path) else None
             self._findings.problems.extend(self._unreadable.get(path, ()))
             if catalog is not None and catalog.name == name:
                 return catalog
@@ -239,11 +251,11 @@ def twins_in(catalog: etree._Element, source: str) -> dict[str, Problem]:
 
 def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, str]:
     """What is wrong where a catalog is in none of the places given, and what would be right."""
-    gone = [str(place) for place in places if not place.exists()]
-    message = f"no catalog {name!r} in " + ", ".join(str(place) for place in places)
+    gone = [shortened(str(place), 300) for place in places if not os.path.exists(place)]
+    message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(place), 300) for place in places)
     if gone:
         remedy = "correct the Directory"
-        if (library_path() / "catalogs" / f"{name}.xosc").is_file():
+        if is_regular_file(library_path() / "catalogs" / f"{name}.xosc"):
             remedy += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
         return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", remedy
     return message, suggestion(name, known)
@@ -261,8 +273,8 @@ def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
 def _candidates(places: Iterable[Path], name: str) -> Iterator[Path]:
     """Files that may hold a catalog of that name, the likely ones first."""
     for place in places:
-        if place.is_file():
+        if is_regular_file(place):
             yield place
-        elif place.is_dir():
+        elif is_folder(place):
             files = sorted(place.glob("*.xosc"))
             yield from sorted(files, key=lambda file: file.stem != name)

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import simpleeval
 
-from eidrive_scenario.errors import suggestion
+from eidrive_scenario.errors import quoted, suggestion
 
 Value: TypeAlias = float | int | bool | str
 
@@ -94,7 +94,7 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"the expression has {len(text)} characters", f"at most {MAX_LENGTH} are allowed")
     if _GLUED.search(text):
-        raise ExpressionError(f"{text!r} is not an expression", "a number ends before a word begins")
+        raise ExpressionError(f"{quoted(text)} is not an expression", "a number ends before a word begins")
     source = _PARAMETER.sub(rf" {_PREFIX}\1 ", text).strip()
     names = {_PREFIX + name: _number(name, value) for name, value in parameters.items()}
     evaluator = simpleeval.SimpleEval(
@@ -105,14 +105,14 @@ def evaluate(text: str, parameters: Mapping[str, Value]) -> float | int | bool:
         _check(tree, text)
         result = evaluator.eval(source, previously_parsed=tree.body)
         if not isinstance(result, int | float) or not math.isfinite(result):
-            raise ExpressionError(f"the expression {text!r} has no finite value")
+            raise ExpressionError(f"the expression {quoted(text)} has no finite value")
         return result
     except ExpressionError:
         raise
     except (ArithmeticError, ValueError) as error:
-        raise ExpressionError(f"the expression {text!r} has no value: {error}") from error
+        raise ExpressionError(f"the expression {quoted(text)} has no value: {error}") from error
     except (SyntaxError, Warning, TypeError, simpleeval.InvalidExpression, RecursionError, MemoryError) as error:
-        raise ExpressionError(f"{text!r} is not an expression", HELP) from error
+        raise ExpressionError(f"{quoted(text)} is not an expression", HELP) from error
 
 
 def concatenate(text: str, parameters: Mapping[str, str]) -> str:
@@ -154,10 +154,10 @@ def _check(tree: ast.Expression, text: str) -> None:
             allowed = isinstance(node, _NODES)
         if not allowed:
             what = type(node).__name__
-            raise ExpressionError(f"{text!r} is not an expression of the standard: {what} is not part of it")
+            raise ExpressionError(f"{quoted(text)} is not an expression of the standard: {what} is not part of it")
         if isinstance(node, ast.Name) and not node.id.startswith(_PREFIX):
             known = FUNCTIONS if id(node) in called else CONSTANTS
             if node.id not in known:
                 kind = "function" if id(node) in called else "word"
                 remedy = suggestion(node.id, known) if kind == "function" else "a parameter begins with $"
-                raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {text!r}", remedy)
+                raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {quoted(text)}", remedy)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Problem, quoted, shortened, suggestion
 from eidrive_scenario.openscenario import expressions
+from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
 from eidrive_scenario.openscenario.expressions import ExpressionError, Value
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
@@ -87,6 +88,12 @@ class Scope:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     lent: set[str] | None = None
     """Where another file's parameters are lent to this one: those that it has made use of."""
+    budget: Budget = field(default_factory=Budget)
+    """What the texts of expressions may add up to."""
+
+    def inner(self) -> Scope:
+        """A scope within this one."""
+        return Scope(self, budget=self.budget)
 
     def find(self, name: str) -> Parameter:
         """The parameter of that name. Raises ExpressionError."""
@@ -100,7 +107,7 @@ class Scope:
                     scope.lent.add(name)
                 return found
             scope = scope.outer
-        raise ExpressionError(f"unknown parameter ${name}", suggestion(name, self.names()))
+        raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
     def names(self) -> set[str]:
         """All names that are visible here."""
@@ -111,11 +118,11 @@ class Scope:
         match = REFERENCE.fullmatch(text)
         if match:
             parameter = self.find(match.group(1))
-            return self._convert(parameter.text, scalar, f"${parameter.name} is {parameter.text!r}")
+            return self._convert(parameter.text, scalar, f"${parameter.name} is {quoted(parameter.text)}")
         if not (text.startswith("${") and text.endswith("}") and scalar.takes_expressions):
             return scalar.convert(text)
         if scalar is not STRING and not EXPRESSION.fullmatch(text):
-            raise ExpressionError(f"{text!r} holds characters that an expression may not have", expressions.HELP)
+            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
         return self._evaluated(text[2:-1], scalar)
 
     def evaluate(self, text: str) -> Value:
@@ -140,9 +147,17 @@ class Scope:
         used = {name: self.find(name) for name in expressions.parameters_of(text)}
         operands = {name: parameter.operand for name, parameter in used.items()}
         if scalar is STRING and expressions.joins_text(text, operands):
-            return expressions.concatenate(text, {name: parameter.text for name, parameter in used.items()})
+            return self._joined(text, {name: parameter.text for name, parameter in used.items()})
         result = written(expressions.evaluate(text, operands))
-        return self._convert(result, scalar, f"the expression {text!r} is {result}")
+        return self._convert(result, scalar, f"the expression {quoted(text)} is {result}")
+
+    def _joined(self, text: str, values: Mapping[str, str]) -> str:
+        length = len(text) + sum(len(values[name]) for name in expressions.parameters_of(text))
+        try:
+            self.budget.join(length)
+        except BudgetError as error:
+            raise ExpressionError(f"the expression {quoted(text)} is too long: {error}", "join less") from error
+        return expressions.concatenate(text, values)
 
     def _convert(self, text: str, scalar: Scalar, what: str) -> Any:
         try:
@@ -169,22 +184,24 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
         findings.warn(
             f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
-            f"{declaration.value!r}",
+            f"{quoted(declaration.value)}",
             "it is taken as a text",
             source=declaration.source,
             line=declaration.line,
         )
         scalar = STRING
     try:
+        if len(text) > MAX_TEXT:
+            raise ValueError(f"at most {MAX_TEXT} characters are read")
         value = scalar.convert(text)
     except ValueError as error:
         findings.error(
-            f"the parameter {name!r} is {text!r}, which is not {scalar.name}",
+            f"the parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
             str(error),
             source=place.source,
             line=place.line,
         )
-        scope.parameters[name] = Parameter(name, text, text, declaration.value, sound=False)
+        scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, sound=False)
         return
     scope.parameters[name] = Parameter(name, text, value, declaration.value)
     groups = declaration.constraint_group
@@ -199,7 +216,7 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
             " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
         )
         findings.rule_out(
-            f"the parameter {name!r} is {text!r}, outside its constraints",
+            f"the parameter {name!r} is {quoted(text)}, outside its constraints",
             f"it has to be {allowed}",
             source=place.source,
             line=place.line,

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 from xml.etree import ElementTree
-from xml.parsers import expat
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, ScenarioError
-from eidrive_scenario.xml_lines import parse_numbered
+from eidrive_scenario.errors import Problem, ScenarioError, shortened
+from eidrive_scenario.files import MIB, read_regular_file, reason_of
+from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 
 
 class WrittenInPython(Protocol):
@@ -28,10 +28,8 @@ Source: TypeAlias = (
     "WrittenInPython"
 )
 
-MAX_BYTES = 64 * 2**20
-"""Size of a file."""
-MAX_DEPTH = 100
-"""Levels of elements."""
+LIMITS = XmlLimits(max_bytes=64 * MIB, max_nodes=2_000_000)
+"""Limits of a scenario, a catalog and a parameter value distribution."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +51,6 @@ class Document:
     digest: str = ""
 
 
-class _PrologEnds(Exception):
-    """The first element has begun: nothing dangerous can follow."""
-
-
 def open_document(source: Source) -> Document:
     """Parses a file, its bytes, or takes a tree that is parsed already. Raises ScenarioError with file:line."""
     if isinstance(source, bytes):
@@ -65,12 +59,10 @@ def open_document(source: Source) -> Document:
         return _from_tree(source)
     path = Path(source)
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ScenarioError(Problem(f"the file is larger than {MAX_BYTES // 2**20} MiB", "split it", str(source)))
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ScenarioError(Problem(f"cannot be read: {reason}", "check the path", str(source))) from error
+        content = read_regular_file(path, LIMITS.max_bytes)
+    except OSError as error:
+        problem = Problem(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(source)))
+        raise ScenarioError(problem) from error
     return Document(parse(content, str(source)), str(source), path, path.parent, digest=_digest(content))
 
 
@@ -79,7 +71,7 @@ def text_of(source: Source) -> bytes:
     if isinstance(source, bytes):
         return source
     if isinstance(source, str | Path):
-        return Path(source).read_bytes()
+        return read_regular_file(source, LIMITS.max_bytes)
     return etree.tostring(open_document(source).root, encoding="utf-8", xml_declaration=True)
 
 
@@ -142,19 +134,7 @@ def _texts_only(node: ElementTree.Element, name: str) -> None:
 
 def parse(content: bytes, name: str) -> etree._Element:
     """The root element of an XML file's bytes. Raises ScenarioError with file:line."""
-    if len(content) > MAX_BYTES:
-        raise ScenarioError(Problem(f"the file is larger than {MAX_BYTES // 2**20} MiB", "split it", name))
-    _refuse_document_type(content, name)
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
-    try:
-        root = parse_numbered(content, parser)
-    except etree.XMLSyntaxError as error:
-        raise ScenarioError(_not_well_formed(error.msg, error.lineno, name)) from error
-    too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)
-    if too_deep is not None:
-        problem = Problem(f"elements are nested more than {MAX_DEPTH} deep", "flatten them", name, line_of(too_deep))
-        raise ScenarioError(problem)
-    return root
+    return parse_untrusted(content, name, LIMITS, ScenarioError)
 
 
 def _digest(content: bytes) -> str:
@@ -164,35 +144,3 @@ def _digest(content: bytes) -> str:
 def line_of(node: etree._Element) -> int | None:
     """The line where an element begins."""
     return cast("int | None", node.sourceline)
-
-
-def _refuse_document_type(content: bytes, name: str) -> None:
-    """Reads no further than to the first element; a document type, where entities are declared, ends it at once."""
-    parser = expat.ParserCreate()
-
-    def document_type(*_: object) -> None:
-        raise ScenarioError(
-            Problem(
-                "the file has a document type declaration (DOCTYPE), which may bring in entities and other files",
-                "remove it; OpenSCENARIO needs none",
-                name,
-                parser.CurrentLineNumber,
-            )
-        )
-
-    def first_element(*_: object) -> None:
-        raise _PrologEnds
-
-    parser.StartDoctypeDeclHandler = document_type
-    parser.StartElementHandler = first_element
-    try:
-        parser.Parse(content, True)
-    except _PrologEnds:
-        return
-    except expat.ExpatError as error:
-        raise ScenarioError(_not_well_formed(expat.ErrorString(error.code), error.lineno, name)) from error
-
-
-def _not_well_formed(what: str | None, line: int | None, name: str) -> Problem:
-    remedy = "every tag has to be closed, every value quoted, & written as &amp;"
-    return Problem(f"not well-formed XML: {what or 'unreadable'}", remedy, name, line)

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Problem, quoted, suggestion
 from eidrive_scenario.openscenario.expressions import ExpressionError
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
@@ -79,7 +79,7 @@ class Reader:
         self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
         self._with_space = set(cast(list[etree._Element], _WITH_SPACE(node)))
         open_assignments = dict(assignments or {})
-        element = self._element(node, cls, lent or Scope(), open_assignments)
+        element = self._element(node, cls, lent or Scope(budget=self.findings.budget), open_assignments)
         self._unknown_parameters(open_assignments, ())
         return element
 
@@ -92,7 +92,7 @@ class Reader:
         if "ParameterDeclarations" in known.children:
             declarations = next((child for child in below if child.tag == "ParameterDeclarations"), None)
             if declarations is not None:
-                scope = Scope(scope)
+                scope = scope.inner()
                 self.declared = self.declared or scope
                 values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
         self._attributes(node, known, scope, values)
@@ -141,7 +141,8 @@ class Reader:
                 value = float(text)
                 self._by_python(name, node, text, "as Python writes infinity; it is taken so", f"write {text.upper()}")
             else:
-                self._error(f"{name} of {node.tag} is {text!r}, which is not {rule.scalar.name}", str(error), node)
+                message = f"{name} of {node.tag} is {quoted(text)}, which is not {rule.scalar.name}"
+                self._error(message, str(error), node)
         if rule.deprecated:
             self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
         if isinstance(value, Enumeration) and rule.scalar.is_deprecated(value):
@@ -156,7 +157,7 @@ class Reader:
         if text.startswith("${") and self.version < (1, 1):
             if rule.scalar is STRING:
                 return text
-            raise ExpressionError(f"{text!r} is an expression", "OpenSCENARIO has them since 1.1")
+            raise ExpressionError(f"{quoted(text)} is an expression", "OpenSCENARIO has them since 1.1")
         return scope.resolve(text, rule.scalar)
 
     def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
@@ -256,7 +257,7 @@ class Reader:
 
     def _by_python(self, name: str, node: etree._Element, text: str, what: str, remedy: str) -> None:
         """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
-        message = f"{name} of {node.tag} is {text!r}, {what}"
+        message = f"{name} of {node.tag} is {quoted(text)}, {what}"
         self.findings.warn(message, remedy, source=self.source, line=line_of(node))
 
     def _deprecated(self, what: str, since: str, node: etree._Element) -> None:

@@ -86,4 +86,6 @@ def without(scope: Scope | None, names: Iterable[str]) -> Scope | None:
         return None
     hidden = set(names)
     outer = without(scope.outer, hidden)
-    return Scope(outer, {name: one for name, one in scope.parameters.items() if name not in hidden}, scope.lent)
+    return Scope(
+        outer, {name: one for name, one in scope.parameters.items() if name not in hidden}, scope.lent, scope.budget
+    )

@@ -6,7 +6,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from eidrive_scenario.errors import suggestion
+from eidrive_scenario.errors import shortened, suggestion
+from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import File, RoadNetwork
@@ -26,10 +27,10 @@ def find_road_file(network: RoadNetwork | None, folder: Path, findings: Findings
     if logic is None or not isinstance(logic.filepath, str) or not logic.filepath.strip():
         return None
     for candidate in _candidates(logic, folder):
-        if candidate.is_file():
+        if is_regular_file(candidate):
             return candidate
     findings.error(
-        f"no road file '{logic.filepath}' {_from(folder)} nor in the folders of {MAPS}",
+        f"no road file '{shortened(logic.filepath, 300)}' {_from(folder)} nor in the folders of {MAPS}",
         _remedy(logic, folder),
         source=logic.source,
         line=logic.line,
@@ -57,7 +58,7 @@ def _map_folders() -> list[Path]:
 def _remedy(logic: File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
-    known = {file.stem for place in places if place.is_dir() for file in place.glob(f"*{SUFFIX}")}
+    known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{SUFFIX}")}
     if known:
         return suggestion(named.name.removesuffix(SUFFIX), known)
     return f"check LogicFile, or set {MAPS} to where the maps lie"

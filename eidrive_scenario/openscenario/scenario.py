@@ -135,7 +135,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         assigned=assignments,
         digest=document.digest,
         catalogs=library.digests,
-        scope=Scope(parameters=dict(read.parameters)),
+        scope=Scope(parameters=dict(read.parameters), budget=findings.budget),
     )
 
 

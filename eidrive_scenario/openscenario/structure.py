@@ -12,6 +12,9 @@ from eidrive_scenario.openscenario.matching import Automaton
 from eidrive_scenario.openscenario.scalars import Version, availability
 from eidrive_scenario.openscenario.schema import Rules, rules
 
+_LONGEST_NAME = 100
+"""Characters of a name that are compared with others."""
+
 Report = Callable[[str, str, etree._Element], None]
 """Takes what is wrong, the remedy, and the element where it is."""
 
@@ -29,7 +32,7 @@ def check_children(
             standing.append((child.tag, child))
             continue
         report(f"unknown element {child.tag} in {node.tag}", _instead(node, child.tag, known, version), child)
-        meant = difflib.get_close_matches(child.tag, known.children, n=1)
+        meant = difflib.get_close_matches(child.tag[:_LONGEST_NAME], known.children, n=1)
         standing.extend((name, child) for name in meant)
     if known.order is None:
         _check_each_once(node, standing, known, report)

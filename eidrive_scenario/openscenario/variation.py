@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import Problem, SettingError, quoted, suggestion
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.references import resolve_references, without
 from eidrive_scenario.openscenario.scenario import Scenario
@@ -60,7 +60,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
         if not isinstance(data, dict):
             raise SettingError(
                 Problem(
-                    f"{COMMAND} holds {data!r}",
+                    f"{COMMAND} holds {quoted(data)}",
                     "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}",
                     action.source,
                     action.line,
@@ -81,7 +81,7 @@ def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, sp
     if name not in scenario.parameters:
         raise SettingError(
             Problem(
-                f"{COMMAND} names the undeclared parameter {name!r}",
+                f"{COMMAND} names the undeclared parameter {quoted(name)}",
                 suggestion(name, scenario.parameters),
                 action.source,
                 action.line,

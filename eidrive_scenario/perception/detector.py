@@ -32,8 +32,9 @@ class Detector(ABC):
 
     A class is registered in the entry points `eidrive_scenario.detectors`. It is built as `cls()`, or as
     `cls(settings)` where it has a `settings_type`: an instance of that, read from the controller's property
-    `detector_settings`. It may raise SettingError while it is built. Then `install` is called once, and `detect` in
-    each tick in which all kinds of sensors in `needs` were read.
+    `detector_settings`. It may raise SettingError while it is built. Then `load_weights` is called before a run, but
+    not by `eidrive check`; then `install` is called once, and `detect` in each tick in which all kinds of sensors in
+    `needs` were read.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset()
@@ -49,6 +50,12 @@ class Detector(ABC):
     """What the property `detector_settings` may say; nothing where None."""
     pictures: Mapping[str, ImageDetections] = MappingProxyType({})
     """What it found in the last picture of each camera, if it looks at pictures: they are kept with the boxes."""
+
+    def load_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - a hook that most do not need
+        """Load what the detector computes with, such as the weights of a network. May raise SettingError.
+
+        `allow_torchscript`: whether the user lets files of weights execute code.
+        """
 
     def install(self, installation: Installation) -> None:  # noqa: B027 - a hook that most do not need
         """Learn where it works, before the first reading."""

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.files import MIB, is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.v2x.message import Message, StationState
 
 TYPES = {"cam": "CAM", "cpm": "CPM"}
@@ -30,6 +31,8 @@ _METRES_PER_DEGREE = 111_319.49
 """Along the equator, about which the plane of the world is put."""
 
 
+MAX_BYTES = MIB
+"""Size of an ASN.1 module."""
 ROADSIDE = "misc"
 """The class of stations that are no vehicles: roadside units."""
 
@@ -57,14 +60,19 @@ class Asn1Encoder:
             remedy = "install it: pip install 'eidrive-scenario[asn1]'"
             raise SettingError(Problem("asn1_files needs the package asn1tools", remedy, source, line)) from error
         for file in files:
-            if not file.is_file():
-                problem = Problem(f"no ASN.1 module {str(file)!r}", "give the path of a file", source, line)
+            if not is_regular_file(file):
+                problem = Problem(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
                 raise SettingError(problem)
         try:
-            self._modules = asn1tools.compile_files([str(file) for file in files], "uper")
-        except (asn1tools.CompileError, asn1tools.ParseError, UnicodeDecodeError) as error:
+            texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
+            self._modules = asn1tools.compile_string("\n".join(texts), "uper")
+        except OSError as error:
+            problem = Problem(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
+            raise SettingError(problem) from error
+        except (asn1tools.CompileError, asn1tools.ParseError, RecursionError, ArithmeticError, LookupError) as error:
             names = ", ".join(str(file) for file in files)
-            raise SettingError(Problem(f"{names}: {error}", "correct the module", source, line)) from error
+            message = f"{names}: {_without_quotes(error)}"
+            raise SettingError(Problem(message, "correct the module", source, line)) from error
         self._error: type[Exception] = asn1tools.EncodeError
         for kind in kinds:
             if TYPES[kind] not in self._modules.types:
@@ -103,6 +111,12 @@ class Asn1Encoder:
     def decode(self, kind: str, data: bytes) -> Any:
         """What such a message says, as asn1tools has it."""
         return self._modules.decode(TYPES[kind], data)
+
+
+def _without_quotes(error: Exception) -> str:
+    """What asn1tools says, without the line of the file that it quotes: the path may lead to a file of another kind."""
+    place = re.search(r"line (\d+)", str(error))
+    return "not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
 
 
 def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -10,8 +10,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, NonNegativeFloat, model_validator
 
+from eidrive_scenario.errors import quoted, shortened
+from eidrive_scenario.files import MIB, read_regular_file, reason_of
 from eidrive_scenario.settings import Settings
 
+MAX_BYTES = 32 * MIB
+"""Size of a file of measured delays."""
 UNITS = {"s": 1.0, "ms": 1e-3}
 
 
@@ -74,36 +78,41 @@ class TraceDelay(Settings):
 def _column(path: Path, column: object) -> list[float]:
     """The numbers in a column of a CSV file; a first row of words names the columns. Raises ValueError."""
     if not isinstance(column, str | int) or isinstance(column, bool):
-        raise ValueError(f"the column is {column!r}; give its name, or its number from 0 on")
+        raise ValueError(f"the column is {quoted(column)}; give its name, or its number from 0 on")
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader if row]
+        text = read_regular_file(path, MAX_BYTES).decode("utf-8")
+        reader = csv.reader(text.splitlines(keepends=True))
+        rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+        reason = "it is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
+        raise ValueError(f"cannot read {_shown(path)}: {reason}") from error
     if not rows:
-        raise ValueError(f"{path} is empty")
+        raise ValueError(f"{_shown(path)} is empty")
     header = [cell.strip() for cell in rows[0][1]]
     if isinstance(column, str):
         if column not in header:
-            raise ValueError(f"{path} has no column {column!r}; it has {', '.join(header)}")
+            raise ValueError(f"{_shown(path)} has no column {quoted(column)} in its first row")
         place = header.index(column)
     else:
         place = column
     if not 0 <= place < len(header):
-        raise ValueError(f"{path} has no column {place}; it has {len(header)}, from 0 on")
+        raise ValueError(f"{_shown(path)} has no column {quoted(place)}; it has {len(header)}, from 0 on")
     body = rows[1:] if isinstance(column, str) or not _is_number(header[place]) else rows
     if not body:
-        raise ValueError(f"{path} has no delays")
+        raise ValueError(f"{_shown(path)} has no delays")
     values = []
     for number, row in body:
+        # The row is not quoted: the path may lead to a file of another kind.
         if place >= len(row) or not _is_number(row[place]):
-            found = row[place] if place < len(row) else "nothing"
-            raise ValueError(f"{path}:{number}: {found!r} is no delay")
+            raise ValueError(f"{_shown(path)}:{number}: column {place} holds no delay")
         if float(row[place]) < 0.0:
-            raise ValueError(f"{path}:{number}: a delay is not negative, found {row[place]}")
+            raise ValueError(f"{_shown(path)}:{number}: a delay is negative")
         values.append(float(row[place]))
     return values
+
+
+def _shown(path: Path) -> str:
+    return shortened(str(path), 200)
 
 
 def _is_number(text: str) -> bool:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
+from eidrive_scenario.errors import Problem, RegistryError, SettingError, quoted, suggestion
+from eidrive_scenario.files import is_regular_file
 from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.openscenario.references import is_reference, resolve_references
 from eidrive_scenario.registry import registry
@@ -70,10 +70,11 @@ def load_profile(
     path = _find(source, folders)
     if path is None:
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
-        what = f"no file {str(source)!r}" if source.suffix in SUFFIXES else f"no channel profile {str(source)!r}"
+        kind = "file" if source.suffix in SUFFIXES else "channel profile"
+        what = f"no {kind} {quoted(str(source))}"
         remedy = suggestion(source.stem, names)
-        if os.path.isfile(source):
-            what, remedy = f"the file {str(source)!r} is no channel profile", "give one that ends in .yaml"
+        if is_regular_file(source):
+            what, remedy = f"the file {quoted(str(source))} is no channel profile", "give one that ends in .yaml"
         raise SettingError(Problem(what, remedy, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
@@ -106,7 +107,7 @@ def _find(source: Path, folders: Sequence[Path]) -> Path | None:
         candidates = [source, *(folder / source for folder in folders)]
     else:
         candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
-    return next((path for path in candidates if os.path.isfile(path)), None)
+    return next((path for path in candidates if is_regular_file(path)), None)
 
 
 def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -122,7 +123,7 @@ def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        found = f"found {data!r}" if data is not None else "it is empty"
+        found = f"found {type(data).__name__}" if data is not None else "it is empty"
         raise SettingError(Problem(f"a channel profile is a mapping, {found}", "write `model: composed`", source, line))
     return data
 
@@ -142,7 +143,7 @@ def _parse(
     models = registry("channels")
     if not isinstance(model, str) or model not in models:
         problem = Problem(
-            f"unknown channel model {model!r}", suggestion(str(model), models), source, lines.get("model", line)
+            f"unknown channel model {quoted(model)}", suggestion(str(model), models), source, lines.get("model", line)
         )
         raise SettingError(problem)
     settings = getattr(models.load(model), "settings", None)

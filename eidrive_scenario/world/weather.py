@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
@@ -128,9 +128,7 @@ def load_weather(source: str | Path, *, origin: str = "") -> Weather:
         raise SettingError([replace(problem, source=origin) for problem in error.problems]) from error
     data, lines = load_yaml_file(path)
     if not isinstance(data, Mapping):
-        found: Any = "nothing" if data is None else data
-        raise SettingError(
-            Problem(f"a weather is a mapping, found {found!r}", "write `cloud_cover: 0.5`", str(path), 1)
-        )
+        found = "nothing" if data is None else type(data).__name__
+        raise SettingError(Problem(f"a weather is a mapping, found {found}", "write `cloud_cover: 0.5`", str(path), 1))
     weather = parse_settings(Weather, data, source=str(path), line=1, lines=lines)
     return weather if weather.name else weather.model_copy(update={"name": path.stem})

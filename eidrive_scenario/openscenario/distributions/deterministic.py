@@ -9,7 +9,6 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from typing import Protocol
 
@@ -131,12 +130,14 @@ def combinations_of(deterministic: Deterministic, findings: Findings) -> Combina
             if choices is not None:
                 found.append(choices)
     varied_once(((name, origin) for one in found for name, origin in one.names.items()), findings)
-    combinations = Combinations(tuple(found))
-    if combinations.count > sys.maxsize:
-        message = f"the distribution unfolds into {Decimal(combinations.count):.1e} runs"
+    magnitude = sum(math.log10(one.count) for one in found if one.count)
+    if magnitude > math.log10(sys.maxsize):
+        count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
+        message = f"the distribution unfolds into {count} runs"
         remedy = "take wider steps in its ranges"
         findings.error(message, remedy, source=deterministic.source, line=deterministic.line)
-    return combinations
+        return Combinations(())
+    return Combinations(tuple(found))
 
 
 def varied_once(names: Iterable[tuple[str, Problem]], findings: Findings) -> None:

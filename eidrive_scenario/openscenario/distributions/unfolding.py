@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import overload
 
-from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.errors import Problem, ScenarioError, quoted, suggestion
+from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.distributions.deterministic import Combinations, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import Draws, draws_of
@@ -123,10 +124,10 @@ def _varied(distribution: ParameterValueDistribution, seed: float, findings: Fin
 
 def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Path:
     path = place_of(given.filepath.strip().replace("\\", "/"), folder)
-    if not path.is_file():
-        beside = path.parent.glob("*.xosc") if path.parent.is_dir() else ()
+    if not is_regular_file(path):
+        beside = path.parent.glob("*.xosc") if is_folder(path.parent) else ()
         report(
-            f"no scenario {given.filepath!r}",
+            f"no scenario {quoted(given.filepath)}",
             suggestion(path.stem, {file.stem for file in beside}),
             source=given.source,
             line=given.line,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import cast
 from lxml import etree
 
 from eidrive_scenario.errors import Problem
+from eidrive_scenario.files import absolute
 from eidrive_scenario.openscenario.catalogs import catalog_place
 from eidrive_scenario.openscenario.lint.rule import at
 from eidrive_scenario.openscenario.lint.survey import Survey
@@ -103,15 +105,15 @@ def unused_catalogs(survey: Survey) -> Iterator[Problem]:
     if locations is None:
         return
     folder = path.parent if path is not None else Path()
-    used = {Path(entry.source).resolve() for entry in survey.scenario.entries.values()}
+    used = {absolute(entry.source) for entry in survey.scenario.entries.values()}
     for location in locations.children():
         kind = type(location).__name__.removesuffix("Location")
         directory = getattr(location, "directory", None)
         if directory is None:
             continue
-        place = catalog_place(directory.path, folder).resolve()
+        place = absolute(catalog_place(directory.path, folder))
         if not any(file == place or file.parent == place for file in used):
-            gone = "" if place.exists() else ", which is not there,"
+            gone = "" if os.path.exists(place) else ", which is not there,"
             yield at(location, f"nothing is taken from the {kind} {directory.path!r}{gone}".rstrip(","), "take it out")
 
 

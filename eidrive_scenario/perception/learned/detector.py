@@ -5,19 +5,25 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, PositiveInt, model_validator
+from pydantic import Field, model_validator
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, SettingError, quoted
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.learned.classes import misspelt, object_category
 from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork, Layout
 from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
+from eidrive_scenario.perception.learned.weight_files import (
+    TORCHSCRIPT_SUFFIX,
+    check_weights_exist,
+    refused_torchscript,
+    torchscript_is_allowed,
+)
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.surroundings import Surroundings
@@ -26,18 +32,22 @@ from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Sen
 from eidrive_scenario.settings import Settings
 
 SHIPPED = Path(__file__).parents[1] / "weights"
-OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", ".pt")
+OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
 
 USUAL_CONFIDENCE = 0.35
 SAME_PLACE = 0.1
 """Lifted boxes that overlap this much in plan view are one object; the surer one counts."""
 
 
+Side = Annotated[int, Field(ge=1, le=8192)]
+"""Width or height of a network's input [px]."""
+
+
 class LearnedSettings(Settings):
     """What the property `detector_settings` may say.
 
     weights      a file, seen from the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or
-                 a TorchScript model (.pt); None is what is shipped
+                 a TorchScript model (.pt), which is loaded only where the user allows it; None is what is shipped
     classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
                  and how its output is laid out, where the shape does not tell
     letterbox    of an .onnx or .pt: whether it takes pictures in their own shape, with grey margins; else stretched
@@ -46,12 +56,12 @@ class LearnedSettings(Settings):
     """
 
     weights: str | None = None
-    classes: tuple[str, ...] | None = None
-    input_size: tuple[PositiveInt, PositiveInt] | None = None
+    classes: Annotated[tuple[str, ...], Field(max_length=10_000)] | None = None
+    input_size: tuple[Side, Side] | None = None
     layout: Layout | None = None
     letterbox: bool = False
     confidence: float | None = Field(default=None, gt=0.0, lt=1.0)
-    threads: PositiveInt = 1
+    threads: Annotated[int, Field(ge=1, le=256)] = 1
 
     @model_validator(mode="after")
     def _fit_together(self) -> LearnedSettings:
@@ -90,11 +100,17 @@ class LearnedDetector(Detector):
         self.settings = settings or LearnedSettings()
         self.pictures: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
-        self._network = build_network(self.network, self.settings)
-        self.sees_signals = signal_kinds(self._network.classes)
+        check_weights_exist(weights_path(self.network, self.settings))
+        self._network: ImageNetwork | None = None
         self._surroundings = Surroundings(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
+
+    def load_weights(self, *, allow_torchscript: bool = False) -> None:
+        """Build the network. Raises SettingError if its weights do not fit."""
+        if self._network is None:
+            self._network = build_network(self.network, self.settings, allow_torchscript=allow_torchscript)
+            self.sees_signals = signal_kinds(self._network.classes)
 
     def install(self, installation: Installation) -> None:
         """Learn the map and the patterns of the LiDARs."""
@@ -106,6 +122,8 @@ class LearnedDetector(Detector):
 
     def detect(self, readings: Readings) -> Detections:
         """The road users in the pictures of all cameras that were read."""
+        self.load_weights()
+        assert self._network is not None
         name, sweep = next(iter(readings.lidars.items()), ("", None))
         self.pictures = {camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()}
         self._signals = self._lights.read(self.pictures, readings.cameras)
@@ -154,11 +172,21 @@ class SsdDetector(LearnedDetector):
     network: ClassVar[Literal["yolov5", "ssd"]] = "ssd"
 
 
-def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
-    """The network that the settings ask for. Raises SettingError if its weights are missing or do not fit."""
-    path = SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
-    if not path.is_file():
-        raise SettingError(Problem(f"no file {str(path)!r} with weights", "check `weights` of the detector's settings"))
+def weights_path(name: str, settings: LearnedSettings) -> Path:
+    """The file of weights that the settings of the detector of this name ask for."""
+    return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
+
+
+def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bool = False) -> ImageNetwork:
+    """The network that the settings ask for.
+
+    Raises SettingError if its weights are missing or do not fit, or are TorchScript, which the user has to allow.
+    """
+    path = weights_path(name, settings)
+    check_weights_exist(path)
+    allow_torchscript = torchscript_is_allowed(allow_torchscript)
+    if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
+        raise refused_torchscript(path)
     if path.suffix != ".onnx" and importlib.util.find_spec("torch") is None:
         message = f"detector {name!r} needs torch, which is not installed"
         raise SettingError(Problem(message, "run: pip install eidrive-scenario[learned]"))
@@ -172,12 +200,13 @@ def build_network(name: str, settings: LearnedSettings) -> ImageNetwork:
             settings.layout,
             settings.threads,
             settings.letterbox,
+            allow_torchscript=allow_torchscript,
         )
     from eidrive_scenario.perception.learned.torch_network import TorchNetwork
 
     network = TorchNetwork(path, settings.confidence, settings.threads)
     if network.name != name:
-        message = f"weights {str(path)!r} do not fit: they are of {network.name!r}, not of {name!r}"
+        message = f"weights {quoted(str(path))} do not fit: they are of {network.name!r}, not of {name!r}"
         raise SettingError(Problem(message, f"take the detector {network.name!r}"))
     return network
 

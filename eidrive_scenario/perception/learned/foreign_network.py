@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,8 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, SettingError, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
+from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights, refused_torchscript
+
+_LOG = logging.getLogger(__name__)
 
 Floats = NDArray[np.float32]
 Layout = Literal["yolov5", "yolov8", "boxes_scores", "detections"]
@@ -30,7 +35,8 @@ class ForeignNetwork(ImageNetwork):
 
     It gets (1, 3, H, W) float32, red green blue in [0, 1], and gives boxes in pixels of that in one of the layouts
     `yolov5`, `yolov8`, `boxes_scores` and `detections`; None tells them by their shape. It is tried on an empty picture
-    while it is built. Raises SettingError if it cannot be read, does not take this size or gives what fits no layout.
+    while it is built. Raises SettingError if it cannot be read, does not take this size or gives what fits no layout;
+    and for TorchScript, which can execute any code, unless `allow_torchscript` says that its source is trusted.
     """
 
     def __init__(
@@ -42,10 +48,14 @@ class ForeignNetwork(ImageNetwork):
         layout: Layout | None = None,
         threads: int = 1,
         letterbox: bool = False,
+        *,
+        allow_torchscript: bool = False,
     ) -> None:
         super().__init__(classes, input_size, confidence, letterbox)
         self._path = path
-        self._compute = (_onnx if path.suffix == ".onnx" else _torchscript)(path, threads)
+        if path.suffix == TORCHSCRIPT_SUFFIX and not allow_torchscript:
+            raise refused_torchscript(path)
+        self._compute = (_torchscript if path.suffix == TORCHSCRIPT_SUFFIX else _onnx)(path, threads)
         blank = np.zeros((input_size[1], input_size[0], 3), dtype=np.uint8)
         outputs = self._outputs(blank)
         self._layout: Layout = layout or self._told_by_shape(outputs)
@@ -61,7 +71,7 @@ class ForeignNetwork(ImageNetwork):
         except (ValueError, IndexError) as error:
             given = ", ".join(str(output.shape) for output in outputs)
             fits = f"{self._layout!r} for {len(self.classes)} classes"
-            message = f"weights {str(self._path)!r} give {given}, which is not {fits}: {error}"
+            message = f"weights {quoted(str(self._path))} give {given}, which is not {fits}: {error}"
             raise SettingError(Problem(message, f"layouts: {LAYOUTS}")) from error
 
     def _outputs(self, picture: NDArray[np.uint8]) -> list[Floats]:
@@ -69,10 +79,10 @@ class ForeignNetwork(ImageNetwork):
         try:
             with _quiet_opencv():
                 return self._compute(pixels)
-        except (cv2.error, RuntimeError) as error:
+        except (cv2.error, RuntimeError, MemoryError) as error:
             width, height = self.input_size
             reason = " ".join(str(error).split())[:160]
-            message = f"weights {str(self._path)!r} do not take pictures of {width} x {height}: {reason}"
+            message = f"weights {quoted(str(self._path))} do not take pictures of {width} x {height}: {reason}"
             raise SettingError(Problem(message, "say the network's own with 'input_size'")) from error
 
     def _told_by_shape(self, outputs: list[Floats]) -> Layout:
@@ -92,9 +102,9 @@ class ForeignNetwork(ImageNetwork):
             return fits[0]
         given = ", ".join(str(shape) for shape in shapes)
         if not fits:
-            message = f"weights {str(self._path)!r} give {given}, which fits no layout for {count} classes"
+            message = f"weights {quoted(str(self._path))} give {given}, which fits no layout for {count} classes"
             raise SettingError(Problem(message, f"check 'classes'; layouts: {LAYOUTS}"))
-        message = f"weights {str(self._path)!r} give {given}, which could be {' or '.join(fits)}"
+        message = f"weights {quoted(str(self._path))} give {given}, which could be {' or '.join(fits)}"
         raise SettingError(Problem(message, "say which with 'layout'"))
 
     def _candidates(self, outputs: list[Floats]) -> Candidates:
@@ -138,11 +148,13 @@ def _corners(boxes: Floats) -> Floats:
 
 def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
     cv2.setNumThreads(threads)
+    # From memory: a model that is read by its path may name further files with its tensors.
+    content = np.frombuffer(read_weights(path), dtype=np.uint8)
     try:
         with _quiet_opencv():
-            network = cv2.dnn.readNetFromONNX(str(path))
+            network = cv2.dnn.readNetFromONNX(content)
         names = network.getUnconnectedOutLayersNames()
-    except cv2.error as error:
+    except (cv2.error, MemoryError) as error:
         raise _unreadable(path, "an ONNX model", error) from error
 
     def compute(pixels: Floats) -> list[Floats]:
@@ -167,10 +179,11 @@ def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
     import torch
 
     torch.set_num_threads(threads)
+    content = read_weights(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # torch would rather have torch.export
-            network: Any = torch.jit.load(str(path), map_location="cpu").eval()  # type: ignore[no-untyped-call]
+            network: Any = torch.jit.load(io.BytesIO(content), map_location="cpu").eval()  # type: ignore[no-untyped-call]
     except (RuntimeError, ValueError, OSError) as error:
         raise _unreadable(path, "a TorchScript model", error) from error
 
@@ -186,5 +199,8 @@ def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
 
 
 def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
-    reason = " ".join(str(error).split())[:160]
-    return SettingError(Problem(f"weights {str(path)!r} are not {kind}: {reason}", "export the model again"))
+    """The error for a file that is not read. Its reason, which may quote the file, is logged for debugging only."""
+    _LOG.debug("%s: %s", path, error)
+    return SettingError(
+        Problem(f"weights {quoted(str(path))} are not {kind} that can be read", "export the model again")
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,16 @@ import numpy as np
 import torch
 from torch import nn
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.ssd import Ssd
+from eidrive_scenario.perception.learned.weight_files import read_arrays, read_weights
 from eidrive_scenario.perception.learned.yolov5 import Anchors, YoloV5
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 _DESCRIPTION = "description"
+MAX_SIDE = 8192
+"""Largest width and height of a network's input [px]."""
+MAX_CLASSES = 10_000
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class Description:
             return YoloV5(len(self.classes), self.anchors)
         if self.network == "ssd":
             return Ssd(len(self.classes))
-        raise ValueError(f"no network {self.network!r}, or it lacks its anchors")
+        raise ValueError("its description names no network, or lacks anchors")
 
 
 def save(path: Path, network: nn.Module, description: Description, card: dict[str, Any]) -> None:
@@ -57,33 +62,54 @@ def save(path: Path, network: nn.Module, description: Description, card: dict[st
 
 def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
     """The network with its weights, ready to be trained on. Raises SettingError if the file is not one of weights."""
+    content = read_weights(path)
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            description = _described(json.loads(str(stored[_DESCRIPTION])))
-            network = description.build()
-            own = network.state_dict()
-            values = {
-                name: torch.from_numpy(stored[name]).to(value.dtype) if name in stored else None
-                for name, value in own.items()
-            }
-        missing = [name for name, value in values.items() if value is None]
+        stored = read_arrays(content)
+        description = _described(json.loads(str(stored[_DESCRIPTION])))
+        network = description.build()
+        own = network.state_dict()
+        missing = [name for name in own if name not in stored]
         if missing:
             raise ValueError(f"{missing[0]} is missing")
-        network.load_state_dict({name: value for name, value in values.items() if value is not None})
-    except (OSError, KeyError, TypeError, ValueError, RuntimeError, EOFError, zipfile.BadZipFile) as error:
-        reason = " ".join(str(error).split())[:200]
-        remedy = "give a file that training/train.py has written, an ONNX model (.onnx) or a TorchScript model (.pt)"
-        raise SettingError(Problem(f"weights {str(path)!r} do not fit: {reason}", remedy)) from error
+        wrong = [name for name, value in own.items() if tuple(value.shape) != stored[name].shape]
+        if wrong:
+            raise ValueError(f"{wrong[0]} has another shape than the network")
+        network.load_state_dict(
+            {name: torch.from_numpy(stored[name].copy()).to(value.dtype) for name, value in own.items()}
+        )
+    except _DAMAGED as error:
+        reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
+        remedy = "give a file that training/train.py has written, or an ONNX model (.onnx)"
+        raise SettingError(Problem(f"weights {quoted(str(path))} do not fit: {reason}", remedy)) from error
     return description, network
+
+
+_DAMAGED = (
+    OSError,
+    LookupError,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    RuntimeError,
+    EOFError,
+    MemoryError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What a damaged file may raise: in zipfile, in the headers of its arrays, in its description, in torch."""
 
 
 def _described(data: dict[str, Any]) -> Description:
     anchors = data["anchors"]
-    width, height = data["input_size"]
+    width, height = (int(side) for side in data["input_size"])
+    classes = tuple(str(name) for name in data["classes"])
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE and 1 <= len(classes) <= MAX_CLASSES):
+        raise ValueError("its description has no usable input size or classes")
     return Description(
         network=str(data["network"]),
-        classes=tuple(data["classes"]),
-        input_size=(int(width), int(height)),
+        classes=classes,
+        input_size=(width, height),
         confidence=float(data.get("confidence", Description.confidence)),
         anchors=None if anchors is None else tuple(tuple((w, h) for w, h in scale) for scale in anchors),
     )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 from lxml import etree
 
 from eidrive_scenario.errors import Problem, RoadError, suggestion
+from eidrive_scenario.files import MIB, read_regular_file, reason_of
 from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.model import (
     Connection,
@@ -26,24 +27,19 @@ from eidrive_scenario.roads.reading.findings import Findings, line_of
 from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
-from eidrive_scenario.xml_lines import parse_numbered
+from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 
-LARGEST = 256 * 1024 * 1024
-"""Bytes of a file that is read at all."""
+LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
+"""Limits of an OpenDRIVE file."""
 
 
 def read_road_text(path: Path) -> bytes:
     """The text of an OpenDRIVE file. Raises RoadError if it cannot be read."""
-    source = str(path)
     try:
-        size = path.stat().st_size
-        text = path.read_bytes() if size <= LARGEST else b""
+        return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise RoadError(Problem(f"cannot read: {reason}", "give the path of an OpenDRIVE file", source)) from error
-    if size > LARGEST:
-        raise RoadError(Problem(f"is {size} bytes large", f"at most {LARGEST} are read", source))
-    return text
+        problem = Problem(f"cannot read: {reason_of(error)}", "give the path of an OpenDRIVE file", str(path))
+        raise RoadError(problem) from error
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
@@ -74,25 +70,14 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
-    """The root element. No DTD, no entities, no network, no namespaces left."""
-    parser = etree.XMLParser(
-        resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_comments=True, remove_pis=True
-    )
-    try:
-        root = parse_numbered(text, parser)
-    except etree.XMLSyntaxError as error:
-        line = error.lineno if error.lineno else None
-        raise RoadError(Problem(f"not well-formed XML: {error.msg}", "repair it there", source, line)) from error
-    docinfo: Any = root.getroottree().docinfo
-    if docinfo.doctype:
-        raise RoadError(Problem("has a document type declaration", "remove <!DOCTYPE …>", source, 1))
+    """The root element, without namespaces."""
+    root = parse_untrusted(text, source, LIMITS, RoadError, remove_comments=True)
     if root.tag.startswith("{"):
         for element in root.iter():
             element.tag = etree.QName(element).localname
     if root.tag != "OpenDRIVE":
-        raise RoadError(
-            Problem(f"the root element is <{root.tag}>", "an OpenDRIVE file begins with <OpenDRIVE>", source, 1)
-        )
+        what = "the root element is not <OpenDRIVE>"
+        raise RoadError(Problem(what, "is this another kind of file?", source, line_of(root)))
     return root
 
 

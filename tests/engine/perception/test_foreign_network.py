@@ -69,7 +69,7 @@ def test_an_onnx_model_finds_what_it_was_made_for() -> None:
 
 
 def test_a_torchscript_model_finds_the_same(torchscript: Path) -> None:
-    assert_finds_the_square(ForeignNetwork(torchscript, CLASSES, SIZE, 0.5))
+    assert_finds_the_square(ForeignNetwork(torchscript, CLASSES, SIZE, 0.5, allow_torchscript=True))
 
 
 def test_a_letterboxed_picture_keeps_its_shape_and_its_boxes_their_place() -> None:
@@ -107,6 +107,13 @@ def test_a_torchscript_file_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "empty.pt"
     path.write_bytes(b"not a model")
     with pytest.raises(SettingError, match="are not a TorchScript model"):
+        ForeignNetwork(path, CLASSES, SIZE, 0.5, allow_torchscript=True)
+
+
+def test_foreign_network_with_torchscript_without_permission_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "any.pt"
+    path.write_bytes(b"is not even read")
+    with pytest.raises(SettingError, match=r"can execute any code with your rights; export the model to ONNX"):
         ForeignNetwork(path, CLASSES, SIZE, 0.5)
 
 

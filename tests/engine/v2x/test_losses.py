@@ -198,10 +198,10 @@ def test_wrong_losses_say_what_would_be_right(settings: dict[str, object], words
     [
         (None, {}, "cannot read"),
         ("", {}, "is empty"),
-        ("a,b\n1,2\n", {"column": "c"}, "has no column 'c'; it has a, b"),
-        ("a\n1\nx\n", {}, ":3: 'x' is no delay"),
+        ("a,b\n1,2\n", {"column": "c"}, "has no column 'c' in its first row"),
+        ("a\n1\nx\n", {}, ":3: column 0 holds no delay"),
         ("a\n1\n", {"column": 4}, "has no column 4; it has 1"),
-        ("-1\n", {}, ":1: a delay is not negative, found -1"),
+        ("-1\n", {}, ":1: a delay is negative"),
         ("1\n", {"seconds": [1.0]}, "either seconds or a file"),
     ],
 )

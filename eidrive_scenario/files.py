@@ -1,0 +1,109 @@
+"""Bounded reading of regular files.
+
+Scenarios and all files that they refer to come from untrusted sources. A path may name a pipe, which blocks, a device,
+which never ends, or a file that does not fit into memory. All input files are therefore read here.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+MIB = 2**20
+_CHUNK = MIB
+_FLAGS = (
+    os.O_RDONLY
+    | getattr(os, "O_NONBLOCK", 0)
+    | getattr(os, "O_CLOEXEC", 0)
+    | getattr(os, "O_NOCTTY", 0)
+    | getattr(os, "O_BINARY", 0)
+)
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+class RefusedFileError(OSError):
+    """The path does not name a regular file, or names one above the size limit; `strerror` states the reason."""
+
+    def __init__(self, reason: str, path: str | os.PathLike[str]) -> None:
+        super().__init__(errno.EINVAL, reason, os.fspath(path))
+
+
+def is_regular_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a path leads to a regular file; False for a text that cannot be a path at all, as it is too long."""
+    return os.path.isfile(path)
+
+
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Whether a path leads to a folder; False for a text that cannot be a path at all."""
+    return os.path.isdir(path)
+
+
+def read_regular_file(path: str | os.PathLike[str], limit: int) -> bytes:
+    """Return the content of a regular file of at most `limit` bytes.
+
+    Never block and never read more than `limit` + 1 bytes, whatever the path leads to and whatever happens to the file
+    meanwhile. Raise OSError if the file cannot be read, and RefusedFileError if it is not a regular file or is larger.
+    """
+    with _opened(path) as descriptor:
+        size = os.fstat(descriptor).st_size
+        parts: list[bytes] = []
+        count = 0
+        while size <= limit and count <= limit:
+            part = os.read(descriptor, min(_CHUNK, limit + 1 - count))
+            if not part:
+                return b"".join(parts)
+            parts.append(part)
+            count += len(part)
+    raise RefusedFileError(f"the file is larger than {_size(limit)}", path)
+
+
+def reason_of(error: Exception) -> str:
+    """The reason why a file cannot be read, without its path; only for errors whose texts quote no content."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[int]:
+    """The descriptor of a regular file.
+
+    The kind is checked before the file is opened, as opening a device may already have an effect, and once more
+    afterwards, as the file may have been replaced in between.
+    """
+    try:
+        _check_kind(os.stat(path), path)
+        descriptor = os.open(path, _FLAGS)
+    except ValueError as error:  # a null byte
+        raise RefusedFileError("the path is not valid", str(path).replace("\0", "\\0")) from error
+    try:
+        _check_kind(os.fstat(descriptor), path)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _check_kind(status: os.stat_result, path: str | os.PathLike[str]) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((name for matches, name in _KINDS if matches(status.st_mode)), "of another kind")
+        raise RefusedFileError(f"the path leads to {kind}; a regular file is expected", path)
+
+
+def _size(limit: int) -> str:
+    return f"{limit // MIB} MiB" if limit >= MIB else f"{limit // 1024} KiB"
+
+
+def absolute(path: str | Path) -> Path:
+    """The path without symbolic links, if it can be resolved; else as it is."""
+    try:
+        return Path(path).resolve()
+    except (OSError, ValueError, RuntimeError):
+        return Path(path)
