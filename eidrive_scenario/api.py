@@ -39,6 +39,7 @@ from eidrive_scenario.storyboard.condition import (
     QuantityCondition,
     compares,
     in_words,
+    relation,
 )
 from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of
 from eidrive_scenario.storyboard.domains import Domain
@@ -169,6 +170,7 @@ __all__ = [
     "parse_settings",
     "random_route",
     "references",
+    "relation",
     "resolve",
     "route_of",
     "suggestion",

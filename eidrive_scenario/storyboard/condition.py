@@ -21,6 +21,9 @@ WORDS = {
     "notEqualTo": "≠",
 }
 
+COMPLEMENTS = {">": "≤", "≥": "<", "<": "≥", "≤": ">", "=": "≠", "≠": "="}
+"""By sign, the one that holds where it does not."""
+
 
 def compares(value: float, rule: model.Rule, limit: float) -> bool:
     """`value` against `limit` by a Rule of the standard; NaN compares to nothing."""
@@ -45,6 +48,12 @@ def compares(value: float, rule: model.Rule, limit: float) -> bool:
 def in_words(rule: model.Rule) -> str:
     """A Rule as the sign that one would write."""
     return WORDS[rule.value]
+
+
+def relation(rule: model.Rule, holds: bool) -> str:
+    """Return the sign that holds between a value and its limit: that of the rule, or its complement."""
+    sign = WORDS[rule.value]
+    return sign if holds else COMPLEMENTS[sign]
 
 
 class Measure(NamedTuple):
@@ -156,10 +165,13 @@ class QuantityCondition(EntityCondition):
         return compares(self.quantity(stage, entity), rule, limit)
 
     def explain_for(self, stage: Stage, entity: str) -> str:
-        """The quantity, the rule and the limit."""
+        """The quantity, the limit, and how they compare; on a falling edge that is not what the rule asks for."""
         rule, limit = self.threshold()
-        value = f"{self.quantity(stage, entity):.2f} {self.unit}"
-        return f"{entity}: {self.what()} {value} {in_words(rule)} {limit:g} {self.unit}"
+        quantity = self.quantity(stage, entity)
+        if quantity != quantity:
+            return f"{entity}: {self.what()} undefined, not {in_words(rule)} {limit:g} {self.unit}"
+        sign = relation(rule, compares(quantity, rule, limit))
+        return f"{entity}: {self.what()} {quantity:.2f} {self.unit} {sign} {limit:g} {self.unit}"
 
     def describe_for(self) -> str:
         """The quantity by its name, the rule and the limit."""

@@ -68,13 +68,19 @@ class ConditionMonitor:
         return self.result
 
     def _late(self, stage: Stage, result: bool, who: tuple[str, ...]) -> bool:
-        if result != self._recorded:
+        """Return the result of the delay ago; each true one is kept with the values of its own instant."""
+        if result or self._recorded:
             self._recorded = result
-            self._history.append((stage.time, result, self.condition.explain(stage) if result else "", who))
+            self._history.append((stage.time, result, self._words(stage) if result else "", who))
         while self._history and self._history[0][0] <= stage.time - self.delay + TINY:
             _, value, text, self.triggering = self._history.popleft()
             self._delayed = (value, text)
         return self._delayed[0]
+
+    def _words(self, stage: Stage) -> str:
+        """Return the condition with its values of now."""
+        text = self.condition.explain(stage)
+        return text if self.value or self.edge == "none" else f"{text} (falling edge)"
 
     def _edge(self, value: bool) -> bool:
         before, self.value = self.value, value
@@ -87,7 +93,7 @@ class ConditionMonitor:
     def why(self, stage: Stage) -> str:
         """What made it true, in words, with the values of that instant; to be asked where it just was true."""
         if self.delay <= 0.0:
-            return self.condition.explain(stage)
+            return self._words(stage)
         return f"{self._delayed[1]}, {self.delay:g} s ago"
 
     def describe(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.api import Condition, Measure, Problem, Stage, compares, in_words, model
+from eidrive_scenario.api import Condition, Measure, Problem, Stage, compares, in_words, model, relation
 
 
 class SimulationTimeCondition(Condition):
@@ -18,7 +18,8 @@ class SimulationTimeCondition(Condition):
 
     def explain(self, stage: Stage) -> str:
         """The time."""
-        return f"simulation time {stage.time:.2f} s {in_words(self.element.rule)} {self.element.value:g} s"
+        sign = relation(self.element.rule, self.holds(stage))
+        return f"simulation time {stage.time:.2f} s {sign} {self.element.value:g} s"
 
     def describe(self) -> str:
         """Rule and limit."""
@@ -60,7 +61,8 @@ class TimeOfDayCondition(Condition):
         """The clock."""
         now = stage.environment.clock(stage.time)
         shown = "unknown" if now is None else now.isoformat()
-        return f"time of day {shown} {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
+        sign = relation(self.element.rule, self.holds(stage))
+        return f"time of day {shown} {sign} {self.element.date_time.isoformat()}"
 
     def describe(self) -> str:
         """Rule and limit."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model
+from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model, relation
 
 WORDS = {"true": 1.0, "false": 0.0}
 """What a boolean counts as."""
@@ -57,7 +57,8 @@ class ParameterCondition(Condition):
     def explain(self, stage: Stage) -> str:
         """Its value."""
         value = stage.parameters.get(self.element.parameter_ref)
-        return f"parameter {self.element.parameter_ref} = {value} {in_words(self.element.rule)} {self.element.value}"
+        sign = relation(self.element.rule, self.holds(stage))
+        return f"parameter {self.element.parameter_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""
@@ -81,7 +82,8 @@ class VariableCondition(Condition):
     def explain(self, stage: Stage) -> str:
         """Its value."""
         value = stage.variables.get(self.element.variable_ref)
-        return f"variable {self.element.variable_ref} = {value} {in_words(self.element.rule)} {self.element.value}"
+        sign = relation(self.element.rule, self.holds(stage))
+        return f"variable {self.element.variable_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""
@@ -108,7 +110,8 @@ class UserDefinedValueCondition(Condition):
     def explain(self, stage: Stage) -> str:
         """Its value."""
         value = stage.user_values(self.element.name)
-        return f"{self.element.name} = {value} {in_words(self.element.rule)} {self.element.value}"
+        sign = relation(self.element.rule, self.holds(stage))
+        return f"{self.element.name} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""

@@ -94,6 +94,21 @@ def test_why_speaks_of_the_time_before_the_delay(clock: Any, script: Any) -> Non
     assert trigger.why == "value 2 at 0.1 s, 0.2 s ago"
 
 
+def test_why_of_lasting_condition_has_the_value_of_the_delay_ago(clock: Any, script: Any) -> None:
+    """It is true from the start; with another that is true from 0.2 s on, the trigger fires 0.3 s later."""
+    lasting, late = script([YES] * 6), script([NO, NO, YES, YES, YES, YES])
+    trigger = Trigger([ConditionGroup((ConditionMonitor(lasting, delay=0.3), ConditionMonitor(late, delay=0.3)))])
+    assert [trigger.evaluate(clock.step()) for _ in range(6)] == [NO, NO, NO, NO, NO, YES]
+    assert trigger.why == "value 3 at 0.2 s, 0.3 s ago and value 3 at 0.2 s, 0.3 s ago"
+
+
+@pytest.mark.parametrize("edge", ["falling", "risingOrFalling"])
+def test_why_of_falling_edge_says_so(clock: Any, script: Any, edge: str) -> None:
+    trigger = Trigger([ConditionGroup((ConditionMonitor(script([YES, NO]), edge=edge),))])
+    assert [trigger.evaluate(clock.step()) for _ in range(2)] == [NO, YES]
+    assert trigger.why == "value 2 at 0.1 s (falling edge)"
+
+
 def test_a_trigger_without_groups_never_fires(clock: Any) -> None:
     assert not Trigger([])
     assert not Trigger([]).evaluate(clock.step())
