@@ -31,9 +31,14 @@ class RoadDistances:
 
         Along the reference lines of the chain of roads that `by` asks for [m]. None where no chain of roads joins them.
         """
+        found = self.placed(a, b, by)
+        return None if found is None else found[:2]
+
+    def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
+        """Return `between`, and +1 where the s of both roads runs the same way along the chain, else -1."""
         direction = driving_direction(self._roads[a.road], a.lane)
         if a.road == b.road:
-            return (b.s - a.s) * direction, (b.t - a.t) * direction
+            return (b.s - a.s) * direction, (b.t - a.t) * direction, 1
         options = []
         for sense in (1, -1):
             way = self._from(a.road, direction * sense, by).get(b.road)
@@ -43,11 +48,11 @@ class RoadDistances:
                 left = self._roads[a.road].length - a.s if direction * sense > 0 else a.s
                 across = b.t * entered * sense - a.t * direction
                 cost += left * self._per_metre(a.road, by) + rest * self._per_metre(b.road, by)
-                options.append((cost, left + gap + rest, sense, across))
+                options.append((cost, left + gap + rest, sense, across, entered * direction * sense))
         if not options:
             return None
-        _, span, sense, across = min(options, key=lambda option: option[0])
-        return span * sense, across
+        _, span, sense, across, same = min(options, key=lambda option: option[0])
+        return span * sense, across, same
 
     def _per_metre(self, road: str, by: Chain) -> float:
         return 1.0 / self._speed(road) if by == "fastest" else 1.0

@@ -242,6 +242,14 @@ class RoadNetwork(Roads):
             return self._distances.between(a, b, by)
         return route.distance(a, b)
 
+    def orientation(self, a: LaneLocation, b: LaneLocation) -> int | None:
+        """Return +1 where the s of b's road runs as that of a's road does, seen along the road, -1 where against it.
+
+        None where no chain of roads joins them.
+        """
+        found = self._distances.placed(a, b)
+        return None if found is None else found[2]
+
     def _usual_speed(self, road: str) -> float:
         return speed_on(self, road, 0.5 * self.road(road).length)
 

@@ -51,6 +51,11 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         return self.domains
 
     @property
+    def at_once(self) -> bool:
+        """Whether it is over as soon as it has started, so that it may stand beside an action that lasts."""
+        return False
+
+    @property
     def performer_missing(self) -> bool:
         """Whether it would move an actor that is not in the world."""
         return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present

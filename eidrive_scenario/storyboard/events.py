@@ -53,7 +53,7 @@ class EventElement(StoryElement):
                 rival.halt(f"{self.name} overrides it")
         self.executions += 1
         self._change(Transition.START, State.RUNNING, why)
-        for action in self.elements:
+        for action in sorted(self.elements, key=_takes_time):
             action.begin()
 
     def _change(self, transition: Transition | None, after: State, why: str = "") -> None:
@@ -141,16 +141,28 @@ class ActionElement(StoryElement):
                 names |= set(members)
         return [held for held in self.running if held.actor_name in names]
 
+    @property
+    def takes_time(self) -> bool:
+        """Whether any of its behaviours lasts longer than the instant at which it starts."""
+        return not all(held.at_once for actor in self.actors for held in self.behaviours(actor))
+
     def displace(self, behaviour: Holder, why: str) -> None:
-        """A younger action took the domain of this behaviour."""
+        """A younger action took the domain of this behaviour. One that takes no time has its effect before that."""
+        done = False
         for held in self.running:
             if held is behaviour:
+                if held.at_once and self._decided_at is None and self._tried_at == self.stage.progress.tick:
+                    self._let_decide(held)
+                    done = held.status is Status.SUCCESS
                 held.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
         self._there = [other for other in self._there if other is not behaviour]
         self._waiting.pop(behaviour, None)
         if not self.running and self.state is State.RUNNING:
-            self._change(Transition.STOP, State.COMPLETE, why)
+            if done:
+                self._change(Transition.END, State.COMPLETE)
+            else:
+                self._change(Transition.STOP, State.COMPLETE, why)
 
     def halt(self, why: str = "") -> None:
         """Stop all its behaviours."""
@@ -214,3 +226,8 @@ class ActionElement(StoryElement):
             self.stage.release(behaviour)
         if not self.running and self.state is State.RUNNING:
             self._change(Transition.END, State.COMPLETE)
+
+
+def _takes_time(action: StoryElement) -> bool:
+    """Sort key: actions of one event start together, and those that take no time have their effect first."""
+    return isinstance(action, ActionElement) and action.takes_time

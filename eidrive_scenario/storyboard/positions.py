@@ -10,7 +10,7 @@ from typing import Any
 from eidrive_scenario.errors import Problem, ScenarioError
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.roads.location import PositionError
 from eidrive_scenario.storyboard.geographic import height_of_level, plane_coordinates
 from eidrive_scenario.storyboard.motion import Place
@@ -95,7 +95,7 @@ def _road(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
 
 def _relative_road(frame: model.RelativeRoadPosition, stage: Stage, actor: str | None) -> Place:
     roads, origin = _roads(frame, stage), _origin(frame, stage)
-    here = along_reference(roads, origin, frame.ds)
+    here = along_reference(roads, origin, frame.ds, stage.actors[frame.entity_ref].motion.route)
     if here is None:
         raise _missing(frame, f"leads {frame.ds:g} m from {frame.entity_ref}, beyond the end of the road")
     return _in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
@@ -113,14 +113,14 @@ def _lane(frame: model.LanePosition, stage: Stage, actor: str | None) -> Place:
 
 
 def _relative_lane(frame: model.RelativeLanePosition, stage: Stage, actor: str | None) -> Place:
+    """`ds` runs along the reference line, `dsLane` along the lane as the entity faces; lanes count to its left."""
     roads, origin = _roads(frame, stage), _origin(frame, stage)
+    route = stage.actors[frame.entity_ref].motion.route
     ahead = facing(stage, frame.entity_ref, origin)
     if frame.ds_lane is not None:
-        there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead)
+        there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead, route=route)
     else:
-        there = along_reference(
-            roads, origin, (frame.ds or 0.0) * ahead * roads.driving_direction(origin.road, origin.lane)
-        )
+        there = along_reference(roads, origin, frame.ds or 0.0, route)
     if there is None:
         raise _missing(frame, f"lies beyond the end of the road of {frame.entity_ref}")
     sign = ahead * roads.driving_direction(there.road, there.lane)
@@ -196,15 +196,20 @@ def count_lanes(lane: int, steps: int) -> int:
     return target
 
 
-def along_reference(roads: RoadNetwork, here: LaneLocation, ds: float) -> LaneLocation | None:
-    """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset."""
+def along_reference(
+    roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
+) -> LaneLocation | None:
+    """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset.
+
+    At forks the route decides.
+    """
     road = roads.roads[here.road]
     s = here.s + ds
     if 0.0 <= s <= road.length:
         return here._replace(s=s)
     rest = s - road.length if s > road.length else s
     edge = here._replace(s=road.length if s > road.length else 0.0)
-    return roads.advance(edge, rest * roads.driving_direction(here.road, here.lane))
+    return roads.advance(edge, rest * roads.driving_direction(here.road, here.lane), route=route)
 
 
 def facing(stage: Stage, name: str, here: LaneLocation) -> int:

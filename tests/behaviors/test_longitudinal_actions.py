@@ -114,6 +114,26 @@ def profile(mode: str, *entries: tuple[float | None, float], rates: str = "") ->
       </SpeedProfileAction></LongitudinalAction></PrivateAction>"""
 
 
+@pytest.mark.element("SpeedAction", "SpeedProfileAction")
+@pytest.mark.parametrize("step_first", [True, False])
+def test_step_beside_profile_takes_effect_and_the_profile_goes_on_from_there(scene: Any, step_first: bool) -> None:
+    """At 0.5 s from 20 m/s to 0 at once, from there to 4 m/s within 4 s: v = t - 0.5 s."""
+    later = '<ByValueCondition><SimulationTimeCondition value="0.45" rule="greaterThan"/></ByValueCondition>'
+    step, rise = speed(absolute(0), "step"), profile("position", (4.0, 4.0))
+    actions = [step, rise] if step_first else [rise, step]
+    played = scene(6, ("Ego", '</Action><Action name="second">'.join(actions), later))
+    assert played.at(0.5).speed == 20.0
+    for time in (0.6, 1.5, 3.0, 4.4):
+        assert played.at(time).speed == pytest.approx(time - 0.5)
+    assert played.at(5.0).speed == 4.0
+    step_name, rise_name = ("action 0", "second") if step_first else ("second", "action 0")
+    ends = {c.element: c.transition.value for c in played.changes if c.after.value == "completeState" and c.transition}
+    assert (ends[step_name], ends[rise_name]) == ("endTransition", "endTransition")
+    assert (played.when(step_name, "completeState"), played.when(rise_name, "completeState")) == pytest.approx(
+        (0.5, 4.5)
+    )
+
+
 @pytest.mark.element("SpeedProfileAction")
 def test_a_profile_in_straight_lines(scene: Any) -> None:
     played = scene(4, ("Ego", profile("position", (1.0, 30.0), (2.0, 20.0))))

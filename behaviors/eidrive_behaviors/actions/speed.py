@@ -42,6 +42,14 @@ class SpeedAction(ActionBehaviour):
     def _continuous(self) -> bool:
         return self._relative is not None and self._relative.continuous
 
+    @property
+    def at_once(self) -> bool:
+        """A step, unless it is kept up or the vehicle takes its time for it."""
+        dynamics = self._dynamics
+        in_no_time = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
+        step = dynamics.dynamics_shape is model.DynamicsShape.STEP or in_no_time
+        return step and not self._continuous and not follows(self._dynamics)
+
     def initialise(self) -> None:
         """Lay the transition from the present speed."""
         start, target = self._present(), self._target()

@@ -10,9 +10,10 @@ from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, box_of, f
 class RelativeClearanceCondition(EntityCondition):
     """No (named) entity is within a stretch ahead and behind, in a range of lanes counted from the own one to the left.
 
-    The range must exist: an entity beside which there is no such lane has no clearance there. Lanes of oncoming traffic
-    count only with `oppositeLanes`. The stretch is measured from the reference point of the entity along the road; with
-    `freeSpace` whoever reaches into it with any part of its box is in it, else whose reference point lies there.
+    The range must exist: an entity beside which there is no such lane has no clearance there. Lanes whose traffic comes
+    towards the entity, as it faces, count only with `oppositeLanes`; its own lane always counts. The stretch is
+    measured from the reference point of the entity along the road; with `freeSpace` whoever reaches into it with any
+    part of its box is in it, else whose reference point lies there.
     """
 
     element: model.RelativeClearanceCondition
@@ -71,15 +72,18 @@ class RelativeClearanceCondition(EntityCondition):
 
     def _in_range(self, stage: Stage, entity: str, here: LaneLocation, there: LaneLocation) -> bool:
         assert stage.roads is not None
-        way = stage.roads.driving_direction(here.road, here.lane)
-        other = stage.roads.driving_direction(there.road, there.lane)
-        same = (there.lane > 0) == (here.lane > 0) if there.road == here.road else way == other
+        runs = stage.roads.orientation(here, there)
+        if runs is None:
+            return False
+        way = stage.roads.driving_direction(here.road, here.lane) * facing(stage, entity, here)
+        lane = there.lane * runs
+        same = lane == here.lane or stage.roads.driving_direction(there.road, there.lane) * runs == way
         if not same and not self.element.opposite_lanes:
             return False
-        steps = there.lane - here.lane
-        if (there.lane > 0) != (here.lane > 0):
+        steps = lane - here.lane
+        if (lane > 0) != (here.lane > 0):
             steps -= 1 if steps > 0 else -1
-        left = steps * way * facing(stage, entity, here)
+        left = steps * way
         ranges = self.element.relative_lane_range
         return not ranges or any(
             (bounds.from_ is None or left >= bounds.from_) and (bounds.to is None or left <= bounds.to)

@@ -58,7 +58,10 @@ def relative(h: Any) -> Any:
         (model.RelativeLanePosition(entity_ref="A", d_lane=-1, ds=10), 60, -6, 0.0),
         (model.RelativeLanePosition(entity_ref="A", d_lane=1, ds=-10), 40, 2, math.pi),
         (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds_lane=10), 70, 2, math.pi),
-        (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds=10, offset=0.5), 70, -1.5, 0.0),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds_lane=-10), 90, 2, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds=10), 90, 2, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=0, ds=-10), 70, 2, math.pi),
+        (model.RelativeLanePosition(entity_ref="B", d_lane=1, ds=10, offset=0.5), 90, -1.5, 0.0),
     ],
 )
 def test_frames(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:
