@@ -8,13 +8,16 @@ EidriveError
 │   └── SettingError     an option, a controller's property, a channel profile
 ├── RegistryError        two extensions claim one name, or one does not load
 └── SimulationError      the run itself broke
+    ├── ExtensionError   an extension raised an exception or returned something invalid
+    └── WallLimitError   a run took longer than its limit of wall time
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 MAX_DIAGNOSTICS = 200
 """Maximum number of diagnostics of one kind that are collected for one file."""
@@ -88,6 +91,97 @@ class RegistryError(EidriveError):
 
 class SimulationError(EidriveError):
     """The run itself broke."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what `--json` prints of a run that was aborted by this error."""
+        return {"kind": "run", "message": str(self)}
+
+
+@dataclass(frozen=True)
+class ExtensionPlace:
+    """An extension at work: what it is, for whom, when, and the line of its code.
+
+    kind      singular of the entry-point group (detector, planner, …), or observer
+    name      of the entry point; of an observer, its class
+    value     module and object of the entry point
+    subject   for whom it was called: station 'Ego', actor 'Ego', or the place of an element in the file
+    time      simulated time [s]; None before the run
+    """
+
+    kind: str
+    name: str
+    value: str
+    subject: str = ""
+    time: float | None = None
+    file: str = ""
+    line: int | None = None
+    function: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}: " if self.file else ""
+        value = f" ({self.value})" if self.value else ""
+        subject = f" of {self.subject}" if self.subject else ""
+        time = f" at t = {self.time:.3f} s" if self.time is not None else ""
+        return f"{place}{self.kind} {self.name!r}{value}{subject}{time}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields with their names, without those that are not known."""
+        return {key: value for key, value in asdict(self).items() if value not in ("", None)}
+
+
+class ExtensionError(SimulationError):
+    """An extension raised an exception or returned something invalid; `place` says which one and where."""
+
+    def __init__(self, place: ExtensionPlace, problem: str) -> None:
+        super().__init__(f"{place}: {problem}")
+        self.place = place
+        self.problem = problem
+
+    def __reduce__(self) -> tuple[type[ExtensionError], tuple[ExtensionPlace, str]]:
+        return type(self), (self.place, self.problem)
+
+    def as_json(self) -> dict[str, Any]:
+        return {**super().as_json(), **self.place.as_json(), "problem": self.problem}
+
+
+class WallLimitError(SimulationError):
+    """A run took longer than its limit of wall time.
+
+    limit   [s] of wall time
+    place   the extension that was running; None if none was
+    time    simulated time [s] that the run had reached; None before the run
+    where   `file:line in function` that was running
+    """
+
+    def __init__(
+        self, limit: float, place: ExtensionPlace | None = None, time: float | None = None, where: str = ""
+    ) -> None:
+        if place is not None:
+            running = f"{place}: still running" + (f" in {place.function}" if place.function else "")
+        else:
+            running = f"{where}: " if where else ""
+            running += "the run is not finished" + (f" at t = {time:.3f} s" if time is not None else "")
+        super().__init__(f"{running} after {limit:g} s of wall time (the wall limit)")
+        self.limit, self.place, self.time, self.where = limit, place, time, where
+
+    def __reduce__(self) -> tuple[type[WallLimitError], tuple[float, ExtensionPlace | None, float | None, str]]:
+        return type(self), (self.limit, self.place, self.time, self.where)
+
+    def as_json(self) -> dict[str, Any]:
+        place = {"kind": "run", "time": self.time} if self.place is None else self.place.as_json()
+        return {**super().as_json(), **place, "wall_limit": self.limit}
+
+
+class InvalidResult(Exception):
+    """An extension returned something that cannot be used; the run reports it as ExtensionError.
+
+    extension  the object whose `method` returned it
+    """
+
+    def __init__(self, extension: object, method: str, problem: str) -> None:
+        super().__init__(f"{method} {problem}")
+        self.extension = extension
+        self.method = method
 
 
 class Together:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+import sys
+import traceback
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from inspect import isabstract
 from typing import Any
 
-from eidrive_scenario.errors import Problem, RegistryError, SettingError, suggestion
+from eidrive_scenario.errors import InvalidResult, Problem, RegistryError, SettingError, suggestion
 
 GROUPS = ("actions", "conditions", "criteria", "detectors", "channels", "fusion", "planners", "controllers")
+_SINGULAR = {"criteria": "criterion", "fusion": "fusion method", "controllers": "controller model"}
+_BUILT_IN = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
+_loaded: dict[type, tuple[str, str, str]] = {}
+"""Kind, name and value of the entry point of each extension that was loaded."""
 
 
 class Registry:
@@ -40,24 +46,125 @@ class Registry:
         """The module and object behind a name, as `package.module:Object`."""
         return self._points[name].value
 
-    def load(self, name: str) -> Any:
-        """The extension of that name. Raises SettingError if there is none, RegistryError if it does not import
-        or leaves out a method that its base class asks for."""
+    def load(self, name: str, base: type | None = None) -> Any:
+        """The extension of that name, a class derived from `base`.
+
+        Raises SettingError if there is none. Raises RegistryError if it does not import, is no such class, leaves out
+        a method that its base class asks for, or defines one that cannot be called in the same way.
+        """
         point = self._points.get(name)
         if point is None:
             singular = self.kind.removesuffix("s")
             raise SettingError(Problem(f"unknown {singular} {name!r}", suggestion(name, self._points)))
-        try:
-            found = point.load()
-        except (ImportError, AttributeError) as error:
-            raise RegistryError(f"{self.kind} {name!r} ({point.value}) does not load: {error}") from error
-        if isabstract(found):
+        found = self._import(point)
+        if found in _checked.get((self.kind, name, base), ()):
+            return found
+        described = f"{self.kind} {name!r} ({point.value})"
+        if base is not None and not (isinstance(found, type) and issubclass(found, base)):
+            what = found.__name__ if isinstance(found, type) else f"an object of type {type(found).__name__}"
+            raise RegistryError(f"{described} is no class derived from {base.__name__} (got {what})")
+        if inspect.isabstract(found):
             missing = ", ".join(sorted(found.__abstractmethods__))
-            raise RegistryError(f"{self.kind} {name!r} ({point.value}) lacks {missing}")
+            raise RegistryError(f"{described} lacks {missing}")
+        if isinstance(found, type):
+            for problem in _mismatches(found):
+                raise RegistryError(f"{described}: {problem}")
+            _loaded.setdefault(found, (_SINGULAR.get(self.kind, self.kind.removesuffix("s")), name, point.value))
+            _checked[self.kind, name, base] = (found,)
         return found
+
+    def _import(self, point: EntryPoint) -> Any:
+        try:
+            return point.load()
+        except (Exception, SystemExit) as error:
+            place = _raised_at(error)
+            text = str(error) if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {error}"
+            described = f"{self.kind} {point.name!r} ({point.value})"
+            raise RegistryError(f"{described} does not load: {text}{f' ({place})' if place else ''}") from error
+
+
+_checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 
 
 @cache
 def registry(kind: str) -> Registry:
     """The registry of one kind, read once per process."""
     return Registry(kind)
+
+
+def construct(extension_class: Any, *given: Any, **named: Any) -> Any:
+    """Return an instance of an extension. Raise InvalidResult if its constructor does not take these arguments."""
+    try:
+        return extension_class(*given, **named)
+    except TypeError as error:
+        if error.__traceback__ is not None and error.__traceback__.tb_next is None:
+            raise InvalidResult(extension_class, "__init__", f"cannot be called: TypeError: {error}") from error
+        raise
+
+
+def third_party_files() -> dict[str, dict[str, tuple[str, str, str]]]:
+    """Return kind, name and value of the loaded extensions of others, by file and qualified name of their classes."""
+    found: dict[str, dict[str, tuple[str, str, str]]] = {}
+    for extension_class, known in _loaded.items():
+        file = getattr(sys.modules.get(extension_class.__module__), "__file__", None)
+        if file is not None and not is_built_in(extension_class):
+            found.setdefault(file, {})[extension_class.__qualname__] = known
+    return found
+
+
+def registration(extension_class: type) -> tuple[str, str, str] | None:
+    """Return kind, name and value of the entry point through which a class was loaded, or None."""
+    for one in extension_class.__mro__:
+        if one in _loaded:
+            return _loaded[one]
+    return None
+
+
+def is_built_in(extension_class: type) -> bool:
+    """Whether a class is part of this project."""
+    return extension_class.__module__.partition(".")[0] in _BUILT_IN
+
+
+def _mismatches(found: type) -> Iterator[str]:
+    """Methods of a third party's class that cannot be called as those of this project that they override."""
+    bases = [one for one in found.__mro__ if is_built_in(one)]
+    for own_class in found.__mro__:
+        if own_class in bases:
+            continue
+        for name, own in vars(own_class).items():
+            expected = next((vars(base)[name] for base in bases if name in vars(base)), None)
+            if name.startswith("_") or not inspect.isfunction(expected):
+                continue
+            plain = own.__func__ if isinstance(own, staticmethod | classmethod) else own
+            if not callable(plain):
+                yield f"{name} is an object of type {type(plain).__name__} (expected a method)"
+            elif inspect.isgeneratorfunction(plain) or inspect.iscoroutinefunction(plain):
+                yield f"{name} is a generator or coroutine (expected a method that returns its result)"
+            elif problem := _signature_problem(own, plain, expected):
+                yield f"{name}{problem}"
+
+
+def _signature_problem(own: Any, plain: Any, expected: Any) -> str:
+    """How the signature of a method differs from that of its base class, so that a call fails; "" if it does not."""
+    wanted = inspect.signature(expected)
+    try:
+        given = inspect.signature(plain)
+    except (TypeError, ValueError):
+        return ""
+    parameters = wanted.parameters.values()
+    named = {entry.name: None for entry in parameters if entry.kind is entry.KEYWORD_ONLY}
+    positional = [None for entry in parameters if entry.kind in (entry.POSITIONAL_ONLY, entry.POSITIONAL_OR_KEYWORD)]
+    try:
+        given.bind(*positional[isinstance(own, staticmethod) :], **named)
+    except TypeError as error:
+        return f"{given} cannot be called as {expected.__qualname__}{wanted}: {error}"
+    return ""
+
+
+def _raised_at(error: BaseException) -> str:
+    """Return `file:line` of the raise in the imported module; "" if the import itself failed."""
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}:{error.lineno}"
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
+    own = [frame for frame in frames if frame.filename != __file__]
+    return f"{own[-1].filename}:{own[-1].lineno}" if own else ""

@@ -9,9 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
+from eidrive_scenario.attribution import attributed, report_extension
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
 from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.errors import Together, suggestion
+from eidrive_scenario.errors import Problem, SettingError, Together, suggestion
 from eidrive_scenario.library import name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
@@ -22,7 +23,7 @@ from eidrive_scenario.recording.criteria_text import (
     stop_trigger_criteria,
     unbuilt_criteria,
 )
-from eidrive_scenario.recording.criterion import Criterion, Verdict
+from eidrive_scenario.recording.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -71,6 +72,7 @@ class Simulation:
     Raises InputError while it is built if the scenario, its roads or the settings are wrong.
     """
 
+    @attributed
     def __init__(
         self,
         source: Scenario | Source | ConcreteRun,
@@ -82,6 +84,9 @@ class Simulation:
     ) -> None:
         self.seed = seed
         self.settings = settings or RunSettings()
+        self._observers: tuple[Observer, ...] = ()
+        for observer in observers:
+            self.add_observer(observer)
         self._run = source.number if isinstance(source, ConcreteRun) else None
         together = Together()
         self.scenario = scenario = _load_for_run(source, seed, self.settings.parameters, together)
@@ -114,7 +119,6 @@ class Simulation:
         self.world = World(self.roads, dt=self.settings.dt, entities=self.storyboard.road_objects)
         if self._weather is not None:
             self.world.set_weather(self._weather)
-        self._observers = tuple(observers)
         self._trace = TraceHash()
         doubts = self.roads.doubts if self.roads is not None else ()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario), *doubts)]
@@ -141,8 +145,9 @@ class Simulation:
 
     def add_observer(self, observer: Observer) -> None:
         """Show the frames of all ticks from now on to this observer too, and close it with the run."""
-        self._observers = (*self._observers, observer)
+        self._observers = (*self._observers, _checked_observer(observer))
 
+    @attributed
     def close(self) -> None:
         """Free the world and finish what the observers write, each of them, whatever another one meets at it."""
         with ExitStack() as stack:
@@ -172,7 +177,22 @@ class Simulation:
             return self._result(frame, end, time.perf_counter() - started)
 
     def tick(self) -> tuple[Frame, str | None]:
-        """One step of the loop: the frame of this instant, and why the run ends with it (None: it goes on)."""
+        """One step of the loop: the frame of this instant, and why the run ends with it (None: it goes on).
+
+        Raises ExtensionError if an extension raises an exception or returns something invalid.
+        """
+        try:
+            return self._tick()
+        except BaseException as error:
+            self.attribute(error)
+            raise
+
+    def attribute(self, error: BaseException) -> None:
+        """Raise ExtensionError from an error that an extension of this run raised; return otherwise."""
+        world: World | None = getattr(self, "world", None)
+        report_extension(error, time=None if world is None else world.time, observers=self._observers)
+
+    def _tick(self) -> tuple[Frame, str | None]:
         view = self.world.view()
         steps = self.stations.act(self.world, view)
         commands = self.storyboard.tick(view)
@@ -204,7 +224,7 @@ class Simulation:
         if self._exit is not None:
             return f"command: {self._exit.name}"
         for criterion in self.criteria:
-            if criterion.fatal and (verdict := criterion.verdict()).fatal and not verdict.passed:
+            if criterion.fatal and (verdict := checked_verdict(criterion)).fatal and not verdict.passed:
                 return f"criterion: {criterion.name}"
         if self.storyboard.ended is not None:
             return self.storyboard.ended
@@ -275,13 +295,14 @@ class Simulation:
             if name not in wanted:
                 yield f"no UserDefinedValueCondition asks for {name!r}; {suggestion(name, wanted)}"
 
+    @attributed
     def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
-        verdicts = [criterion.verdict() for criterion in self.criteria]
+        verdicts = [checked_verdict(criterion) for criterion in self.criteria]
         if self._exit is not None:
             verdicts.append(self._exit)
         metrics: dict[str, float] = {}
         for criterion in self.criteria:
-            metrics.update(criterion.metrics())
+            metrics.update(checked_metrics(criterion))
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
         passed = all(verdict.passed for verdict in verdicts)
@@ -306,6 +327,15 @@ class Simulation:
             links=dict(self.stations.link_statistics(frame.view.time)),
             settings=self.resolved,
         )
+
+
+def _checked_observer(observer: Observer) -> Observer:
+    """Raise SettingError for an object that lacks the methods of an observer."""
+    for method in ("observe", "close"):
+        if not callable(getattr(observer, method, None)):
+            name = type(observer).__name__
+            raise SettingError(Problem(f"observer {name} has no method {method}", "define observe(frame) and close()"))
+    return observer
 
 
 def run_file(

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from eidrive_scenario.errors import EidriveError, InputError
+from eidrive_scenario.errors import EidriveError, ExtensionError, InputError
 
 WRONG_INPUT, BROKEN = 2, 3
 _INTERRUPTED, _NOBODY_READS = 130, 141
@@ -35,30 +35,24 @@ class Guarded(TyperGroup):
             # The reader, say `head`, has enough. Python would complain once more when it flushes at the end.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(_NOBODY_READS) from error
-        except EidriveError as error:
-            if ctx.params.get("traceback"):
-                raise
-            typer.echo(f"the run broke: {error}", err=True)
-            tell_notes(error)
-            raise typer.Exit(BROKEN) from error
-        except OSError as error:
-            if ctx.params.get("traceback"):
-                raise
-            tell(error)
-            raise typer.Exit(BROKEN) from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if ctx.params.get("traceback") or _from_typer(error):
                 raise
             tell(error)
             raise typer.Exit(BROKEN) from error
 
 
-def tell(error: Exception, file: object = None) -> None:
-    """Say on stderr what broke in a few words: what the system refused, or an error of this program's own.
+def tell(error: BaseException, file: object = None) -> None:
+    """Say on stderr what broke in a few words: the run, what the system refused, or an error of this program's own.
 
     file  which one it broke at, where several are worked through
     """
     place = f"{file}: " if file is not None else ""
+    error = _attributed(error)
+    if isinstance(error, EidriveError):
+        typer.echo(f"{place}the run broke: {error}", err=True)
+        tell_notes(error)
+        return
     if isinstance(error, OSError) and error.strerror:
         where = f": {error.filename}" if error.filename is not None else ""
         typer.echo(f"{place}broken off: {error.strerror}{where}", err=True)
@@ -75,6 +69,19 @@ def tell_notes(error: BaseException) -> None:
         typer.echo(note, err=True)
 
 
-def _from_typer(error: Exception) -> bool:
+def _attributed(error: BaseException) -> BaseException:
+    """The error, or that of the extension which raised it."""
+    if isinstance(error, EidriveError):
+        return error
+    from eidrive_scenario.attribution import report_extension
+
+    try:
+        report_extension(error)
+    except ExtensionError as found:
+        return found
+    return error
+
+
+def _from_typer(error: BaseException) -> bool:
     """Exits and usage errors, which typer shows itself; it brings its own copy of click in newer versions."""
     return any(kind.__module__.split(".")[0] in ("typer", "click") for kind in type(error).__mro__)

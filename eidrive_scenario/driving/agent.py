@@ -14,12 +14,16 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.control import Controller
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.received_objects import ReceivedObjects
+from eidrive_scenario.driving.result_checks import check_followed, check_plan
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.speaker import Speaker
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
+from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.result_checks import check_detections, is_checked
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.message import Message, Received, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
@@ -63,7 +67,9 @@ class Agent:
         self.settings = settings
         self.perception = perception
         self.fusion = fusion
+        self._fusion_checked = is_checked(fusion)
         self.planner = planner
+        self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
         self.listens = listens
         """Whether the messages of others are for this station; one that does not drive may only speak."""
@@ -99,11 +105,15 @@ class Agent:
         if found is not None and not self.own_perception:
             self._take(Report(self.name, found, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
+        if self._fusion_checked:
+            check_detections(self.fusion, "fuse", fused)
         plan = None
         if self.planner is not None:
             if self.settings.obey_signals:
                 self.planner.heed(self.perception.signals(readings))
             plan = self.planner.plan(ego, fused, goal, now)
+            if self._planner_checked:
+                check_plan(self.planner, plan)
         return AgentStep(
             detections=detections,
             inbox=tuple(inbox),
@@ -202,7 +212,17 @@ class Agent:
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:
             return None
-        return self.controller.parked() if plan is None else self.controller.control(ego, plan)
+        if plan is None or self.planner is None:
+            return self.controller.parked()
+        try:
+            control = self.controller.control(ego, plan)
+        except (ArithmeticError, ValueError, LookupError):
+            check_followed(self.planner, plan)
+            raise
+        if not math.isfinite(control.throttle + control.brake + control.steering):
+            check_followed(self.planner, plan)
+            raise SimulationError(f"station {self.name!r}: the controller returned {control} (expected finite numbers)")
+        return control
 
     def _state(self, ego: EgoState) -> StationState:
         x, y, z = ego.position.tolist()

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.speaker import Speaker
@@ -16,7 +17,7 @@ from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
-from eidrive_scenario.registry import registry
+from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
@@ -27,21 +28,21 @@ from eidrive_scenario.world.actor import ActorSpec
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
-    kind: type[Detector] = registry("detectors").load(settings.detector)
+    kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
     return Rig(spec, settings.rig_sensors(kind.needs, kind.usual_sensors), seed=seed)
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
     """The detector that the settings name. Raises SettingError, with this place, if its own settings are wrong."""
-    kind: type[Detector] = registry("detectors").load(settings.detector)
+    kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
     given = settings.detector_settings
     if kind.settings_type is not None:
         own = parse_settings(kind.settings_type, given, source=source, line=line)
-        return kind(own)  # type: ignore[call-arg]
+        return construct(kind, own)  # type: ignore[no-any-return]
     if given:
         message = f"detector {settings.detector!r} has no settings of its own"
         raise SettingError(Problem(message, "remove the property 'detector_settings'", source, line))
-    return kind()
+    return construct(kind)  # type: ignore[no-any-return]
 
 
 def build_fusion(
@@ -49,7 +50,7 @@ def build_fusion(
 ) -> FusionMethod:
     """The fusion method that the settings name. Raises SettingError, with this place, if its own settings are wrong,
     or if it joins points and the detector looks at none."""
-    kind: type[FusionMethod] = registry("fusion").load(settings.fusion)
+    kind: type[FusionMethod] = registry("fusion").load(settings.fusion, FusionMethod)
     given = settings.fusion_settings
     if given and kind.settings_type is None:
         message = f"fusion {settings.fusion!r} has no settings of its own"
@@ -58,8 +59,9 @@ def build_fusion(
         message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
         raise SettingError(Problem(message, "give it a detector for LiDAR: lidar", source, line))
     if kind.settings_type is None:
-        return kind()
-    return kind(parse_settings(kind.settings_type, given, source=source, line=line))  # type: ignore[call-arg]
+        return construct(kind)  # type: ignore[no-any-return]
+    own = parse_settings(kind.settings_type, given, source=source, line=line)
+    return construct(kind, own)  # type: ignore[no-any-return]
 
 
 def build_agent(
@@ -106,7 +108,7 @@ def build_agent(
         fusion=fusion,
         planner=None
         if planner == NO_PLANNER
-        else registry("planners").load(planner)(settings, spec, roads, dt=dt, seed=seed),
+        else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
         controller=Controller(spec, dt) if wheels else None,
         speaker=Speaker(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,

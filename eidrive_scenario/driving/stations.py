@@ -18,12 +18,14 @@ from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
 from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.channel_checks import check_delivered, check_interval, check_statistics, check_told
 from eidrive_scenario.v2x.link_events import LinkEvents
 from eidrive_scenario.v2x.message import LinkEvent, Received
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
@@ -64,6 +66,8 @@ class Stations:
         self._dt = dt
         self._fixed_channel = channel is not None
         self._channel: Channel | None = None
+        self._checked_channel: Channel | None = None
+        """The channel, if its results are checked: that of a third party."""
         self._silenced: Channel | None = None
         """The channel before, where there is none any more: its books still count."""
         self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
@@ -160,6 +164,8 @@ class Stations:
         now = view.time
         for name, agent in self._agents.items():
             agent.message_interval = 0.0 if self._channel is None else self._channel.interval(name)
+            if self._checked_channel is not None:
+                check_interval(self._checked_channel, agent.message_interval)
         return {
             name: agent.act(readings[name], self._deliver(name, now), now, self.goals.get(name))
             for name, agent in self._agents.items()
@@ -192,6 +198,8 @@ class Stations:
             receivers = self._listeners(sender)
             outbox += [(message, receivers) for message in step.outbox]
         told = self._channel.transmit(outbox, now)
+        if self._checked_channel is not None:
+            check_told(self._checked_channel, told)
         self._books = None
         self.links = told if isinstance(told, LinkEvents) else tuple(told)
 
@@ -214,6 +222,8 @@ class Stations:
             return {}
         if self._books is None or self._books[0] != now:
             self._books = now, channel.statistics(now)
+            if not is_built_in(type(channel)):
+                check_statistics(channel, self._books[1])
         return self._books[1]
 
     def _surroundings(self, world: World, view: WorldView) -> Surroundings:
@@ -223,7 +233,12 @@ class Stations:
         return Surroundings(places, partial(sight_lines, world, places))
 
     def _deliver(self, receiver: str, now: float) -> Sequence[Received]:
-        return self._channel.deliver(receiver, now) if self._channel is not None else ()
+        if self._channel is None:
+            return ()
+        delivered = self._channel.deliver(receiver, now)
+        if self._checked_channel is not None:
+            check_delivered(self._checked_channel, delivered, now)
+        return delivered
 
     def _listeners(self, sender: str) -> list[str]:
         """Who hears `sender`: listening stations that count it; itself too where the channel carries own perception."""
@@ -244,6 +259,8 @@ class Stations:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
         before = self._channel or self._silenced
         self._channel = build_channel(profile, self._seed, previous=before)
+        third_party = self._channel is not None and not is_built_in(type(self._channel))
+        self._checked_channel = self._channel if third_party else None
         self._silenced = before if self._channel is None else None
         self._books = None
         self.channel_profile = profile

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
+from eidrive_scenario.perception.result_checks import check_detections, describe, is_checked
 from eidrive_scenario.perception.tracking import Tracker
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 
@@ -37,6 +39,7 @@ class Perception:
         latency: float = 0.0,
     ) -> None:
         self.detector = detector
+        self._checked = is_checked(detector)
         self._tracker = tracker
         self._localizer = localizer
         self._latency = latency
@@ -56,13 +59,18 @@ class Perception:
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
         """The traffic lights and stop signs in sight: those that the detector reads, and the lookout's."""
-        return (*self.detector.signals(), *readings.signals)
+        found = self.detector.signals()
+        if not isinstance(found, Sequence):
+            raise InvalidResult(self.detector, "signals", f"returned {describe(found)} (expected SignalReadings)")
+        return (*found, *readings.signals)
 
     def perceive(self, readings: Readings) -> Detections | None:
         """The newest objects that become known now; None if there is nothing new."""
         now = readings.time
         if _has_all(readings, self.detector.needs):
             found = self.detector.detect(readings)
+            if self._checked:
+                check_detections(self.detector, "detect", found)
             if self._latency <= 0.0 and not self._computing:
                 return found if self._tracker is None else self._tracker.update(found)
             self._computing.append((now + self._latency, found))

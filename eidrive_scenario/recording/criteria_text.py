@@ -17,7 +17,7 @@ from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.openscenario.references import resolve_references
 from eidrive_scenario.recording.criterion import Criterion, Verdict
-from eidrive_scenario.registry import registry
+from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import key_lines, load_yaml, parse_settings
 
 EXITS = {"exitSuccess": True, "exitFailure": False}
@@ -96,14 +96,14 @@ def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mappi
     known = registry("criteria")
     if kind not in known:
         raise SettingError(Problem(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
-    criterion_type = known.load(kind)
+    criterion_type = known.load(kind, Criterion)
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
         fields = criterion_type.settings_type.model_fields.items()
         remedy = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
         raise SettingError(Problem(f"{kind} is given {settings!r}", remedy, source, line))
     parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
-    criterion: Criterion = criterion_type(parsed)
+    criterion: Criterion = construct(criterion_type, parsed)
     return criterion
 
 

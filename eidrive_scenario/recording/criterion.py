@@ -5,10 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
+from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.settings import Settings
 
@@ -78,9 +81,38 @@ def never_appeared(names: Iterable[str]) -> str:
     return f"{' and '.join(names)} {verb} never in the world, so nothing was measured"
 
 
+def checked_verdict(criterion: Criterion) -> Verdict:
+    """Return the verdict of a criterion. Raise InvalidResult if it is none, or if its numbers are undefined."""
+    verdict: object = criterion.verdict()
+    if not isinstance(verdict, Verdict):
+        what = "None" if verdict is None else f"an object of type {type(verdict).__name__}"
+        raise InvalidResult(criterion, "verdict", f"returned {what} (expected Verdict)")
+    if not isinstance(verdict.passed, bool | np.bool_):
+        raise InvalidResult(criterion, "verdict", f"returned passed = {verdict.passed!r} (expected True or False)")
+    for name in ("value", "limit", "first_violation"):
+        number = getattr(verdict, name)
+        if number is not None and (not isinstance(number, Real | np.bool_) or number != number):
+            raise InvalidResult(criterion, "verdict", f"returned {name} = {number!r} (expected a number or None)")
+    for name in ("name", "unit", "reason"):
+        if not isinstance(text := getattr(verdict, name), str):
+            raise InvalidResult(criterion, "verdict", f"returned {name} = {text!r} (expected a text)")
+    return verdict
+
+
+def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
+    """Return the metrics of a criterion. Raise InvalidResult if they are no numbers by name."""
+    metrics: object = criterion.metrics()
+    if not isinstance(metrics, Mapping):
+        raise InvalidResult(criterion, "metrics", f"returned {metrics!r} (expected numbers by name)")
+    for name, number in metrics.items():
+        if not isinstance(name, str) or not isinstance(number, Real | np.bool_):
+            raise InvalidResult(criterion, "metrics", f"returned {name!r}: {number!r} (expected numbers by name)")
+    return metrics
+
+
 def judge(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
     """The verdicts of `criteria` over `frames`, say of a recording."""
     for frame in frames:
         for criterion in criteria:
             criterion.observe(frame)
-    return tuple(criterion.verdict() for criterion in criteria)
+    return tuple(checked_verdict(criterion) for criterion in criteria)

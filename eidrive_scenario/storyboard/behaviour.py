@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
+import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import InvalidResult, Problem, ScenarioError
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.stage import Absent, Stage
@@ -25,10 +27,16 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     the step that brings the action to its goal: it ends at the end of that step. In Init the step is 0 s long.
     """
 
+    third_party: ClassVar[bool] = False
+    """Whether it is no part of this project: what it decides is then checked."""
     domains: ClassVar[Domain] = Domain.NONE
     immediate: ClassVar[bool] = False
     """True for an action that moves nothing, as it sets a value: it acts as soon as it starts, and it ends at the
     instant at which `update` answers SUCCESS."""
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        cls.third_party = not is_built_in(cls)
 
     def __init__(
         self,
@@ -88,7 +96,28 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.stage.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").problems
         return why
 
+    def check_decision(self) -> None:
+        """Raise InvalidResult if `update` returned no status, or left its actor with numbers that are not finite."""
+        if self.status is Status.INVALID:
+            raise InvalidResult(self, "update", "returned no Status (expected RUNNING, SUCCESS or FAILURE)")
+        names = self.stage.actors if self.actor_name is None else (self.actor_name,)
+        for actor in [self.stage.actors[name] for name in names if name in self.stage.actors]:
+            left: dict[str, object] = {"motion.pose": actor.motion.pose, "motion.speed": actor.motion.speed}
+            if actor.goal is not None:
+                left |= {f"goal.{name}": value for name, value in vars(actor.goal).items() if value is not None}
+            for name, value in left.items():
+                if not _is_finite(value):
+                    text = f"left actor {actor.name!r} with {name} = {value!r} (expected finite numbers)"
+                    raise InvalidResult(self, "update", text)
+
     def problem(self, message: str, remedy: str = "") -> ScenarioError:
         """An error at the place of this action in the file."""
         where = self.action
         return ScenarioError(Problem(f"{type(where).__name__} {message}", remedy, where.source, where.line))
+
+
+def _is_finite(value: object) -> bool:
+    try:
+        return bool(np.isfinite(np.asarray(value, dtype=float)).all())
+    except (TypeError, ValueError):
+        return False

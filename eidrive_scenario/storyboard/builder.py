@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.errors import Problem, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.registry import Registry
+from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition, EntityCondition
 from eidrive_scenario.storyboard.elements import (
@@ -166,7 +166,9 @@ class Builder:
             try:
                 one = self._selections.single(leaf)
                 for around in [one] if parent is leaf else self._selections.alternatives(parent):
-                    made = self._actions.load(name)(one, self._stage, actor=actor, parent=around)
+                    made = construct(
+                        self._actions.load(name, ActionBehaviour), one, self._stage, actor=actor, parent=around
+                    )
                     if not isinstance(made, ActionBehaviour):
                         raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
                     behaviours.append(made)
@@ -200,17 +202,17 @@ class Builder:
         name = _registered(leaf, self._conditions)
         if not self._known(name, self._conditions, leaf, f"{name} is not evaluated yet"):
             return None
-        make = self._conditions.load(name)
+        make = self._conditions.load(name, Condition)
         wrong = RegistryError(f"conditions {name!r} ({self._conditions.value(name)}) is no Condition of this kind")
         if by_entity is None:
-            condition = make(leaf)
+            condition = construct(make, leaf)
             if not isinstance(condition, Condition):
                 raise wrong
             return condition
         triggering = by_entity.triggering_entities
         names = [one for ref in triggering.entity_ref for one in self._entities(ref.entity_ref)]
         rule = triggering.triggering_entities_rule.value
-        towards = [make(one, names, rule) for one in self._selections.alternatives(leaf)]
+        towards = [construct(make, one, names, rule) for one in self._selections.alternatives(leaf)]
         if not all(isinstance(one, EntityCondition) for one in towards):
             raise wrong
         return towards[0] if len(towards) == 1 else AnyMember(leaf, names, rule, towards)

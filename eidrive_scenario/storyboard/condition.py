@@ -6,6 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
+from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.storyboard.stage import Stage
 
@@ -96,6 +99,13 @@ class Condition(ABC):
         return ()
 
 
+def truth(condition: Condition, held: object) -> bool:
+    """Return the result of a condition as bool. Raise InvalidResult if it is none, as None and NaN are."""
+    if isinstance(held, bool | np.bool_):
+        return bool(held)
+    raise InvalidResult(condition, "the condition", f"returned {held!r} (expected True or False)")
+
+
 class EntityCondition(Condition):
     """A condition on each of several triggering entities, joined by `any` or `all`.
 
@@ -114,8 +124,12 @@ class EntityCondition(Condition):
 
     def holds(self, stage: Stage) -> bool:
         """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
-        self.fulfilled = tuple([name for name in self.entities if name in stage.view and self.holds_for(stage, name)])
+        self.fulfilled = tuple([name for name in self.entities if name in stage.view and self._holds_for(stage, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
+
+    def _holds_for(self, stage: Stage, entity: str) -> bool:
+        held: object = self.holds_for(stage, entity)
+        return held if held is True or held is False else truth(self, held)
 
     def explain(self, stage: Stage) -> str:
         """What is true of those that fulfil it, or of all."""

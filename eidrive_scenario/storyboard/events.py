@@ -206,6 +206,8 @@ class ActionElement(StoryElement):
             if behaviour.status is not Status.RUNNING and behaviour.performer_missing:
                 raise Absent(behaviour.actor_name)
             behaviour.tick_once()
+            if behaviour.third_party or behaviour.status is Status.INVALID:
+                behaviour.check_decision()
         except Absent as who:
             if self._tried_at == self.stage.progress.tick:
                 behaviour.stop(Status.INVALID)

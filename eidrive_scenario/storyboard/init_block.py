@@ -37,6 +37,8 @@ class InitBlock(Composite):
     def _started(self, behaviour: ActionBehaviour) -> bool:
         try:
             behaviour.tick_once()
+            if behaviour.third_party or behaviour.status is Status.INVALID:
+                behaviour.check_decision()
         except Absent:
             behaviour.stop(Status.INVALID)
             return False
@@ -63,6 +65,8 @@ class InitBlock(Composite):
         for behaviour in tuple(self.running):
             try:
                 yield from behaviour.tick()
+                if behaviour.third_party or behaviour.status is Status.INVALID:
+                    behaviour.check_decision()
             except Absent as who:
                 behaviour.give_up(who)
             if behaviour.status is not Status.RUNNING:

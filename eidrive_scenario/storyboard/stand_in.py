@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, SupportsFloat
 
-from eidrive_scenario.errors import Problem, RegistryError, suggestion
+from eidrive_scenario.errors import InvalidResult, Problem, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.registry import Registry
+from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.actor import Actor, is_ours
 from eidrive_scenario.storyboard.stage import Stage
 
@@ -38,7 +39,10 @@ class StandIn(ABC):
         if not self._active:
             self._active = True
             self.begin()
-        self.actor.motion.speed = self.speed()
+        speed = self.speed()
+        if not isinstance(speed, SupportsFloat) or not math.isfinite(speed):
+            raise InvalidResult(self, "speed", f"returned {speed!r} (expected a finite number)")
+        self.actor.motion.speed = speed
 
     @abstractmethod
     def begin(self) -> None:
@@ -55,11 +59,11 @@ def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, st
     Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
     """
     found = []
-    kinds = {name: known.load(stand_in) for name, stand_in in wanted.items()}
+    kinds = {name: known.load(stand_in, StandIn) for name, stand_in in wanted.items()}
     for actor in actors.values():
         for controller in actor.controllers:
             if controller.name in kinds:
-                made = kinds[controller.name](controller, stage, actor)
+                made = construct(kinds[controller.name], controller, stage, actor)
                 if not isinstance(made, StandIn):
                     raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
                 found.append(made)

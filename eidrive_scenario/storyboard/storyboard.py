@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import Pose, RoadNetwork
@@ -20,6 +21,7 @@ from eidrive_scenario.storyboard.stage import GivenPose, Stage
 from eidrive_scenario.storyboard.stand_in import left_alone, stand_ins
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind, refuse_circles
+from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.view import WorldView
 
 STOPPED = "stop trigger"
@@ -110,6 +112,7 @@ class Storyboard:
                 commands.placements[name] = actor.motion.step(self.dt)
             elif actor.motion.jumped:
                 commands.placements[name] = actor.motion.placement()
+        _check_placements(commands.placements)
         for front, back in trains:
             if front.present and back.present:
                 back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
@@ -148,6 +151,18 @@ class Storyboard:
         commands.signals, commands.appearances = stage.signals.states, stage.appearances
         commands.monitors = stage.monitors
         return commands
+
+
+def _check_placements(placements: Mapping[str, Placement]) -> None:
+    """Raise SimulationError for the first placement that is not finite; pybullet would take it as it is."""
+    total = 0.0
+    for placement in placements.values():
+        total += placement.x + placement.y + placement.z + placement.yaw + placement.speed
+    if math.isfinite(total):
+        return
+    for name, placement in placements.items():
+        if not all(map(math.isfinite, (placement.x, placement.y, placement.z, placement.yaw, placement.speed))):
+            raise SimulationError(f"actor {name!r} would be placed at {placement} (expected finite numbers)")
 
 
 def _empty_view() -> WorldView:

@@ -10,7 +10,8 @@ from typing import Protocol
 import py_trees
 from py_trees.common import Status
 
-from eidrive_scenario.storyboard.condition import Condition
+from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.storyboard.condition import Condition, truth
 from eidrive_scenario.storyboard.stage import Stage
 
 TINY = 1e-6
@@ -55,7 +56,8 @@ class ConditionMonitor:
             return self.result
         self._asked_at = stage.progress.tick
         self.evaluations += 1
-        result = self._edge(self.condition.holds(stage))
+        held: object = self.condition.holds(stage)
+        result = self._edge(held if held is True or held is False else truth(self.condition, held))
         if again and self.edge != "none" and self._pulse:
             return self.result
         self._pulse = result
@@ -79,7 +81,9 @@ class ConditionMonitor:
 
     def _words(self, stage: Stage) -> str:
         """Return the condition with its values of now."""
-        text = self.condition.explain(stage)
+        text: object = self.condition.explain(stage)
+        if not isinstance(text, str):
+            raise InvalidResult(self.condition, "explain", f"returned {text!r} (expected a text)")
         return text if self.value or self.edge == "none" else f"{text} (falling edge)"
 
     def _edge(self, value: bool) -> bool:

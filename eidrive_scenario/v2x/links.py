@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from eidrive_scenario.v2x.books import Book, LinkStatistics
@@ -40,8 +41,12 @@ class Links:
         self, message: Message, receiver: str, now: float, delay: float, distance: float | None = None
     ) -> LinkEvent:
         """Send a message that arrives `delay` [s] after `now`, over this distance between antennas [m]."""
-        if not delay >= 0.0:
-            raise ValueError(f"a delay of {delay} s would let {receiver!r} hear a message before it was said")
+        try:
+            valid = 0.0 <= delay < math.inf
+        except TypeError:
+            valid = False
+        if not valid:
+            raise ValueError(f"the delay of a message to {receiver!r} is {delay} (expected seconds from 0 on, finite)")
         arrives = now + delay
         self.carry((arrives, message.sender, message.number, now, Received(message, arrives)), receiver)
         book = self._enter(message, receiver)

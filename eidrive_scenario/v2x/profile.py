@@ -10,7 +10,7 @@ from eidrive_scenario.errors import Problem, RegistryError, SettingError, quoted
 from eidrive_scenario.files import is_regular_file
 from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.openscenario.references import is_reference, resolve_references
-from eidrive_scenario.registry import registry
+from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import Settings, key_lines, load_yaml, load_yaml_file, parse_settings
 from eidrive_scenario.v2x.channel import Channel
 
@@ -92,7 +92,7 @@ def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel |
     """
     if profile is None:
         return None
-    channel: Channel = registry("channels").load(profile.model)(profile, seed)
+    channel: Channel = construct(registry("channels").load(profile.model, Channel), profile, seed)
     if previous is not None:
         channel.take_over(previous)
     return channel
@@ -146,7 +146,7 @@ def _parse(
             f"unknown channel model {quoted(model)}", suggestion(str(model), models), source, lines.get("model", line)
         )
         raise SettingError(problem)
-    settings = getattr(models.load(model), "settings", None)
+    settings = getattr(models.load(model, Channel), "settings", None)
     if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
         raise RegistryError(f"the channel model {model!r} has no `settings`, a class derived from ChannelProfile")
     profile = parse_settings(settings, data, source=source, line=line, lines=lines)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import ExtensionError, InputError
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
@@ -208,7 +208,7 @@ def test_observers_are_closed_once_even_when_the_run_breaks() -> None:
             raise RuntimeError("full disk")
 
     watch = Breaks()
-    with pytest.raises(RuntimeError, match="full disk"):
+    with pytest.raises(ExtensionError, match=r"observer 'Breaks' at t = 0\.000 s: RuntimeError: full disk"):
         play(ONE, 1, watch)
     assert watch.closed == 1
 
@@ -226,6 +226,6 @@ def test_observers_are_closed_whatever_one_of_them_meets_at_it() -> None:
             if self.error:
                 raise OSError(self.error)
 
-    with pytest.raises(OSError, match="full disk"):
+    with pytest.raises(ExtensionError, match=r"observer 'Closes' .*OSError: full disk"):
         play(ONE, 1, Closes("first"), Closes("second", "full disk"), Closes("third"))
     assert order == ["first", "second", "third"]

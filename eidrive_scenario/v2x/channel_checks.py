@@ -1,0 +1,51 @@
+"""Checks of what a third party's channel returns; those of this project are not asked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.link_events import LinkEvents
+from eidrive_scenario.v2x.message import LinkEvent, Received
+
+_NUMBER = int | float | np.integer | np.floating
+
+
+def check_interval(channel: Channel, interval: Any) -> None:
+    """Raise InvalidResult unless the interval between messages [s] is a finite number from 0 on."""
+    if not isinstance(interval, _NUMBER) or not 0.0 <= interval < math.inf:
+        raise InvalidResult(channel, "interval", f"returned {interval!r} (expected a finite number from 0 on)")
+
+
+def check_delivered(channel: Channel, delivered: Any, now: float) -> None:
+    """Raise InvalidResult unless all that is delivered at `now` [s] are messages that have arrived by then."""
+    if not isinstance(delivered, tuple | list):
+        raise InvalidResult(channel, "deliver", f"returned {delivered!r} (expected a tuple of Received)")
+    for received in delivered:
+        if not isinstance(received, Received):
+            raise InvalidResult(channel, "deliver", f"returned {received!r} (expected Received)")
+        arrived: Any = received.arrived
+        if not isinstance(arrived, _NUMBER) or not -math.inf < arrived <= now + 1e-6:
+            text = f"returned a message that arrived at {arrived!r} (expected a time up to {now:g} s)"
+            raise InvalidResult(channel, "deliver", text)
+
+
+def check_told(channel: Channel, told: Any) -> None:
+    """Raise InvalidResult unless `transmit` answers with events of links."""
+    if isinstance(told, LinkEvents):
+        return
+    if not isinstance(told, Sequence) or not all(isinstance(event, LinkEvent) for event in told):
+        raise InvalidResult(channel, "transmit", f"returned {told!r} (expected a sequence of LinkEvents)")
+
+
+def check_statistics(channel: Channel, statistics: Any) -> None:
+    """Raise InvalidResult unless the statistics of links are a mapping."""
+    if not isinstance(statistics, Mapping):
+        raise InvalidResult(
+            channel, "statistics", f"returned {statistics!r} (expected a mapping by sender and receiver)"
+        )

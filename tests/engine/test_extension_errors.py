@@ -1,0 +1,253 @@
+"""Errors of extensions: each is reported with its name, for whom it was called, the time, and its line of code."""
+
+from __future__ import annotations
+
+import pickle
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from faulty_extensions import BROKEN_MODULES, install, line_of, write_scenario
+
+from eidrive_scenario.errors import ExtensionError, InputError, RegistryError
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.registry import registry
+from eidrive_scenario.simulation import RunResult, RunSettings, run_file
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The installed package of faulty extensions."""
+    folder = install(tmp_path_factory.mktemp("faulty"))
+    registry.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        yield folder
+    registry.cache_clear()
+    for name in ("faulty", *BROKEN_MODULES):
+        sys.modules.pop(name, None)
+
+
+def run(tmp_path: Path, *, detector: str = "oracle", channel: str = "ideal", **extensions: object) -> RunResult:
+    scenario = write_scenario(tmp_path / "s.xosc", **extensions)  # type: ignore[arg-type]
+    return run_file(scenario, settings=RunSettings(detector=detector, channel=channel))
+
+
+def error_of(tmp_path: Path, **extensions: str) -> ExtensionError:
+    with pytest.raises(ExtensionError) as caught:
+        run(tmp_path, **extensions)
+    return caught.value
+
+
+def test_run_of_sound_extensions_passes(package: Path, tmp_path: Path) -> None:
+    assert run(tmp_path, channel="{model: faulty, fault: sound}", criterion="faulty: {fault: sound}").passed
+
+
+# Exceptions
+
+
+@pytest.mark.parametrize(
+    ("extensions", "place", "time", "line", "problem"),
+    [
+        ({"detector": "raises"}, "detector 'raises' (faulty:Raises) of station 'Ego'", 0.0,
+         'raise KeyError("no such camera")', "KeyError: 'no such camera'"),
+        ({"detector": "exits"}, "detector 'exits' (faulty:Exits) of station 'Ego'", 0.5, "sys.exit(0)",
+         "SystemExit: 0 (an extension cannot end the process)"),
+        ({"detector": "raises_in_numpy"}, "detector 'raises_in_numpy' (faulty:RaisesInNumpy) of station 'Ego'", 0.0,
+         "np.linalg.inv", "numpy.linalg.LinAlgError: Singular matrix (raised at "),
+        ({"detector": "wrong_shape"}, "detector 'wrong_shape' (faulty:WrongShape) of station 'Ego'", 0.0,
+         "np.zeros((1, 6))", "ValueError: boxes have shape (1, 6), expected (N, 7) (raised at "),
+        ({"fusion": "fusion_hear_raises"}, "fusion method 'fusion_hear_raises' (faulty:FusionHearRaises) of station",
+         0.0, 'raise ZeroDivisionError("division', "ZeroDivisionError: division by zero"),
+        ({"planner": "planner_static_raises"}, "planner 'planner_static_raises' (faulty:PlannerStaticRaises) of stat",
+         0.0, "from a static method", "RuntimeError: from a static method"),
+        ({"channel": "{model: faulty, fault: raises}"}, "channel 'faulty' (faulty:FaultyChannel)", 0.0,
+         'raise OSError("no radio")', "OSError: no radio"),
+        ({"criterion": "faulty: {fault: observe}"}, "criterion 'faulty' (faulty:FaultyCriterion)", 0.5,
+         "this criterion fails to observe", "RuntimeError: this criterion fails to observe"),
+        ({"criterion": "faulty: {fault: verdict}"}, "criterion 'faulty' (faulty:FaultyCriterion)", 1.05,
+         'raise ValueError("no verdict")', "ValueError: no verdict"),
+        ({"action": "raises"}, "action 'faulty.action' (faulty:FaultyAction) of ", 0.55,
+         'raise LookupError("no such action")', "LookupError: no such action"),
+        ({"condition": "raises"}, "condition 'faulty.condition' (faulty:FaultyCondition) of ", 0.0,
+         'raise ArithmeticError("undefined")', "ArithmeticError: undefined"),
+    ],
+)  # fmt: skip
+def test_exception_of_extension_names_it_with_time_and_line(
+    package: Path, tmp_path: Path, extensions: dict[str, str], place: str, time: float, line: str, problem: str
+) -> None:
+    error = error_of(tmp_path, **extensions)
+    assert str(error.place).split(": ", 1)[1].startswith(place)
+    assert (error.place.file, error.place.line) == (str(package / "faulty.py"), line_of(line))
+    assert error.place.time == pytest.approx(time)
+    assert error.problem.startswith(problem)
+
+
+def test_exception_of_action_or_condition_names_its_place_in_the_scenario(package: Path, tmp_path: Path) -> None:
+    text = write_scenario(tmp_path / "t.xosc").read_text().splitlines()
+    for kind, element in (("action", 'type="faulty.action"'), ("condition", 'name="faulty.condition"')):
+        line = next(number for number, content in enumerate(text, 1) if element in content)
+        assert f"{tmp_path / 's.xosc'}:{line}" in str(error_of(tmp_path, **{kind: "raises"}))
+
+
+@pytest.mark.parametrize(
+    ("extensions", "line"),
+    [
+        ({"detector": "exits_when_built"}, "sys.exit(0)"),
+        ({"criterion": "faulty: {fault: built}"}, 'raise RuntimeError("not built")'),
+    ],
+)
+def test_exception_of_constructor_names_the_extension_without_a_time(
+    package: Path, tmp_path: Path, extensions: dict[str, str], line: str
+) -> None:
+    error = error_of(tmp_path, **extensions)
+    assert error.place.time is None or error.place.time == 0.0
+    assert error.place.line is not None
+    assert line in (package / "faulty.py").read_text().splitlines()[error.place.line - 1]
+
+
+def test_input_error_of_constructor_stays_an_input_error(package: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no weights; give weights"):
+        run(tmp_path, detector="wrong_settings")
+
+
+def test_exception_of_built_in_extension_names_it(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("eidrive_scenario.perception.oracle._certain", lambda count: 1 / 0)
+    error = error_of(tmp_path)
+    assert str(error.place).endswith("detector 'oracle' (eidrive_scenario.perception.oracle:OracleDetector) "
+                                     "of station 'Ego' at t = 0.000 s")  # fmt: skip
+    assert error.problem.startswith("ZeroDivisionError: division by zero")
+
+
+def test_extension_error_survives_pickling(package: Path, tmp_path: Path) -> None:
+    """Runs in other processes send it back."""
+    error = error_of(tmp_path, detector="raises")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.place) == (str(error), error.place)
+
+
+def test_keyboard_interrupt_of_extension_interrupts_the_run(
+    package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import faulty
+
+    def interrupt(self: object, readings: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(faulty.Raises, "detect", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path, detector="raises")
+
+
+# Invalid results
+
+
+@pytest.mark.parametrize(
+    ("extensions", "problem"),
+    [
+        ({"detector": "returns_nan"}, "detect returned boxes with the value nan (expected finite numbers)"),
+        ({"detector": "returns_none"}, "detect returned None (expected Detections)"),
+        ({"detector": "list_of_boxes"}, "detect returned an object of type list (expected Detections)"),
+        ({"detector": "no_signals", "signals": True}, "signals returned None (expected SignalReadings)"),
+        ({"fusion": "fusion_nan"}, "fuse returned boxes with the value inf (expected finite numbers)"),
+        ({"fusion": "fusion_none"}, "fuse returned None (expected Detections)"),
+        ({"planner": "planner_none"}, "plan returned None (expected Plan)"),
+        ({"planner": "planner_nan"}, "plan returned speeds with the value nan (expected finite numbers)"),
+        ({"planner": "planner_one_point"}, "plan returned points of shape (1, 2) and speeds of shape (1,) (expected"),
+        ({"planner": "planner_stands"}, "plan returned points 0 and 1 at the same place [0.0, 0.0] (expected a line)"),
+        ({"channel": "{model: faulty, fault: nan}"}, "ValueError: the delay of a message to 'Other' is nan"),
+        ({"channel": "{model: faulty, fault: inf}"}, "ValueError: the delay of a message to 'Other' is inf"),
+        ({"channel": "{model: faulty, fault: none}"}, "ValueError: the delay of a message to 'Other' is None"),
+        ({"channel": "{model: faulty, fault: interval}"}, "interval returned nan (expected a finite number from 0"),
+        ({"channel": "{model: faulty, fault: deliver}"}, "deliver returned None (expected a tuple of Received)"),
+        ({"criterion": "faulty: {fault: none}"}, "verdict returned None (expected Verdict)"),
+        ({"criterion": "faulty: {fault: nan}"}, "verdict returned passed = nan (expected True or False)"),
+        ({"criterion": "faulty: {fault: value}"}, "verdict returned value = nan (expected a number or None)"),
+        ({"criterion": "faulty: {fault: metrics}"}, "metrics returned None (expected numbers by name)"),
+        ({"action": "none"}, "update returned no Status (expected RUNNING, SUCCESS or FAILURE)"),
+        ({"condition": "none"}, "the condition returned None (expected True or False)"),
+        ({"condition": "nan"}, "the condition returned nan (expected True or False)"),
+    ],
+)
+def test_invalid_result_of_extension_names_it_and_what_is_expected(
+    package: Path, tmp_path: Path, extensions: dict[str, str], problem: str
+) -> None:
+    error = error_of(tmp_path, **extensions)
+    assert error.problem.startswith(problem)
+    assert error.place.value.startswith("faulty:")
+    assert error.place.file == str(package / "faulty.py")
+    assert error.place.line is not None
+
+
+def test_action_that_leaves_its_actor_with_nan_is_named(package: Path, tmp_path: Path) -> None:
+    error = error_of(tmp_path, action="nan")
+    assert error.place.name == "faulty.action"
+    assert error.problem.startswith("update left actor 'Ego' with motion.speed = nan")
+
+
+# Extensions that cannot be loaded
+
+
+@pytest.mark.parametrize(
+    ("detector", "problem"),
+    [
+        ("yields", "detect is a generator or coroutine (expected a method that returns its result)"),
+        ("few_arguments", "detect(self) cannot be called as Detector.detect(self, readings: 'Readings')"),
+        ("lacks", " lacks detect"),
+        ("no_detector", "is no class derived from Detector (got NoDetector)"),
+        ("a_function", "is no class derived from Detector (got an object of type function)"),
+        ("faulty_exits", "does not load: SystemExit: 0 (FOLDER/faulty_exits.py:2)"),
+        ("faulty_syntax", "does not load: SyntaxError: invalid syntax (faulty_syntax.py, line 1)"),
+        ("faulty_raises", "does not load: ZeroDivisionError: division by zero (FOLDER/faulty_raises.py:2)"),
+        ("faulty_import", "does not load: No module named 'no_such_module' (FOLDER/faulty_import.py:1)"),
+    ],
+)
+def test_extension_that_cannot_be_loaded_is_named(package: Path, tmp_path: Path, detector: str, problem: str) -> None:
+    text = re.escape(problem.replace("FOLDER", str(package)))
+    with pytest.raises(RegistryError, match=rf"detectors '{detector}' \(faulty\w*:\w+\).*{text}"):
+        run(tmp_path, detector=detector)
+
+
+def test_planner_with_another_constructor_is_named(package: Path, tmp_path: Path) -> None:
+    error = error_of(tmp_path, planner="planner_arguments")
+    assert error.place.name == "planner_arguments"
+    assert "TypeError" in error.problem
+
+
+# Observers
+
+
+class Watcher:
+    """An observer that raises when it is told to."""
+
+    def __init__(self, error: BaseException | None = None, close_error: BaseException | None = None) -> None:
+        self.error, self.close_error = error, close_error
+
+    def observe(self, frame: Frame) -> None:
+        if self.error is not None:
+            raise self.error
+
+    def close(self) -> None:
+        if self.close_error is not None:
+            raise self.close_error
+
+
+@pytest.mark.parametrize(
+    "observer", [Watcher(ValueError("no")), Watcher(None, ValueError("no")), Watcher(SystemExit(0))]
+)
+def test_exception_of_observer_names_its_class(package: Path, tmp_path: Path, observer: Watcher) -> None:
+    with pytest.raises(ExtensionError, match=r"observer 'Watcher'.*(ValueError: no|SystemExit: 0)") as caught:
+        run_file(write_scenario(tmp_path / "s.xosc"), observers=[observer])
+    assert caught.value.place.file == __file__
+
+
+def test_observer_without_close_is_refused(package: Path, tmp_path: Path) -> None:
+    class Half:
+        def observe(self, frame: Frame) -> None: ...
+
+    with pytest.raises(InputError, match="observer Half has no method close"):
+        run_file(write_scenario(tmp_path / "s.xosc"), observers=[Half()])  # type: ignore[list-item]
