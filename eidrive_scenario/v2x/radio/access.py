@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,10 @@ class Transmission:
     first_band: int = 0
     bands: int = 1
     """Which subchannels it takes."""
+    reserves: bool = False
+    """Whether its control information announces another use of the resource."""
+    control: NDArray[np.int8] | None = None
+    """(N,) what became of its control information at each station, as a cause of loss or 0; None where it has none."""
 
 
 class Access(ABC):
@@ -72,9 +76,8 @@ class Access(ABC):
         self.ready = np.full(count, math.inf)
         """When the first message of each station may contend [s]; infinity where there is none."""
         self._last_start = np.full(count, -math.inf)
-        self._last_duration = np.zeros(count)
-        self.free_from = np.full(count, -math.inf)
-        """From when on each station finds the medium free, as far as is known [s]."""
+        self._last_use = np.zeros(count)
+        """Channel time that the last message of each station took: its duration, times its share of the channel [s]."""
         self._busy_time = np.zeros(count)
         self._period_busy = np.zeros(count)
         self._period: int | None = None
@@ -91,43 +94,12 @@ class Access(ABC):
         """What has not started."""
         return [*self._arrivals, *(entry for queue in self._waiting for entry in queue)]
 
+    @abstractmethod
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
         """Play the medium up to `until` [s]: what has started, and what was thrown out of queues.
 
         power  (N, N) at which each station (column) receives each other (row) [dBm]
         """
-        started: list[Transmission] = []
-        dropped: list[Transmission] = []
-        if not self.names:
-            return started, dropped
-        sensed = power >= self.sensing_dbm
-        np.fill_diagonal(sensed, True)
-        nobody = np.full(len(self.names), math.inf)
-        while True:
-            starts = self.starts() if self.contending else nobody
-            row = int(np.argmin(starts)) if self.contending else 0
-            start = float(starts[row])
-            if self._arrivals and self._arrivals[0].ready <= min(start, until - EARLY):
-                dropped += self._arrive(self._arrivals.popleft())
-                continue
-            if not start < until - EARLY:
-                break
-            self._measure(start)
-            transmission = self._head[row]
-            assert transmission is not None
-            self._begin(row, transmission, start, sensed[row], starts)
-            started.append(transmission)
-        if math.isfinite(until):
-            self._measure(until)
-        return started, dropped
-
-    @abstractmethod
-    def starts(self) -> Array:
-        """(N,) when the first message of each station would go on the air [s]; infinity where none waits."""
-
-    @abstractmethod
-    def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
-        """A station has gone on the air, and those in `sensed` notice; `starts` are what `starts()` said before."""
 
     @abstractmethod
     def headed(self, row: int, transmission: Transmission | None) -> None:
@@ -144,11 +116,11 @@ class Access(ABC):
 
     def interval(self, row: int) -> float:
         """How long congestion control lets a station wait from one message to the next, after its last one [s]."""
-        return self.gate.interval(row, float(self._last_duration[row]))
+        return self.gate.interval(row, float(self._last_use[row]))
 
-    def busy_for(self, row: int) -> float:
-        """How long a station has found the medium busy so far [s]."""
-        return float(self._busy_time[row] + self._period_busy[row])
+    def busy_ratio(self, row: int, span: float) -> float:
+        """The channel busy ratio of a station over the `span` [s] since it joined."""
+        return float(self._busy_time[row] + self._period_busy[row]) / span
 
     def rearrange(self, names: tuple[str, ...]) -> list[Transmission]:
         """Other stations from now on; the answer is what those had still to say who have left."""
@@ -163,8 +135,7 @@ class Access(ABC):
         for field, fresh in (
             ("ready", math.inf),
             ("_last_start", -math.inf),
-            ("_last_duration", 0.0),
-            ("free_from", -math.inf),
+            ("_last_use", 0.0),
             ("_busy_time", 0.0),
             ("_period_busy", 0.0),
         ):
@@ -214,18 +185,12 @@ class Access(ABC):
         self._head[row], self.ready[row] = first, max(first.ready, opens)
         self.headed(row, first)
 
-    def _begin(
-        self, row: int, transmission: Transmission, start: float, sensed: NDArray[np.bool_], starts: Array
-    ) -> None:
+    def _begin(self, row: int, transmission: Transmission, start: float) -> None:
+        """The first message in the queue of a station goes on the air."""
         transmission.start, transmission.end = start, start + transmission.duration
         self._waiting[row].popleft()
-        self._last_start[row], self._last_duration[row] = start, transmission.duration
+        self._last_start[row], self._last_use[row] = start, transmission.duration * self.share(transmission)
         self.on_air.append(transmission)
-        busy = np.where(sensed, np.maximum(0.0, transmission.end - np.maximum(start, self.free_from)), 0.0)
-        self._period_busy += busy * self.share(transmission)
-        self.began(row, transmission, sensed, starts)
-        self.free_from[sensed] = np.maximum(self.free_from[sensed], transmission.end)
-        self._next(row)
 
     def _measure(self, now: float) -> None:
         """Tell congestion control how busy each of its periods was."""
@@ -234,12 +199,16 @@ class Access(ABC):
             self._period = math.floor(now / period + 1e-6)
         while now >= (self._period + 1) * period - EARLY:
             self._busy_time += self._period_busy
-            self.gate.measured(self._period_busy / period)
+            self.gate.measured(self._period_ratio(period))
             self._period_busy = np.zeros(len(self.names))
             self._period += 1
 
+    def _period_ratio(self, period: float) -> Array:
+        """(N,) busy ratio of the period that ends [s]."""
+        return self._period_busy / period
 
-def moved(values: Array, rows: Sequence[int | None], fresh: float) -> Array:
+
+def moved(values: NDArray[Any], rows: Sequence[int | None], fresh: float) -> Array:
     """An array by station for other stations: the value of the former row, or `fresh`."""
     return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
 

@@ -65,7 +65,7 @@ class RadioChannel(LinkChannel):
             decorrelation=profile.decorrelation,
         )
         self._receiver = Receiver(
-            profile.noise,
+            tuple(profile.noise_in(width) for width in range(1, profile.most_subchannels + 1)),
             profile.sensing,
             profile.curves,
             locks=profile.technology == "80211p",
@@ -96,7 +96,7 @@ class RadioChannel(LinkChannel):
         gate = Gate(profile.congestion, len(names), self._outside)
         if profile.technology == "80211p":
             return Csma(names, profile.queue, gate, profile.sensing, self._seed)
-        return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink)
+        return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink, profile.noise_dbm)
 
     def fate(self, message: Message, receiver: str, now: float) -> float | str:
         """Nothing can be said of one link alone. Raises TypeError."""
@@ -140,7 +140,7 @@ class RadioChannel(LinkChannel):
         row = self._rows.get(station)
         if row is None or self._until is None or self._until <= self._joined[station]:
             return self._outside
-        return min(1.0, self._access.busy_for(row) / (self._until - self._joined[station]) + self._outside)
+        return min(1.0, self._access.busy_ratio(row, self._until - self._joined[station]) + self._outside)
 
     def interval(self, station: str) -> float:
         row = self._rows.get(station)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.v2x.counter_draws import Keys, key, uniforms
-from eidrive_scenario.v2x.radio.access import Access, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.access import EARLY, Access, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.congestion import Gate
 
 Array = NDArray[np.float64]
@@ -37,12 +37,43 @@ class Csma(Access):
         """How many free slots the first message of each station waits for; NaN while it found no busy medium."""
         self._fixed = np.full(len(names), math.nan)
         """Starts that no later transmission delays any more [s]."""
+        self.free_from = np.full(len(names), -math.inf)
+        """From when on each station finds the medium free, as far as is known [s]."""
         self._keys = self._backoff_keys()
+
+    def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
+        started: list[Transmission] = []
+        dropped: list[Transmission] = []
+        if not self.names:
+            return started, dropped
+        sensed = power >= self.sensing_dbm
+        np.fill_diagonal(sensed, True)
+        nobody = np.full(len(self.names), math.inf)
+        while True:
+            starts = self.starts() if self.contending else nobody
+            row = int(np.argmin(starts)) if self.contending else 0
+            start = float(starts[row])
+            if self._arrivals and self._arrivals[0].ready <= min(start, until - EARLY):
+                dropped += self._arrive(self._arrivals.popleft())
+                continue
+            if not start < until - EARLY:
+                break
+            self._measure(start)
+            transmission = self._head[row]
+            assert transmission is not None
+            self._begin(row, transmission, start)
+            self._occupy(row, transmission, sensed[row], starts)
+            self._next(row)
+            started.append(transmission)
+        if math.isfinite(until):
+            self._measure(until)
+        return started, dropped
 
     def _backoff_keys(self) -> Keys:
         return np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)
 
     def starts(self) -> Array:
+        """(N,) when the first message of each station would go on the air [s]; infinity where none waits."""
         return self._starts_of_few() if len(self.names) <= FEW else self._starts_of_many()
 
     def _starts_of_few(self) -> Array:
@@ -71,10 +102,16 @@ class Csma(Access):
     def headed(self, row: int, transmission: Transmission | None) -> None:
         self._slots[row] = self._fixed[row] = math.nan
 
-    def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
-        if self.contending == 1:
-            return  # only the one that has just begun
-        start = transmission.start
+    def _occupy(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
+        """Those in `sensed` find the medium busy with a message that has started; `starts` as they were before."""
+        start, end = transmission.start, transmission.end
+        self._period_busy += np.where(sensed, np.maximum(0.0, end - np.maximum(start, self.free_from)), 0.0)
+        if self.contending > 1:
+            self._count_down(row, start, sensed, starts)
+        self.free_from[sensed] = np.maximum(self.free_from[sensed], end)
+
+    def _count_down(self, row: int, start: float, sensed: NDArray[np.bool_], starts: Array) -> None:
+        """The others keep what is left of their slots, but for those who cannot have noticed the start yet."""
         others = sensed & np.isfinite(starts)
         others[row] = False
         unaware = others & (starts < start + SLOT)
@@ -85,6 +122,7 @@ class Csma(Access):
 
     def reorder(self, rows: Sequence[int | None]) -> None:
         self._slots, self._fixed = moved(self._slots, rows, math.nan), moved(self._fixed, rows, math.nan)
+        self.free_from = moved(self.free_from, rows, -math.inf)
         self._keys = self._backoff_keys()
 
     def _draw(self, rows: NDArray[np.int64]) -> None:

@@ -63,6 +63,12 @@ def interpolated(x: float, places: Sequence[float], values: Sequence[float]) -> 
 _WILAB = "WiLabV2Xsim, IEEE 802.11p at 6 Mbit/s (MCS 2), 350 bytes, channel model "
 _GOUBET_RATIOS, _GOUBET_ERRORS = ieee80211p.FRAME_ERRORS
 
+_PSCCH_ERRORS = (
+    1.0, 0.9883, 0.9784, 0.9721, 0.9631, 0.9517, 0.9325, 0.9133, 0.8783, 0.849, 0.8048, 0.7565, 0.6958, 0.6325, 0.5703,
+    0.5049, 0.4273, 0.3733, 0.2989, 0.2437, 0.1932, 0.1467, 0.1126, 0.0785, 0.0592, 0.0423, 0.0265, 0.0186, 0.011,
+    0.0072, 0.0031, 0.0026, 0.0011, 0.0008, 0.0003, 0.0002, 0.0001, 0.0,
+)  # fmt: skip
+
 CURVES = {
     "80211p_highway_los": ErrorCurve(
         tuple(map(float, range(-2, 9))),
@@ -91,6 +97,12 @@ CURVES = {
     ),
     "cv2x_r0.7": ErrorCurve(
         *cv2x_mode4.CODINGS[4][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.7, 280 km/h, 190 bytes", floor=1e-4
+    ),
+    "pscch": ErrorCurve(
+        tuple(round(-6.2 + 0.2 * place, 1) for place in range(len(_PSCCH_ERRORS))),
+        _PSCCH_ERRORS,
+        None,
+        "NIST, LTE D2D model of ns-3 (public domain): PSCCH, SCI in additive white Gaussian noise, one antenna",
     ),
     "cv2x_r0.5": ErrorCurve(
         *cv2x_mode4.CODINGS[2][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.5, 280 km/h, 190 bytes", floor=1e-4

@@ -18,7 +18,7 @@ from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoControl
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss, Tr37885
-from eidrive_scenario.v2x.radio.sidelink import SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
 from eidrive_scenario.v2x.surroundings import LOS
 
 Array = NDArray[np.float64]
@@ -33,7 +33,6 @@ _CURVES = {
 }
 _IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu"}}
 """What has no meaning to each technology."""
-_BLOCKS, _BLOCKS_OF_A_MESSAGE = 50, 10
 
 
 class PacketErrors(Settings):
@@ -118,10 +117,19 @@ class RadioProfile(ComposedProfile):
 
     @property
     def noise(self) -> float:
-        """In the band of one message [dBm]: C-V2X takes 10 of the 50 resource blocks of 10 MHz."""
+        """In the band of a message [dBm]; with C-V2X, of one in a single subchannel: 10 of 50 resource blocks."""
+        return self.noise_in(1)
+
+    def noise_in(self, width: int) -> float:
+        """In the band of a message in so many subchannels [dBm]."""
         if self.technology == "80211p":
             return self.noise_dbm
-        return self.noise_dbm - 10.0 * float(np.log10(_BLOCKS / _BLOCKS_OF_A_MESSAGE))
+        return self.noise_dbm - 10.0 * float(np.log10(BLOCKS / self.sidelink.pssch_blocks(width)))
+
+    @property
+    def most_subchannels(self) -> int:
+        """How many a message can take; 802.11p knows only one."""
+        return 1 if self.technology == "80211p" else self.sidelink.subchannels
 
     @property
     def radiated(self) -> float:

@@ -43,13 +43,13 @@ class Receptions:
 class Receiver:
     """What all receivers have in common.
 
-    noise_dbm, sensing_dbm  noise in the band of a message, and the least power that is noticed
+    noises_dbm   noise in the band of a message in 1, 2, … subchannels;  sensing_dbm  the least power that is noticed
     curves     packet error by code of the state of the line of sight
     locks      whether a receiver stays with the message that came first (IEEE 802.11p), deaf to those that overlap it
     background traffic that is not simulated, and the mean path loss over distance (D,) to which its table belongs
     """
 
-    noise_dbm: float
+    noises_dbm: Sequence[float]
     sensing_dbm: float
     curves: Sequence[ErrorCurve]
     locks: bool
@@ -81,7 +81,8 @@ class Receiver:
 
         senders = rows[own]
         signal = power[senders]
-        snr = signal - self.noise_dbm
+        noise_dbm = np.array([self.noises_dbm[entry.bands - 1] for entry in ended])[:, None]
+        snr = signal - noise_dbm
         numbers = np.array([entry.message.number for entry in ended])[:, None]
         draws = uniforms(keys[senders], numbers)
         sizes = np.array([entry.message.size for entry in ended], dtype=float)[:, None]
@@ -89,11 +90,19 @@ class Receiver:
         lost_alone = self._errors(snr, states, sizes)
 
         causes = np.zeros(snr.shape, dtype=np.int8)
-        interference, busy, deaf = self._together(together, same_band, start, own, rows, power)
+        shares = None
+        if int(last.max() - first.min()) > 1:
+            common = np.minimum(last[None, :], last[own, None]) - np.maximum(first[None, :], first[own, None])
+            shares = common / (last - first)
+        interference, busy, deaf = self._together(together, same_band, shares, start, own, rows, power)
         if same_band.any():
-            noise = 10.0 ** (self.noise_dbm / 10.0)
-            disturbed = signal - 10.0 * np.log10(noise + interference)
+            disturbed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + interference)
             causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
+        controls = [entry.control for entry in ended if entry.control is not None]
+        if controls:
+            control = np.stack(controls)
+            causes[control == COLLISION] = COLLISION
+            causes[control == PROPAGATION] = PROPAGATION
         causes[draws < lost_alone] = PROPAGATION
         causes[busy] = BUSY
         causes[signal < self.sensing_dbm] = SENSING
@@ -114,9 +123,13 @@ class Receiver:
             together = [other for other in on_air if other is not entry and _overlap(other, entry)]
             talking = {budget.rows[other.message.sender] for other in together}
             disturbing = sorted(
-                (budget.rows[other.message.sender], other.start) for other in together if _share_a_band(other, entry)
+                (budget.rows[other.message.sender], other.start, _common_share(other, entry))
+                for other in together
+                if _common_share(other, entry) > 0.0
             )
-            earlier = {row for row, start in disturbing if start < entry.start} if self.locks else set()
+            earlier = {row for row, start, _ in disturbing if start < entry.start} if self.locks else set()
+            noise_dbm = self.noises_dbm[entry.bands - 1]
+            controls = None if entry.control is None else entry.control.tolist()
             number, size = entry.message.number, entry.message.size
             found = []
             for station, signal in enumerate(powers[sender]):
@@ -128,17 +141,19 @@ class Receiver:
                     cause = SENSING
                 elif any(powers[row][station] >= self.sensing_dbm for row in earlier):
                     cause = BUSY
-                elif draw < curve.of(signal - self.noise_dbm, size):
+                elif draw < curve.of(signal - noise_dbm, size):
                     cause = PROPAGATION
+                elif controls is not None and controls[station] != DELIVERED:
+                    cause = controls[station]
                 elif disturbing:
-                    others = sum(10.0 ** (powers[row][station] / 10.0) for row, _ in disturbing)
-                    floor = 10.0 * math.log10(10.0 ** (self.noise_dbm / 10.0) + others)
+                    others = sum(10.0 ** (powers[row][station] / 10.0) * share for row, _, share in disturbing)
+                    floor = 10.0 * math.log10(10.0 ** (noise_dbm / 10.0) + others)
                     cause = COLLISION if draw < curve.of(signal - floor, size) else DELIVERED
                 if self.background is not None:
                     cause = self._in_background(cause, mean_loss[sender][station], links[sender][station], number)
                 found.append(cause)
             causes.append(found)
-            ratios.append([signal - self.noise_dbm for signal in powers[sender]])
+            ratios.append([signal - noise_dbm for signal in powers[sender]])
         return Receptions(np.array(causes, dtype=np.int8), np.array(ratios), np.array(senders, dtype=np.int64))
 
     def _in_background(self, cause: int, mean_loss: float, link: int, number: int) -> int:
@@ -160,10 +175,20 @@ class Receiver:
         return loss_at.tolist(), table.distance.tolist(), given
 
     def _together(
-        self, together: Bools, same_band: Bools, start: Array, own: Rows, rows: Rows, power: Array
+        self,
+        together: Bools,
+        same_band: Bools,
+        shares: Array | None,
+        start: Array,
+        own: Rows,
+        rows: Rows,
+        power: Array,
     ) -> tuple[Array, Bools, Bools]:
         """Of each message at each station: the interference [mW], whether the receiver is taken by an earlier message,
-        and whether it talks itself. Sums go in the order of the stations, not as a library of matrices likes it."""
+        and whether it talks itself. Sums go in the order of the stations, not as a library of matrices likes it.
+
+        shares  (T, A) of the power of each interferer that falls into the band of a message; None: all of it
+        """
         shape = (len(own), power.shape[1])
         interference, busy, deaf = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         milliwatts, sensed = 10.0 ** (power / 10.0), power >= self.sensing_dbm
@@ -171,8 +196,11 @@ class Receiver:
             deaf[place, rows[together[place]]] = True
             others = np.flatnonzero(same_band[place])
             if len(others):
-                senders = np.sort(rows[others])
-                interference[place] = milliwatts[senders].sum(axis=0)
+                others = others[np.argsort(rows[others], kind="stable")]
+                disturbing = milliwatts[rows[others]]
+                if shares is not None:
+                    disturbing = disturbing * shares[place, others][:, None]
+                interference[place] = disturbing.sum(axis=0)
                 if self.locks:
                     earlier = others[start[others] < start[own[place]]]
                     busy[place] = sensed[rows[earlier]].any(axis=0)
@@ -207,5 +235,7 @@ def _overlap(first: Transmission, second: Transmission) -> bool:
     return first.start < second.end - EARLY and second.start < first.end - EARLY
 
 
-def _share_a_band(first: Transmission, second: Transmission) -> bool:
-    return first.first_band < second.first_band + second.bands and second.first_band < first.first_band + first.bands
+def _common_share(interferer: Transmission, entry: Transmission) -> float:
+    """The share of the power of an interferer that falls into the band of a message."""
+    last = min(interferer.first_band + interferer.bands, entry.first_band + entry.bands)
+    return max(0, last - max(interferer.first_band, entry.first_band)) / interferer.bands

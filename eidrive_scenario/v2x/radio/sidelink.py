@@ -1,66 +1,59 @@
-"""Access of C-V2X Mode 4: each station keeps a resource for some messages, and then looks for a free one.
-
-Sensing-based semi-persistent scheduling after 3GPP TS 36.213, 14.1.1.6 and TS 36.321, 5.14.1.1.
-"""
+"""Access of C-V2X Mode 4: sensing-based semi-persistent scheduling (3GPP TS 36.213, 14.1.1.6; TS 36.321, 5.14.1.1)."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
-from typing import Annotated
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
 
-from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.counter_draws import key, uniforms
-from eidrive_scenario.v2x.radio.access import Access, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniform, uniforms
+from eidrive_scenario.v2x.radio.access import EARLY, Access, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.pscch import ControlChannel, Pdu
+from eidrive_scenario.v2x.radio.reception import PROPAGATION
+from eidrive_scenario.v2x.radio.resource_selection import Request, candidates
+from eidrive_scenario.v2x.radio.sensing import SensingHistory
+from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
 
 Array = NDArray[np.float64]
 
-CANDIDATES = 0.2
-"""Share of the resources among which a station chooses, those with the least power on them."""
-COUNTER_BASE = (5, 15)
-"""Messages for which a resource is kept at an interval of 100 ms; more often at shorter ones."""
-INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""Between the uses of a resource [s]."""
+SUBCARRIERS = 12
+"""Of one resource block."""
+ATTEMPTS_PER_COUNT = 10
+"""C_resel is ten times the reselection counter (3GPP TS 36.213, 14.1.1.4B)."""
+UNUSED = 1.0
+"""A resource that was not used for so long is given up [s] (3GPP TS 36.321, 5.14.1.1)."""
 
 
-class SidelinkSettings(Settings):
-    """Resources of C-V2X Mode 4.
+@dataclass
+class Grant:
+    """The resource that a station has reserved: it was or will be used first in `subframe`, then once per interval.
 
-    interval      between two messages of a station on its resource [s]
-    subchannels   into which 10 MHz are divided, and
-    subchannel_bytes   what one of them carries in a subframe of 1 ms
-    keep          probability of keeping the resource when its time is up
-    processing    from the message to the earliest subframe that can carry it [s]
+    counter   transmissions that are left (SL_RESOURCE_RESELECTION_COUNTER)
+    used      subframe of the last transmission on it; None before the first
     """
 
-    interval: float = 0.1
-    subchannels: Annotated[int, Field(ge=1, le=20)] = 4
-    subchannel_bytes: Annotated[int, Field(ge=1)] = 190
-    keep: Annotated[float, Field(ge=0.0, le=0.8)] = 0.0
-    processing: Annotated[float, Field(ge=0.0)] = 0.001
-
-    @model_validator(mode="after")
-    def _standard(self) -> SidelinkSettings:
-        if self.interval not in INTERVALS:
-            raise ValueError(
-                f"interval is {self.interval:g} s; known: {', '.join(f'{known:g}' for known in INTERVALS)}"
-            )
-        return self
-
-    def extent(self, size: int) -> tuple[int, int]:
-        """How many subchannels and how many subframes a message of `size` bytes takes."""
-        needed = max(1, math.ceil(size / self.subchannel_bytes))
-        return min(needed, self.subchannels), math.ceil(needed / self.subchannels)
+    subframe: int
+    band: int
+    width: int
+    length: int
+    counter: int
+    used: int | None = None
 
 
 class Sidelink(Access):
-    """Resources are (subframe of the interval, subchannels). Nobody hears in a subframe in which it talks."""
+    """Resources are (subframe of the interval, subchannels); no station receives in a subframe in which it transmits.
+
+    Subframe k lasts from k to k + 1 milliseconds. A station that has no resource for its first message selects one
+    when the message may be sent, from what it has sensed in the second before.
+
+    noise_dbm  noise in 10 MHz
+    """
 
     def __init__(
         self,
@@ -70,87 +63,210 @@ class Sidelink(Access):
         sensing_dbm: float,
         seed: int,
         settings: SidelinkSettings,
+        noise_dbm: float,
     ) -> None:
         super().__init__(names, queue, gate, sensing_dbm)
         self._settings = settings
         self._seed = seed
-        self._subframes = round(settings.interval / SUBFRAME)
-        count = len(names)
-        self._slot, self._band, self._left = np.full(count, -1.0), np.zeros(count), np.zeros(count)
-        self._width, self._choices = np.zeros(count), np.zeros(count)
-        self._start = np.full(count, math.inf)
-        self._milliwatts = np.zeros((count, count))
+        noise = 10.0 ** (noise_dbm / 10.0)
+        self._control = ControlChannel(noise / BLOCKS, settings.control_curve)
+        self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
+        self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
+        self._grants: list[Grant | None] = [None] * len(names)
+        self._sent: list[deque[int]] = [deque() for _ in names]
+        """Subframes in which each station transmitted of late."""
+        self._choices = np.zeros(len(names))
+        self._next_event = np.full(len(names), math.inf)
+        """When each station selects a resource, or starts its first message if it has one [s]."""
+        self._scheduled = np.zeros(len(names), dtype=np.bool_)
+        """Whether the event is the start of a message."""
+        self._pdus: list[Pdu] = []
+        """Parts of transmissions that have not been sensed yet."""
+        self._deaf_time, self._period_deaf = np.zeros(len(names)), np.zeros(len(names))
+        """Time in which each station could not measure, as it transmitted itself [s]."""
+        self._keys = self._sci_keys()
+        self._power = np.zeros((len(names), len(names)))
 
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
-        self._milliwatts = 10.0 ** (power / 10.0)
-        np.fill_diagonal(self._milliwatts, 0.0)
-        return super().advance(until, power)
-
-    def starts(self) -> Array:
-        for row in np.flatnonzero(np.isnan(self._start)).tolist():
-            self._start[row] = self._occasion(row)
-        return self._start
+        started: list[Transmission] = []
+        dropped: list[Transmission] = []
+        if not self.names:
+            return started, dropped
+        self._power = power
+        while True:
+            row = int(np.argmin(self._next_event))
+            event = float(self._next_event[row])
+            if self._arrivals and self._arrivals[0].ready <= min(event, until - EARLY):
+                dropped += self._arrive(self._arrivals.popleft())
+                continue
+            if not event < until - EARLY:
+                break
+            self._measure(event)
+            if not self._scheduled[row]:
+                self._next_event[row] = self._occasion(row) * SUBFRAME
+                self._scheduled[row] = True
+                continue
+            started.append(self._start(row))
+        if math.isfinite(until):
+            self._measure(until)
+        self._sense(until)
+        return started, dropped
 
     def headed(self, row: int, transmission: Transmission | None) -> None:
-        self._start[row] = math.inf if transmission is None else math.nan
-
-    def began(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
-        transmission.first_band, transmission.bands = int(self._band[row]), int(self._width[row])
-        self._left[row] -= 1
+        self._next_event[row] = self.ready[row]
+        self._scheduled[row] = False
 
     def share(self, transmission: Transmission) -> float:
-        return self._settings.extent(transmission.message.size)[0] / self._settings.subchannels
+        return transmission.bands / self._settings.subchannels
+
+    def busy_ratio(self, row: int, span: float) -> float:
+        """The channel busy ratio of a station: the mean over all subchannels of the subframes that it could measure."""
+        measured = span - float(self._deaf_time[row] + self._period_deaf[row])
+        return super().busy_ratio(row, measured) if measured > 0.0 else 0.0
 
     def reorder(self, rows: Sequence[int | None]) -> None:
-        self._slot, self._start = moved(self._slot, rows, -1.0), moved(self._start, rows, math.inf)
-        for field in ("_band", "_left", "_width", "_choices"):
-            setattr(self, field, moved(getattr(self, field), rows, 0.0))
-        self._milliwatts = np.zeros((len(rows), len(rows)))
+        former = {old: row for row, old in enumerate(rows) if old is not None}
+        self._grants = [None if old is None else self._grants[old] for old in rows]
+        self._sent = [deque() if old is None else self._sent[old] for old in rows]
+        self._scheduled = moved(self._scheduled, rows, 0.0).astype(np.bool_)
+        for field, fresh in (("_choices", 0.0), ("_next_event", math.inf), ("_deaf_time", 0.0), ("_period_deaf", 0.0)):
+            setattr(self, field, moved(getattr(self, field), rows, fresh))
+        self._pdus = [Pdu(pdu.subframe, former[pdu.row], pdu.transmission) for pdu in self._pdus if pdu.row in former]
+        for entry in self.on_air:
+            if entry.control is not None:
+                entry.control = moved(entry.control, rows, PROPAGATION).astype(np.int8)
+        self._history.rearrange(rows)
+        self._keys = self._sci_keys()
 
-    def _occasion(self, row: int) -> float:
-        """When the resource of a station comes next after its message is ready; a new one if the old is used up."""
-        head = self._head[row]
+    def _start(self, row: int) -> Transmission:
+        """Transmit the first message of a station on its resource."""
+        transmission, grant = self._head[row], self._grants[row]
+        assert transmission is not None
+        assert grant is not None
+        subframe = round(float(self._next_event[row]) / SUBFRAME)
+        transmission.first_band, transmission.bands = grant.band, grant.width
+        grant.used = subframe
+        grant.counter -= 1
+        if grant.counter == 0 and self._draw("keep", row) < self._settings.keep:
+            grant.counter = self._new_counter(row)
+        transmission.reserves = grant.counter > 0
+        length = round(transmission.duration / SUBFRAME)
+        self._pdus += [Pdu(subframe + part, row, transmission) for part in range(length)]
+        self._sent[row].extend(range(subframe, subframe + length))
+        self._begin(row, transmission, subframe * SUBFRAME)
+        self._next(row)
+        return transmission
+
+    def _occasion(self, row: int) -> int:
+        """The subframe of the first message of a station: the next use of its resource, or of a new one."""
+        head, grant = self._head[row], self._grants[row]
         assert head is not None
-        width, _ = self._settings.extent(head.message.size)
-        earliest = math.ceil((self.ready[row] + self._settings.processing) / SUBFRAME - 1e-6)
-        if self._slot[row] < 0.0 or width > self._width[row] or self._used_up(row):
-            self._choose(row, width)
-        behind = (int(self._slot[row]) - earliest) % self._subframes
-        return float((earliest + behind) * SUBFRAME)
+        settings, ready = self._settings, float(self.ready[row])
+        now = math.floor(ready / SUBFRAME + 1e-6)
+        free = self._sent[row][-1] + 1 if self._sent[row] else now
+        width, length = settings.extent(head.message.size)
+        if grant is not None and grant.counter > 0 and grant.width >= width and grant.length >= length:
+            # a message that waits for congestion control to let it go has been processed meanwhile
+            processed = max(ready, head.ready + settings.processing)
+            earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
+            occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
+            in_time = occasion * SUBFRAME <= ready + settings.latency + EARLY
+            if in_time and not self._given_up(grant, now, occasion):
+                return occasion
+        earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
+        self._grants[row] = grant = self._select(row, now, earliest, width, length)
+        return grant.subframe
 
-    def _used_up(self, row: int) -> bool:
-        if self._left[row] > 0.0:
-            return False
-        if self._draw("keep", row) >= self._settings.keep:
-            return True
-        self._renew(row)
-        return False
+    def _given_up(self, grant: Grant, now: int, occasion: int) -> bool:
+        """Whether a resource has not been used for too long."""
+        used = grant.subframe - self._settings.interval_subframes if grant.used is None else grant.used
+        unused = (occasion - used) // self._settings.interval_subframes - 1
+        limit = self._settings.reselect_after
+        return (now - used) * SUBFRAME > UNUSED or (limit is not None and unused >= limit)
 
-    def _choose(self, row: int, width: int) -> None:
-        """Take one of the resources with the least power of others on them."""
-        bands = self._settings.subchannels
-        load = np.zeros((self._subframes, bands))
-        for other in np.flatnonzero(self._slot >= 0.0).tolist():
-            if other != row:
-                first = int(self._band[other])
-                load[int(self._slot[other]), first : first + int(self._width[other])] += self._milliwatts[other, row]
-        windows = np.lib.stride_tricks.sliding_window_view(load, width, axis=1).sum(axis=2).ravel()
-        number = max(1, math.floor(CANDIDATES * len(windows)))
-        shuffled = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(len(windows)))
-        best = np.lexsort((shuffled, windows))[:number]
-        chosen = int(best[math.floor(self._draw("choice", row) * number)])
-        self._slot[row], self._band[row] = divmod(chosen, bands - width + 1)
-        self._width[row] = width
-        self._renew(row)
+    def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
+        """A new resource among those that sensing leaves, and how often it is used."""
+        settings = self._settings
+        self._sense(now * SUBFRAME)
+        counter = self._new_counter(row)
+        sent = self._sent[row]
+        while sent and sent[0] < now - settings.interval_subframes:
+            sent.popleft()
+        request = Request(
+            now=now,
+            first=earliest,
+            last=max(earliest, now + settings.window_subframes),
+            width=width,
+            length=length,
+            interval=settings.interval_subframes,
+            uses=ATTEMPTS_PER_COUNT * counter,
+            threshold=settings.pssch_rsrp_threshold_dbm,
+        )
+        own = np.array([subframe for subframe in sent if subframe < now], dtype=np.int64)
+        places = settings.subchannels - width + 1
+        order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * places))
+        reported = candidates(request, self._history.of(row, now, own), order)
+        chosen = int(reported[math.floor(self._draw("choice", row) * len(reported))])
+        start, band = divmod(chosen, places)
+        return Grant(earliest + start, band, width, length, counter)
 
-    def _renew(self, row: int) -> None:
-        low, high = COUNTER_BASE
-        often = max(1, round(0.1 / self._settings.interval))
-        self._left[row] = often * (low + math.floor(self._draw("counter", row) * (high - low + 1)))
+    def _new_counter(self, row: int) -> int:
         self._choices[row] += 1
+        low, high = self._settings.counter_range
+        return low + math.floor(self._draw("counter", row) * (high - low + 1))
+
+    def _sense(self, until: float) -> None:
+        """Let the stations receive the subframes that end by `until` [s]."""
+        due = [pdu for pdu in self._pdus if (pdu.subframe + 1) * SUBFRAME <= until + EARLY]
+        if not due:
+            return
+        self._pdus = [pdu for pdu in self._pdus if (pdu.subframe + 1) * SUBFRAME > until + EARLY]
+        due.sort(key=lambda pdu: (pdu.subframe, pdu.row))
+        rows = np.array([pdu.row for pdu in due])
+        widths = np.array([pdu.transmission.bands for pdu in due])
+        blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
+        power = self._power[rows]
+        milliwatts = 10.0 ** (power / 10.0)
+        self._history.proceed(due[-1].subframe + 1)
+        subframes = self._history.receive(due, milliwatts / widths[:, None])
+        self._count_busy(subframes)
+        codes = self._control.decode(due, milliwatts / blocks, self._keys)
+        for pdu, code in zip(due, codes, strict=True):
+            before = pdu.transmission.control
+            pdu.transmission.control = code if before is None else np.where(before == 0, code, before)
+        codes[power < self.sensing_dbm] = PROPAGATION
+        reserving = [place for place, pdu in enumerate(due) if pdu.transmission.reserves]
+        if reserving:
+            rsrp = power[reserving] - 10.0 * np.log10(SUBCARRIERS * blocks[reserving])
+            self._history.reserve([due[place] for place in reserving], codes[reserving], rsrp)
+
+    def _count_busy(self, subframes: NDArray[np.int64]) -> None:
+        busy = self._history.busy(subframes, self._busy_above)
+        deaf = np.isnan(busy)
+        self._period_deaf += SUBFRAME * deaf.sum(axis=0)
+        self._period_busy += SUBFRAME * np.where(deaf, 0.0, busy).sum(axis=0)
+
+    def _measure(self, now: float) -> None:
+        period = self.gate.control.period
+        while self._period is not None and now >= (self._period + 1) * period - EARLY:
+            end = (self._period + 1) * period
+            self._sense(end)
+            super()._measure(end)
+        super()._measure(now)
+
+    def _period_ratio(self, period: float) -> Array:
+        measured = period - self._period_deaf
+        ratio: Array = np.where(measured > EARLY, self._period_busy / np.maximum(measured, EARLY), 1.0)
+        self._deaf_time += self._period_deaf
+        self._period_deaf = np.zeros(len(self.names))
+        return ratio
+
+    def _sci_keys(self) -> Keys:
+        own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
+        return joined(own[:, None], own[None, :])
 
     def _draw(self, purpose: str, row: int) -> float:
-        return float(uniforms(np.array([self._key(purpose, row)], dtype=np.uint64), int(self._choices[row]))[0])
+        return uniform(self._key(purpose, row), int(self._choices[row]))
 
     def _key(self, purpose: str, row: int) -> int:
         return key(self._seed, "sidelink", purpose, self.names[row], int(self._choices[row]))

@@ -40,18 +40,6 @@ def test_hidden_stations_collide_where_they_do_not_hear_each_other() -> None:
     assert shares[1] > 2 * shares[0] > 0.0
 
 
-def test_nobody_hears_while_it_talks_in_c_v2x() -> None:
-    """A resource of 100 ms and ten stations: some share a subframe, and lose each other's messages for a while."""
-    places = {f"S{n}": (5.0 * n, 0.0, 1.5) for n in range(10)}
-    events, _ = talk(radio(5, technology="cv2x_mode4", **QUIET), places, 400, dt=0.1)
-    reasons = {event.reason for event in events if event.outcome == "lost"}
-    assert reasons <= {"half_duplex", "propagation"}, "ten stations find ten free resources"
-    pairs = {frozenset((e.sender, e.receiver)) for e in events if e.reason == "half_duplex"}
-    assert all(any(e.sender == a and e.receiver == b for e in events if e.reason) for a, b in map(tuple, pairs)), (
-        "both lose"
-    )
-
-
 def test_the_newest_message_takes_the_place_of_one_that_waits() -> None:
     """20 Hz into resources of 10 Hz: half of the messages are replaced, and the others are never old."""
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}

@@ -1,0 +1,68 @@
+"""Reception of sidelink control information (SCI) on the PSCCH: whoever does not decode it receives no data either."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.counter_draws import Keys, uniforms
+from eidrive_scenario.v2x.radio.access import Transmission
+from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
+from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+BOOST = 2.0
+"""Power of a resource element of the control channel over one of the data: 3 dB (3GPP TS 36.213, 14.2)."""
+
+
+@dataclass(frozen=True)
+class Pdu:
+    """What a station transmits in one subframe."""
+
+    subframe: int
+    row: int
+    transmission: Transmission
+
+
+@dataclass(frozen=True)
+class ControlChannel:
+    """Decodes the control channel.
+
+    block_noise  noise in one resource block [mW];  curve  errors by the ratio of signal to interference and noise
+    """
+
+    block_noise: float
+    curve: ErrorCurve
+
+    def decode(self, pdus: Sequence[Pdu], per_block: Array, keys: Keys) -> Codes:
+        """(T, N) whether each station decodes the SCI of each PDU: DELIVERED, PROPAGATION or COLLISION.
+
+        The control channel lies in the first subchannel of its transmission; others that use this subchannel interfere.
+
+        per_block  (T, N) received power of each PDU in one resource block of its data [mW]
+        keys       (N, N) of the links, by sender and receiver
+        """
+        subframes, rows = (np.array([getattr(pdu, name) for pdu in pdus]) for name in ("subframe", "row"))
+        first = np.array([pdu.transmission.first_band for pdu in pdus])
+        last = first + np.array([pdu.transmission.bands for pdu in pdus])
+        numbers = np.array([pdu.transmission.message.number for pdu in pdus])[:, None]
+        draws = uniforms(keys[rows], numbers)
+        signal = BOOST * per_block
+        codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
+        with np.errstate(divide="ignore"):
+            ratio = 10.0 * np.log10(signal / self.block_noise)
+            meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
+            np.fill_diagonal(meets, False)
+            for place in np.flatnonzero(meets.any(axis=1)).tolist():
+                others = np.flatnonzero(meets[place])
+                boosted = np.where(first[others] == first[place], BOOST, 1.0)
+                interference = (per_block[others] * boosted[:, None]).sum(axis=0)
+                disturbed = 10.0 * np.log10(signal[place] / (self.block_noise + interference))
+                codes[place, draws[place] < self.curve.at(disturbed, 1)] = COLLISION
+        codes[draws < self.curve.at(ratio, 1)] = PROPAGATION
+        return codes

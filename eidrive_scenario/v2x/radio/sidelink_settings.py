@@ -1,0 +1,110 @@
+"""Settings of the resource pool and of the resource selection of C-V2X Mode 4."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.radio.airtime import SUBFRAME
+from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
+
+INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""Resource reservation intervals [s]."""
+BLOCKS = 50
+"""Resource blocks of 10 MHz."""
+PSCCH_BLOCKS = 2
+"""Resource blocks of the control channel in the first subchannel of a transmission (3GPP TS 36.213, 14.2)."""
+MAX_SELECTION_WINDOW = 0.1
+"""Largest T2 [s] (3GPP TS 36.213, 14.1.1.6)."""
+
+
+class SidelinkSettings(Settings):
+    """Resource pool of C-V2X Mode 4 (10 MHz), and how stations select resources in it.
+
+    interval      resource reservation interval [s]
+    subchannels   into which 10 MHz are divided, and
+    subchannel_bytes   what one of them carries in a subframe of 1 ms
+    keep          probability of keeping the resource when the reselection counter has reached 0 (probResourceKeep)
+    processing    from the message to the earliest subframe that can carry it [s]; T1 of the selection window
+    selection_window   T2, the end of the selection window, after the request [s]; None: the interval, at most 100 ms
+    latency       latency requirement [s]: if the next reserved resource is later than this after the message could be
+                  sent, the station selects a new one
+    reselect_after     number of consecutive unused resources after which a station selects a new one
+                  (sl-ReselectAfter); None: no such limit
+    pssch_rsrp_threshold_dbm   SL-ThresPSSCH-RSRP, above which a decoded reservation excludes resources; it is raised by
+                  3 dB while less than 20 % remain [dBm per resource element]
+    cbr_threshold_dbm  S-RSSI above which a subchannel counts as busy [dBm] (ETSI TS 103 574, 5.2)
+    pscch_errors  name of the curve of errors of the control channel
+    """
+
+    interval: float = 0.1
+    subchannels: Annotated[int, Field(ge=1, le=20)] = 4
+    subchannel_bytes: Annotated[int, Field(ge=1)] = 190
+    keep: Annotated[float, Field(ge=0.0, le=0.8)] = 0.0
+    processing: Annotated[float, Field(ge=0.0, le=0.004)] = 0.001
+    selection_window: Annotated[float, Field(ge=0.02, le=MAX_SELECTION_WINDOW)] | None = None
+    latency: Annotated[float, Field(gt=0.0)] = 0.1
+    reselect_after: Annotated[int, Field(ge=1, le=9)] | None = None
+    pssch_rsrp_threshold_dbm: Annotated[float, Field(ge=-128.0, le=-2.0)] = -128.0
+    cbr_threshold_dbm: Annotated[float, Field(ge=-112.0, le=-22.0)] = -94.0
+    pscch_errors: str = "pscch"
+
+    @model_validator(mode="after")
+    def _standard(self) -> SidelinkSettings:
+        if self.interval not in INTERVALS:
+            raise ValueError(
+                f"interval is {self.interval:g} s; known: {', '.join(f'{known:g}' for known in INTERVALS)}"
+            )
+        if self.pscch_errors not in CURVES:
+            raise ValueError(
+                f"no curve of packet errors {self.pscch_errors!r}; {suggestion(self.pscch_errors, CURVES)}"
+            )
+        return self
+
+    @property
+    def interval_subframes(self) -> int:
+        """Resource reservation interval in subframes."""
+        return round(self.interval / SUBFRAME)
+
+    @property
+    def window_subframes(self) -> int:
+        """T2 in subframes."""
+        window = min(self.interval, MAX_SELECTION_WINDOW) if self.selection_window is None else self.selection_window
+        return round(window / SUBFRAME)
+
+    @property
+    def counter_range(self) -> tuple[int, int]:
+        """Smallest and largest reselection counter (3GPP TS 36.321, 5.14.1.1)."""
+        often = max(1, round(0.1 / self.interval))
+        return 5 * often, 15 * often
+
+    @property
+    def control_curve(self) -> ErrorCurve:
+        """Errors of the control channel by its ratio of signal to interference and noise."""
+        return CURVES[self.pscch_errors]
+
+    def extent(self, size: int) -> tuple[int, int]:
+        """How many subchannels and how many subframes a message of `size` bytes takes."""
+        needed = max(1, math.ceil(size / self.subchannel_bytes))
+        return min(needed, self.subchannels), math.ceil(needed / self.subchannels)
+
+    def pssch_blocks(self, width: int) -> int:
+        """Resource blocks that carry the data of a transmission in `width` subchannels.
+
+        3GPP TS 36.213, 14.1.1.4C: all but those of the control channel, the largest product of powers of 2, 3 and 5.
+        """
+        blocks = max(1, BLOCKS // self.subchannels * width - PSCCH_BLOCKS)
+        while not _is_regular(blocks):
+            blocks -= 1
+        return blocks
+
+
+def _is_regular(number: int) -> bool:
+    for prime in (2, 3, 5):
+        while number % prime == 0:
+            number //= prime
+    return number == 1

@@ -1,0 +1,119 @@
+"""C-V2X Mode 4 on the simulated medium against the analytic model of Gonzalez-Martín et al. (IEEE TVT 2019).
+
+Stations stand on a straight road of 2.4 km, each with 10 messages of 190 bytes per second; 600 m in its middle count.
+The medium has the assumptions of the model as settings: WINNER+ B1 with antennas of 1.5 m over an environment of 0 m,
+shadowing of 3 dB, QPSK 0.7, 20 dBm without antenna gain, detection and busy ratio from -90.5 dBm on.
+
+What differs: the medium has a control channel that can fail, measures S-RSSI below -90.5 dBm too (so that stations
+avoid the resources of those whom they do not decode), and the shadowing of a link stays while both stand still.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from radio_talk import message, radio
+
+from eidrive_scenario.v2x.radio.access import Transmission
+from eidrive_scenario.v2x.radio.events import Batch
+from eidrive_scenario.v2x.radio.reception import CAUSES
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
+DISTANCES = (100, 200, 300)
+LENGTH, MIDDLE = 2400.0, 600.0
+DT, WARM_UP, END = 0.02, 3.0, 9.0
+SENSED = -90.5
+PROFILE: dict[str, Any] = {
+    "technology": "cv2x_mode4",
+    "frequency_ghz": 5.91,
+    "tx_power_dbm": 20,
+    "antenna_gain_dbi": 0,
+    "path_loss": {"kind": "winner_b1", "environment_height": 0},
+    "shadowing_db": 3,
+    "line_of_sight": "clear",
+    "jitter": 0,
+    "queue": {"discipline": "lcfs"},
+    "sidelink": {"cbr_threshold_dbm": SENSED},
+}
+
+
+@dataclass
+class Counts:
+    """Of the middle of the road after the warm-up: outcomes by distance, and busy ratios, measured and counted."""
+
+    outcomes: dict[int, Counter[str]] = field(default_factory=lambda: {distance: Counter() for distance in DISTANCES})
+    busy_ratio: float = 0.0
+    occupancy: float = 0.0
+
+    def delivery_ratio(self, distance: int) -> float:
+        return self.outcomes[distance][CAUSES[0]] / self.outcomes[distance].total()
+
+
+def simulate(density: float, seed: int) -> Counts:
+    count = round(LENGTH * density)
+    along = (np.arange(count) + 0.5) / density
+    middle = np.flatnonzero(np.abs(along - LENGTH / 2.0) < MIDDLE / 2.0)
+    names = [f"{row:04d}" for row in range(count)]
+    apart = np.abs(along[:, None] - along)
+    near = [[] if row not in middle else middle[(apart[row, middle] < 310) & (middle != row)] for row in range(count)]
+    receivers = [[names[other] for other in others] for others in near]
+    phase = np.random.default_rng(seed).integers(0, 5, count)
+    carrier = radio(seed, **PROFILE)
+    carrier.around(Surroundings({name: (float(x), 0.0, 1.5) for name, x in zip(names, along, strict=True)}))
+    sent: list[Transmission] = []
+    counts = Counts()
+    before: list[float] = []
+    for tick in range(round(END / DT)):
+        now = tick * DT
+        if not before and now >= WARM_UP:
+            before = [now * (carrier.busy_ratio(names[row]) or 0.0) for row in middle]
+            since = now
+        outbox = [
+            (message(names[row], tick // 5, now, 190), receivers[row]) for row in np.flatnonzero(phase == tick % 5)
+        ]
+        for block in carrier.transmit(outbox, now).parts:  # type: ignore[attr-defined]
+            if isinstance(block, Batch) and now >= WARM_UP:
+                sent += block.ended
+                distance = apart[block.senders, block.heard_by]
+                for one, outcomes in counts.outcomes.items():
+                    at = np.abs(distance - one) <= 0.5 / density + 1e-6
+                    outcomes.update(CAUSES[code] for code in block.causes[at].tolist())
+    after = [now * (carrier.busy_ratio(names[row]) or 0.0) for row in middle]
+    counts.busy_ratio = float(np.mean(np.array(after) - before)) / (now - since)
+    loss = carrier._budget.loss  # type: ignore[union-attr]
+    counts.occupancy = float(np.mean([occupied(sent, 20.0 - loss[:, row], row, since, now) for row in middle[::5]]))
+    return counts
+
+
+def occupied(sent: list[Transmission], power: Any, row: int, since: float, until: float) -> float:
+    """Share of subchannels and subframes whose total power a station can sense, where it did not transmit itself."""
+    total: defaultdict[tuple[int, int], float] = defaultdict(float)
+    own = set()
+    for entry in sent:
+        sender, subframe = int(entry.message.sender), round(1000 * entry.start)
+        if since <= entry.start < until - 0.001:
+            if sender == row:
+                own.add(subframe)
+            else:
+                total[subframe, entry.first_band] += 10.0 ** (power[sender] / 10.0)
+    used = sum(signal > 10.0 ** (SENSED / 10.0) for (subframe, _), signal in total.items() if subframe not in own)
+    return used / (4 * (1000 * (until - since) - len(own)))
+
+
+@pytest.mark.parametrize("golden", GOLDEN["cv2x_mode4"], ids=lambda golden: str(golden["veh_per_m"]))
+def test_mode_4_medium_delivers_as_the_analytic_model(golden: dict[str, Any]) -> None:
+    counts = simulate(golden["veh_per_m"], seed=1)
+    expected = dict(zip(GOLDEN["distance_m"], golden["pdr"], strict=True))
+    for distance in DISTANCES:
+        assert counts.delivery_ratio(distance) == pytest.approx(expected[distance], abs=0.05), distance
+        assert counts.outcomes[distance]["collision"] > 0
+        assert counts.outcomes[distance]["half_duplex"] / counts.outcomes[distance].total() < 0.02
+    assert counts.busy_ratio == pytest.approx(counts.occupancy, abs=0.02)
+    assert counts.busy_ratio == pytest.approx(golden["cbr"], abs=0.02)
