@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.result_views import result_html, result_row
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.books import LinkStatistics
 
@@ -81,6 +82,28 @@ class RunResult:
     recording: Path | None = None
     """The recording, where the run has left one."""
 
+    def __str__(self) -> str:
+        """The outcome in one line."""
+        failed = [verdict.name for verdict in self.criteria if not verdict.passed]
+        outcome = "passed" if self.passed else f"failed by {', '.join(failed)}" if failed else "not passed"
+        number = "" if self.run is None else f", run {self.run}"
+        warned = f", {len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}" if self.warnings else ""
+        head = f"{self.scenario}{number}, seed {self.seed}, channel {self.channel}"
+        return f"{head}: {outcome} ({self.end} at {self.simulated_s:.2f} s{warned})"
+
+    def _repr_html_(self) -> str:
+        """The outcome as HTML, for notebooks; all texts are escaped."""
+        return result_html(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as one flat row: every value is a number, a text, a truth value or None.
+
+        Columns: the outcome; `parameter.NAME`, as a number where the value is one; `channel.KEY`, the content of the
+        channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names;
+        `warnings`, the number of them. `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
+        """
+        return result_row(self)
+
     def as_json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         return {
@@ -102,6 +125,7 @@ class RunResult:
                 }
                 for verdict in self.criteria
             ],
+            "warnings": list(self.warnings),
             "metrics": dict(self.metrics),
             "links": [
                 {"sender": sender, "receiver": receiver, **book.as_json()}

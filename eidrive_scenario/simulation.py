@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,11 @@ from typing import Self
 
 from eidrive_scenario.attribution import attributed, report_extension
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
+from eidrive_scenario.driving.area_checks import areas_off_road
+from eidrive_scenario.driving.declared import possible_drivers
+from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
 from eidrive_scenario.errors import Problem, SettingError, Together, suggestion
 from eidrive_scenario.library import name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
@@ -41,6 +45,7 @@ from eidrive_scenario.run import (
 from eidrive_scenario.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.storyboard.unstarted import unstarted
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.specs import actor_spec
@@ -60,6 +65,10 @@ __all__ = [
     "load_for_seed",
     "run_file",
 ]
+
+
+_CUT_SHORT = ("command: exitFailure",)
+"""Ends of a failed run that leave the rest of the storyboard out."""
 
 
 class Simulation:
@@ -122,6 +131,11 @@ class Simulation:
         self._trace = TraceHash()
         doubts = self.roads.doubts if self.roads is not None else ()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario), *doubts)]
+        self._warn(areas_off_road(scenario, self.stations.settings, self.roads))
+        self._warn(short_detector_latencies(self.stations.settings, self.settings.dt))
+        if self.settings.channel is not None:
+            self._warn(short_channel_delay(self.stations.channel_profile, self.settings.dt, "--channel"))
+        self._motionless = MotionlessStations(possible_drivers(scenario, self.stations.settings))
         self._user_values = dict(self.settings.user_values)
         self.storyboard.stage.user_values = self._user_values.get
         self._environment: Environment | None = None
@@ -208,6 +222,8 @@ class Simulation:
             commands.monitors,
         )
 
+        if self._motionless.watching:
+            self._motionless.observe(view, commands.driven)
         self._trace.observe(frame)
         for observer in self._observers:
             observer.observe(frame)
@@ -268,6 +284,12 @@ class Simulation:
 
     def _command_channel(self, command: CustomCommand) -> None:
         self.stations.use_channel(command.content, source=command.source, line=command.line, scope=command.scope)
+        if self.settings.channel is None:
+            profile = self.stations.channel_profile
+            self._warn(short_channel_delay(profile, self.settings.dt, command.source, command.line))
+
+    def _warn(self, problems: Iterable[Problem]) -> None:
+        self._warnings += map(str, problems)
 
     def _command_criterion(self, command: CustomCommand) -> None:
         self.criteria.extend(
@@ -305,6 +327,10 @@ class Simulation:
             metrics.update(checked_metrics(criterion))
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
+        time_s = frame.view.time
+        self._warn(self._motionless.warnings(self.scenario, time_s))
+        if end not in _CUT_SHORT and not end.startswith("criterion: "):
+            self._warn(unstarted(self.storyboard.root, self.scenario, time_s, end))
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(

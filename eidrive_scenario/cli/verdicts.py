@@ -56,6 +56,11 @@ def show(result: RunResult, varied: str = "") -> None:
     out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
     for line in reproduction_lines(result):
         out.print(Text(line), soft_wrap=True)
+    show_warnings(result)
+
+
+def show_warnings(result: RunResult) -> None:
+    """Print the warnings of a run on standard error, one per line."""
     for warning in result.warnings:
         typer.secho(f"warning: {warning}", fg="yellow", err=True)
 

@@ -57,6 +57,11 @@ def declared_settings(
     return updated
 
 
+def possible_drivers(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> list[str]:
+    """The stations that drive by themselves while their controller is active."""
+    return [name for name, station in settings.items() if _drives(scenario, name, station)]
+
+
 def _by_detector(settings: AgentSettings, detector: str | None) -> dict[str, Any]:
     """What a detector by option changes: the settings in the file are those of the detector in the file."""
     if detector is None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from eidrive_scenario.pytest_plugin.collection import pytest_collect_file
 from eidrive_scenario.pytest_plugin.distributions import (
     pytest_sessionfinish,
-    pytest_terminal_summary,
     pytest_testnodedown,
 )
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests, run_scenario
@@ -21,6 +20,7 @@ from eidrive_scenario.pytest_plugin.options import (
     pytest_configure_node,
     pytest_report_header,
 )
+from eidrive_scenario.pytest_plugin.summary import pytest_terminal_summary
 
 __all__ = [
     "pytest_addoption",

@@ -90,7 +90,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         workeroutput[_WORKER_KEY] = session.config.stash.get(_LEFT_OUT, {})
 
 
-def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+def show_left_out(terminalreporter: Any, config: pytest.Config) -> None:
     """Say which distributions have more runs than tests."""
     left_out = config.stash.get(_LEFT_OUT, {})
     if not left_out:

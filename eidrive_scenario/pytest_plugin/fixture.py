@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -113,12 +113,14 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         if source is None:
             pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
         arm = case.arm if case is not None else Arm(None, 1)
-        arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed)
+        replaced = arm.replaced if channel is None and seed is None else ()
+        arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed, replaced)
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source
             result = play_arm(request.node, source, arm, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
+        result = replace(result, warnings=(*result.warnings, *arm.replaced))
         request.node.user_properties.extend(properties(result))
         return result
 

@@ -24,10 +24,14 @@ _WORKER_KEY = "eidrive_given"
 
 @dataclass(frozen=True)
 class Arm:
-    """One way to run a scenario; the channel None is the one that the file itself names."""
+    """One way to run a scenario; the channel None is the one that the file itself names.
+
+    replaced  warnings of options that replaced what the marker of the test lists
+    """
 
     channel: str | None
     seed: int
+    replaced: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return "-".join([*([] if self.channel is None else [_short(self.channel)]), f"seed{self.seed}"])
@@ -105,13 +109,19 @@ def pytest_report_header(config: pytest.Config) -> str | None:
 
 
 def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None) -> Iterator[Arm]:
-    """Every channel with every seed; the command line wins over `channels` and `seeds`."""
+    """Every channel with every seed; the command line wins over `channels` and `seeds`, those of the marker."""
     given = config.getoption("eidrive_channel")
     names: Sequence[str | None] = _channels(",".join(given)) if given else []
-    count = config.getoption("eidrive_seeds") or seeds or 1
+    option = config.getoption("eidrive_seeds")
+    replaced = []
+    if names and channels is not None and list(names) != list(channels):
+        listed = ", ".join(map(repr, channels))
+        replaced.append(f"--eidrive-channel {','.join(map(str, names))} replaces the marker's channel=[{listed}]")
+    if option and seeds is not None and option != seeds:
+        replaced.append(f"--eidrive-seeds {option} replaces the marker's seeds={seeds}")
     for channel in names or channels or (None,):
-        for seed in range(1, count + 1):
-            yield Arm(channel, seed)
+        for seed in range(1, (option or seeds or 1) + 1):
+            yield Arm(channel, seed, tuple(replaced))
 
 
 def wanted(config: pytest.Config, path: Path) -> bool:

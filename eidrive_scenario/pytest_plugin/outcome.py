@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 Properties = list[tuple[str, object]]
 
+WARNING = "warning"
+"""Name of the property that holds one warning of a run."""
+
 
 class ScenarioFailed(Exception):
     """The verdict of a run is failed."""
@@ -89,6 +92,7 @@ def properties(result: RunResult) -> Properties:
         if verdict.limit is not None:
             noted.append((f"{verdict.name}.limit", float(verdict.limit)))
     noted += ((name, float(value)) for name, value in result.metrics.items())
+    noted += ((WARNING, warning) for warning in result.warnings)
     noted += setting_properties(result.settings)
     return [*noted, ("simulated_s", result.simulated_s), ("trace_hash", result.trace_hash)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_scenario.openscenario.lint import Level, Rule
-from eidrive_scenario.storyboard.lint import paths, places, road_file
+from eidrive_scenario.storyboard.lint import paths, places, road_file, stations
 from eidrive_scenario.storyboard.lint.survey import RoadSurvey
 
 ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
@@ -14,6 +14,12 @@ ROAD_RULES: tuple[Rule[RoadSurvey], ...] = (
     Rule("no-such-signal", Level.WARNING, "a traffic signal that no road has", places.missing_signals),
     Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", paths.trajectories_off_road),
     Rule("waypoint-off-road", Level.WARNING, "a waypoint beside the road", paths.waypoints_off_road),
+    Rule(
+        "conflict-area-off-road",
+        Level.WARNING,
+        "a conflict area that lies off the road",
+        stations.conflict_areas_off_road,
+    ),
     Rule("road-jump", Level.WARNING, "a road whose geometries do not join", road_file.doubts_about("road-jump")),
     Rule("road-kink", Level.WARNING, "a road that bends at a point", road_file.doubts_about("road-kink")),
     Rule("lane-width", Level.WARNING, "a lane without a width, or below 0", road_file.doubts_about("lane-width")),

@@ -1,0 +1,59 @@
+"""Stations that drive, and hardly move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.world.view import WorldView
+
+LEAST = 1.0
+"""Distance from the start that a station which drives is expected to reach [m]."""
+PATIENCE = 2.0
+"""Time for it [s]; of a station that drove for less, nothing can be said: most start from rest."""
+
+
+class MotionlessStations:
+    """Watches stations until they are `LEAST` metres from where they were first seen.
+
+    `watching` is False as soon as there is none left, so that a tick costs nothing.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._starts: dict[str, tuple[float, float] | None] = dict.fromkeys(names)
+        self._reached: dict[str, float] = {}
+        self._since: dict[str, float] = {}
+        self.watching = bool(self._starts)
+
+    def observe(self, view: WorldView, drivers: Collection[str]) -> None:
+        """Take one view, and the names of the stations that drive by themselves in this tick."""
+        for name, start in list(self._starts.items()):
+            row = view.rows.get(name)
+            if row is None:
+                continue
+            x, y = float(view.position[row, 0]), float(view.position[row, 1])
+            if start is None:
+                self._starts[name] = start = (x, y)
+            if name in drivers:
+                self._since.setdefault(name, view.time)
+                self._reached[name] = max(self._reached.get(name, 0.0), math.hypot(x - start[0], y - start[1]))
+            elif name not in self._reached:
+                self._starts[name] = None  # It is scripted so far: it counts from where it begins to drive.
+            if self._reached.get(name, 0.0) >= LEAST:
+                del self._starts[name]
+                self.watching = bool(self._starts)
+
+    def warnings(self, scenario: Scenario, time: float) -> Iterator[Problem]:
+        """Yield a warning for each station that drove and did not leave its place until the end of the run [s]."""
+        entities = scenario.document.entities
+        lines = {one.name: one.line for one in entities.scenario_object} if entities is not None else {}
+        for name in self._starts:
+            if name in self._reached and time - self._since[name] >= PATIENCE:
+                yield Problem(
+                    f"station {name!r} covered only {self._reached[name]:.2f} m in {time:.2f} s",
+                    "check its target speed, its route and what it brakes for",
+                    str(scenario.path or ""),
+                    lines.get(name),
+                )

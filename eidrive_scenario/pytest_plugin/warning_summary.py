@@ -1,0 +1,28 @@
+"""Warnings of all runs at the end of a test session, each once with the number of its tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from eidrive_scenario.pytest_plugin.outcome import WARNING
+
+_SHOWN = 20
+"""Warnings that are listed; of more, the number is given."""
+
+
+def show_warnings(terminalreporter: Any) -> None:
+    """List the warnings; the reports of pytest-xdist's workers carry them too."""
+    tests: dict[str, list[str]] = {}
+    for reports in terminalreporter.stats.values():
+        for report in reports:
+            if getattr(report, "when", None) == "call":
+                for text in {value for name, value in report.user_properties if name == WARNING}:
+                    tests.setdefault(str(text), []).append(report.nodeid)
+    if not tests:
+        return
+    terminalreporter.section("warnings of runs", sep="-", yellow=True)
+    for text, nodes in list(tests.items())[:_SHOWN]:
+        more = f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""
+        terminalreporter.line(f"{nodes[0]}{more}: {text}")
+    if len(tests) > _SHOWN:
+        terminalreporter.line(f"{len(tests) - _SHOWN} more are properties of the tests (--junitxml)")
