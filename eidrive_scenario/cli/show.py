@@ -105,15 +105,18 @@ def view(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """Write a recorded run as an HTML replay."""
-    from eidrive_scenario.recording import read_recording
+    from eidrive_scenario.recording.recording import open_recording
     from eidrive_scenario.recording.run_files import is_partial, recording_in, result_of
-    from eidrive_scenario.reporting.replay import write_replay
+    from eidrive_scenario.reporting.replay import make_replay
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
     check_places({"--out": page}, [path])
-    write_replay(read_recording(path), page, result_of(path))
-    if is_partial(path):
+    complete = not is_partial(path)
+    replay = make_replay(open_recording(path), page, result_of(path), complete=complete)
+    for line in replay.damage:
+        typer.secho(f"warning: {path} is damaged: {line}", fg="yellow", err=True)
+    if not complete:
         typer.secho(f"warning: {path}: the run did not end, this is what there is of it", fg="yellow", err=True)
     typer.echo(str(page))
     if browser:

@@ -5,7 +5,8 @@ from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, V
 from eidrive_scenario.recording.csv_writer import CsvWriter
 from eidrive_scenario.recording.explanation import Explanation
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.recorder import Recorder, Recording, read_recording
+from eidrive_scenario.recording.recorder import Recorder
+from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.recording.run_log import RunLog
 from eidrive_scenario.recording.trace_hash import TraceHash
 

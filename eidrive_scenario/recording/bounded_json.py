@@ -9,15 +9,29 @@ MAX_VALUES = 10_000_000
 """Maximum number of values in a document. Each takes less than 100 bytes of memory beside its text."""
 
 
-def load_json(data: bytes, max_values: int = MAX_VALUES) -> Any:
+def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | None = None) -> Any:
     """Return the values of a JSON document.
 
-    Raises ValueError if it is not valid JSON, has more than `max_values` values, or is nested too deeply.
+    Raises ValueError if it is not valid JSON, has more than `max_values` values, or is nested deeper than `max_depth`,
+    if that is given, or than Python can read.
     """
     values = data.count(b",") + data.count(b"[") + data.count(b"{")
     if values > max_values:
         raise ValueError(f"it has more than {max_values} values")
     try:
-        return json.loads(data)
+        document = json.loads(data)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    if max_depth is not None and _is_deeper(document, max_depth):
+        raise ValueError(f"it is nested more than {max_depth} deep")
+    return document
+
+
+def _is_deeper(document: Any, levels: int) -> bool:
+    layer = [document] if isinstance(document, dict | list) else []
+    for _ in range(levels):
+        items = (item.values() if isinstance(item, dict) else item for item in layer)
+        layer = [item for inside in items for item in inside if isinstance(item, dict | list)]
+        if not layer:
+            return False
+    return True

@@ -79,10 +79,17 @@ def _array(dtype: np.dtype[Any]) -> Codec:
         return nested if dtype.kind != "f" or math.isfinite(np.vdot(array, array)) else _spell(nested)
 
     def decode(data: Json) -> Any:
-        return np.empty(data["shape"], dtype) if isinstance(data, dict) else np.array(data, dtype)
+        return _empty(data["shape"], dtype) if isinstance(data, dict) else np.array(data, dtype)
 
     empty = {"type": "object", "properties": {"shape": {"type": "array", "items": {"type": "integer"}}}}
     return Codec(encode, decode, {"anyOf": [{"type": "array"}, empty]})
+
+
+def _empty(shape: Json, dtype: np.dtype[Any]) -> Any:
+    """An array without entries. Raises ValueError for any other shape, as its entries would be made up."""
+    if not isinstance(shape, list) or 0 not in shape:
+        raise ValueError(f"{str(shape)[:80]} is not the shape of an empty array")
+    return np.empty(shape, dtype)
 
 
 def _spell(nested: Any) -> Json:

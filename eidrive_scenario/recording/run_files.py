@@ -16,6 +16,8 @@ RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
 """Names of the files in a run's folder."""
 _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""
+_DEEPEST = 40
+"""Maximum nesting of a result."""
 
 
 def recording_in(place: Path) -> Path:
@@ -88,7 +90,7 @@ def read_result(path: Path) -> dict[str, Any]:
             data = stream.read(_LARGEST + 1)
         if len(data) > _LARGEST:
             raise InputError(Problem(f"larger than {_LARGEST // 2**20} MiB", f"give a {RESULT}", str(path)))
-        result = load_json(data)
+        result = load_json(data, max_depth=_DEEPEST)
     except OSError as error:
         raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
     except ValueError as error:

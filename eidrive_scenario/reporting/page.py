@@ -34,7 +34,7 @@ def write_page(out: Path, template: str, **values: Any) -> Path:
     Raises SettingError if it cannot be written.
     """
     with create(out) as stream:
-        stream.write(render_page(template, **values).encode())
+        stream.write(render_page(template, **values).encode(errors="replace"))
     return out
 
 

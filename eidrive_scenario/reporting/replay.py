@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.recorder import Recording
+from eidrive_scenario.recording.recording import Recording
+from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.report import reported
 from eidrive_scenario.reporting.road_drawing import recorded_roads
+from eidrive_scenario.reporting.settings_text import run_facts, shortened
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
 from eidrive_scenario.reporting.top_view import (
     AREA,
@@ -31,6 +36,8 @@ from eidrive_scenario.reporting.top_view import (
     is_broken,
 )
 
+_LARGEST_PAGE = 64 * 2**20
+"""Maximum size of the frames in a page, about [bytes]."""
 COLOURS = {
     "own": OWN,
     "received": RECEIVED,
@@ -41,87 +48,193 @@ COLOURS = {
 }
 
 
-def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
-    """The replay of a recording in the file `out`, which is returned, with the verdicts of its `result` if it is given.
+@dataclass(frozen=True)
+class Replay:
+    """A page that was written, and what is wrong with the recording that it shows: a line for each kind of damage."""
 
-    Raises InputError if the recording holds no frame, or the result is none.
+    page: Path
+    damage: tuple[str, ...]
+
+
+def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | None = None) -> Path:
+    """The replay of a recording in the file `out`, which is returned; see `make_replay`."""
+    return make_replay(recording, out, result).page
+
+
+def make_replay(
+    recording: Recording, out: Path, result: Mapping[str, Any] | None = None, *, complete: bool = True
+) -> Replay:
+    """Write the replay of a recording to the file `out`, with the verdicts of its `result` if it is given.
+
+    complete  whether the run has ended; a page of one that has not says so
+
+    A damaged recording is shown as far as it can be read, and its page lists the damage. Raises InputError if no frame
+    can be read, or the result is not one.
     """
-    data = replay_data(recording.frames(), recorded_roads(recording))
+    report = DamageReport()
+    for line in recording.damage:
+        report.add(line)
+    trace = TraceHash()
+    data = replay_data(_drawable(recording, report, trace), _recorded_roads(recording, report), report)
     if not data["times"]:
-        raise InputError(Problem("the recording holds no frame", "record the run again", str(recording.path)))
-    name = recording.scenario or recording.path.stem
-    return write_page(
+        reason = "; ".join(report.lines()) or "record the run again"
+        raise InputError(Problem("the recording holds no frame that can be read", reason, str(recording.path)))
+    if result is not None and result.get("trace_hash") != trace.hexdigest():
+        report.add("the result beside the recording has another trace hash: its verdicts may be those of another run")
+    name = shortened(recording.scenario or recording.path.stem, 200)
+    settings = _settings(recording, report)
+    page = write_page(
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
         result=None if result is None else reported(result),
-        facts=_facts(recording),
+        facts=_facts(recording, settings),
+        settings=json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
+        command=recording.metadata.get("command", ""),
+        damage=report.lines(),
+        complete=complete,
         data=data,
     )
+    return Replay(page, report.lines())
 
 
-def _facts(recording: Recording) -> dict[str, str]:
-    """What the page tells of the run beside the pictures; each scenario parameter in a line of its own."""
-    facts = {name: text for name, text in recording.metadata.items() if name not in ("format", "parameters")}
-    parameters = json.loads(recording.metadata.get("parameters", "{}"))
-    return facts | {f"${name}": _shortly(str(value)) for name, value in parameters.items()}
+def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> Iterator[Frame]:
+    """The frames, which enter the trace hash on the way."""
+    for frame in recording.frames(lambda reason: report.add("frames do not read", shortened(reason, 200))):
+        try:
+            trace.observe(frame)
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            report.add("frames do not fit together", f"tick {frame.view.tick}: {shortened(repr(error), 200)}")
+        yield frame
 
 
-def _shortly(text: str) -> str:
-    """A number with six digits at most, as those that a seed draws have sixteen; other texts as they are."""
+def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
     try:
-        number = float(text)
+        return recorded_roads(recording)
+    except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
+        report.add("the roads are not drawn", shortened(str(error).splitlines()[0] if str(error) else repr(error), 300))
+        return RoadDrawing()
+
+
+def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
+    """The resolved settings in the metadata."""
+    settings = _object(recording.metadata.get("settings", "{}"))
+    if settings is None:
+        report.add("the settings of the run do not read")
+    return settings or {}
+
+
+def _object(text: str) -> dict[str, Any] | None:
+    """A JSON object from the metadata, or None if the text is not one."""
+    try:
+        found = load_json(text.encode(), max_depth=30)
     except ValueError:
-        return text
-    return f"{number:.6g}" if len(text) > len(f"{number:.6g}") and math.isfinite(number) else text
+        return None
+    return found if isinstance(found, dict) else None
 
 
-def replay_data(frames: Iterable[Frame], roads: RoadDrawing | None = None) -> dict[str, Any]:
+def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
+    """What the page tells of the run beside the pictures."""
+    if settings:
+        return run_facts(settings)
+    hidden = ("format", "parameters", "settings", "command")
+    facts = {name: shortened(text) for name, text in recording.metadata.items() if name not in hidden}
+    return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
+
+
+class _Budget:
+    """Bounds the size of a page, whatever a recording holds."""
+
+    def __init__(self, report: DamageReport | None) -> None:
+        self._left = _LARGEST_PAGE
+        self._report = report
+
+    def take(self, size: int, time: float) -> bool:
+        """Whether a part of this many bytes still fits."""
+        self._left -= size
+        if self._left < 0 and self._report is not None:
+            self._report.add("the recording is too large for one page", f"it is shown up to {time:.2f} s")
+        return self._left >= 0
+
+
+def replay_data(
+    frames: Iterable[Frame], roads: RoadDrawing | None = None, report: DamageReport | None = None
+) -> dict[str, Any]:
     """What the page's script draws, as plain lists; lengths in metres to a centimetre, angles to a milliradian.
 
     actors   by name: category and size; poses[frame][name] = x, y, yaw of the box centre, speed
     stations by name, for each frame: own and heard boxes [x, y, l, w, yaw], links [sender, delivered], plan's reason
     changes  [time, path, after, why] of the storyboard's transitions
+
+    With a `report`, a frame that cannot be drawn is reported there and left out.
     """
-    actors: dict[str, dict[str, Any]] = {}
-    times: list[float] = []
-    poses: list[dict[str, list[float]]] = []
-    changes: list[list[Any]] = []
+    data: dict[str, Any] = {"times": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
     knowledge: dict[str, Knowledge] = {}
-    stations: dict[str, list[dict[str, Any] | None]] = {}
-    for index, frame in enumerate(frames):
-        view = frame.view
-        times.append(round(view.time, 4))
-        boxes, speeds = view.boxes.tolist(), view.speed.tolist()
-        for name, category, box in zip(view.names, view.categories, boxes, strict=True):
-            actors.setdefault(name, {"category": category, "size": [round(size, 2) for size in box[3:5]]})
-        poses.append(
-            {
-                name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)]
-                for name, box, speed in zip(view.names, boxes, speeds, strict=True)
-            }
-        )
-        for name in frame.steps:
-            if name not in knowledge:
-                knowledge[name] = Knowledge(name)
-                stations[name] = [None] * index
-        for name, known in knowledge.items():
-            snapshot = known.observe(frame)
-            stations[name].append(_station(snapshot) if name in frame.steps else None)
-        changes.extend(
+    budget = _Budget(report)
+    for frame in frames:
+        try:
+            part = _part(frame, knowledge)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            if report is None:
+                raise
+            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {shortened(repr(error), 200)}")
+            continue
+        if not budget.take(_size(part), frame.view.time):
+            break
+        _append(data, part)
+    return {**data, "roads": _roads(roads or RoadDrawing()), "colours": COLOURS}
+
+
+def _part(frame: Frame, knowledge: dict[str, Knowledge]) -> dict[str, Any]:
+    """What a page shows of one frame. The stations' knowledge is carried on."""
+    view = frame.view
+    boxes, speeds = view.boxes.tolist(), view.speed.tolist()
+    bodies = list(zip(view.names, view.categories, boxes, speeds, strict=True))
+    shown = [body for body in bodies if math.isfinite(sum(body[2]) + body[3])]
+    poses = {
+        name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
+    }
+    for name in frame.steps:
+        knowledge.setdefault(name, Knowledge(name))
+    snapshots = {name: known.observe(frame) for name, known in knowledge.items()}
+    return {
+        "time": round(view.time, 4),
+        "actors": {
+            name: {"category": category, "size": [round(size, 2) for size in box[3:5]]}
+            for name, category, box, _ in shown
+        },
+        "pose": poses,
+        "stations": {name: _station(snapshots[name]) if name in frame.steps else None for name in knowledge},
+        "changes": [
             [round(change.time, 4), change.path, change.after.value.removesuffix("State"), change.why]
             for change in frame.changes
-            if change.transition is not None
-        )
-    return {
-        "times": times,
-        "actors": actors,
-        "poses": poses,
-        "stations": stations,
-        "changes": changes,
-        "roads": _roads(roads or RoadDrawing()),
-        "colours": COLOURS,
+            if change.transition is not None and math.isfinite(change.time)
+        ],
     }
+
+
+def _append(data: dict[str, Any], part: Mapping[str, Any]) -> None:
+    before = len(data["times"])
+    data["times"].append(part["time"])
+    data["poses"].append(part["pose"])
+    data["changes"].extend(part["changes"])
+    for name, actor in part["actors"].items():
+        data["actors"].setdefault(name, actor)
+    for name, station in part["stations"].items():
+        data["stations"].setdefault(name, [None] * before).append(station)
+
+
+def _size(part: Mapping[str, Any]) -> int:
+    """About how many bytes a part takes in the page."""
+    poses = sum(40 + len(name) for name in part["pose"])
+    changes = sum(len(path) + len(why) for _, path, _, why in part["changes"])
+    stations = sum(
+        60
+        if station is None
+        else 120 + 40 * (len(station["own"]) + len(station["heard"]) + len(station["links"])) + len(station["plan"])
+        for station in part["stations"].values()
+    )
+    return 40 + poses + changes + stations
 
 
 def _station(snapshot: Snapshot) -> dict[str, Any]:
@@ -138,7 +251,7 @@ def _boxes(detections: Detections) -> list[list[float]]:
     return [
         [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3)]
         for x, y, _, length, width, _, yaw in detections.boxes.tolist()
-        if math.isfinite(x + y + yaw)
+        if math.isfinite(x + y + yaw + length + width)
     ]
 
 

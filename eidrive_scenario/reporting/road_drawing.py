@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.recording.recorder import Recording
+from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.poses import lateral_axis

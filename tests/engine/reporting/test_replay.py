@@ -13,7 +13,8 @@ from lxml import html
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.replay import _shortly, replay_data, write_replay
+from eidrive_scenario.reporting.replay import replay_data, write_replay
+from eidrive_scenario.reporting.settings_text import short_number
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
 
 Play = Callable[..., list[Frame]]
@@ -91,7 +92,7 @@ def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_parameters_as_a_reader_wants_them(text: str, shown: str) -> None:
-    assert _shortly(text) == shown
+    assert short_number(text) == shown
 
 
 def test_where_nobody_is_a_station_nothing_speaks_of_stations(street: Play, tmp_path: Path) -> None:

@@ -1,0 +1,248 @@
+"""Damaged recordings: reported, bounded in time and memory, and never an internal error.
+
+EIDRIVE_MUTANTS is the number of damaged recordings; a few by default.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import time
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from eidrive_scenario.cli import app
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.codec import codec
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunSettings
+
+from .mutants import CHUNK, MUTATIONS, join, messages, mutant, pack, split, unpack
+
+COUNT = int(os.environ.get("EIDRIVE_MUTANTS", "32"))
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+RUNS: list[tuple[str | Path, dict[str, Any]]] = [
+    ("coop/scenario_1", {"time_limit": 6.0}),
+    ("coop/scenario_2", {"channel": "none", "time_limit": 5.0}),
+    ("coop/scenario_1_late_rsu", {"channel": "{loss: {kind: bernoulli, probability: 0.3}}", "time_limit": 5.0}),
+    ("coop/scenario_2", {"channel": "congested", "dt": 0.1, "weather": "storm", "time_limit": 6.0}),
+    (PASSING_BY, {"dt": 0.005}),
+]
+MAX_SECONDS = 60.0
+MAX_BYTES = 2 * 2**30
+
+
+@pytest.fixture(scope="module")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Recordings of several runs of the library, undamaged."""
+    found = []
+    for source, settings in RUNS[: max(2, min(len(RUNS), COUNT // 10))]:
+        result = play(source, settings=RunSettings(**settings), below=tmp_path_factory.mktemp("runs"))
+        assert result.recording is not None
+        found.append(result.recording)
+    return found
+
+
+Content = tuple[dict[str, str], dict[str, bytes], list[Any]]
+
+
+def content(path: Path) -> tuple[Content, tuple[str, ...]]:
+    """All that a recording gives, and its damage."""
+    encode = codec(Frame).encode
+    recording = read_recording(path)
+    frames = [encode(frame) for frame in recording.frames()]
+    return (dict(recording.metadata), dict(recording.attachments), frames), recording.damage
+
+
+@cache
+def original_content(path: Path) -> Content:
+    found, damage = content(path)
+    assert damage == ()
+    return found
+
+
+def view(path: Path) -> tuple[int, str, str]:
+    """Exit code, standard error and the page of `eidrive view`."""
+    page = path.with_suffix(".html")
+    page.unlink(missing_ok=True)
+    result = CliRunner().invoke(app, ["view", str(path), "--out", str(page)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stderr, page.read_text(encoding="utf-8") if page.exists() else ""
+
+
+def test_originals_are_undamaged(originals: list[Path]) -> None:
+    for path in originals:
+        chunks = [body for opcode, body in split(path.read_bytes()) if opcode == CHUNK]
+        assert len(chunks) >= 2, path
+        assert read_recording(path).damage == ()
+        code, error, page = view(path)
+        assert (code, error) == (0, "")
+        assert "This recording is damaged" not in page
+
+
+@pytest.mark.timeout(0 if COUNT > 100 else 600)
+def test_view_of_damaged_recordings_reports_the_damage(originals: list[Path], tmp_path: Path) -> None:
+    outcomes: Counter[str] = Counter()
+    slowest = 0.0
+    path = tmp_path / "damaged.mcap"
+    for number in range(COUNT):
+        source = originals[number % len(originals)]
+        kind, data = mutant(source.read_bytes(), number)
+        path.write_bytes(data)
+        started = time.perf_counter()
+        try:
+            found, damage = content(path)
+        except InputError:
+            found, damage = None, ("refused",)
+        code, error, page = view(path)
+        slowest = max(slowest, time.perf_counter() - started)
+        case = f"mutant {number} ({kind} of {source.parent.name})"
+        assert "internal error" not in error, case
+        assert code in (0, 2), f"{case}: {error}"
+        assert (code == 0) == bool(page), case
+        if not damage:
+            assert found == original_content(source), f"{case} is shown as undamaged"
+        shown_whole = code == 0 and "is damaged" not in error
+        assert shown_whole == (not damage), f"{case}: {error}"
+        assert ("This recording is damaged" in page) == (code == 0 and bool(damage)), case
+        outcomes["refused" if code == 2 else "intact" if shown_whole else "shown with its damage"] += 1
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    print(f"{COUNT} damaged recordings: {dict(outcomes)}; slowest {slowest:.1f} s, peak {peak / 2**20:.0f} MiB")  # noqa: T201
+    assert outcomes["shown with its damage"] >= COUNT // 2
+    assert slowest < MAX_SECONDS
+    assert peak < MAX_BYTES
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("cut", "missing"),
+        ("append", "the file does not end with its last record"),
+        ("drop chunk", "recorded frames are there"),
+        ("swap chunks", "out of order"),
+        ("double chunk", "doubled or out of order"),
+        ("edit frame", "not those that were recorded"),
+        ("edit attachment", "not those that were recorded"),
+        ("bomb", "checksum"),
+    ],
+)
+def test_damage_is_described(originals: list[Path], tmp_path: Path, kind: str, message: str) -> None:
+    import random
+
+    data = MUTATIONS[kind](originals[0].read_bytes(), random.Random(5))
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    assert message in " / ".join(read_recording(path).damage)
+
+
+def test_missing_ticks_are_named(originals: list[Path], tmp_path: Path) -> None:
+    records = split(originals[0].read_bytes())
+    chunks = [place for place, (opcode, _) in enumerate(records) if opcode == CHUNK]
+    ticks = [
+        int.from_bytes(body[2:6], "little") for opcode, body in messages(unpack(records[chunks[1]][1])) if opcode == 5
+    ]
+    del records[chunks[1]]
+    path = tmp_path / "gap.mcap"
+    path.write_bytes(join(records))
+    recording = read_recording(path)
+    assert f"ticks are missing: {ticks[0]} to {ticks[-1]}" in recording.damage
+    shown = [frame.view.tick for frame in recording.frames()]
+    assert len(shown) == recording.frame_count
+    assert not set(shown) & set(ticks)
+
+
+def test_chunks_behind_a_damaged_length_are_found_again(originals: list[Path], tmp_path: Path) -> None:
+    data = originals[0].read_bytes()
+    records = split(data)
+    first = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
+    offset = 8 + sum(9 + len(body) for _, body in records[:first])
+    path = tmp_path / "lost.mcap"
+    path.write_bytes(data[: offset + 40] + b"???" + data[offset + 40 :])
+    recording = read_recording(path)
+    later = [frame.view.tick for frame in recording.frames()]
+    assert later
+    assert later[-1] == original_content(originals[0])[2][-1]["view"]["tick"]
+
+
+def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
+    """A recording whose frames have another text, and whose seal and checksums are all right."""
+    from mcap.writer import CompressionType, Writer
+
+    from eidrive_scenario.recording.seal import Seal
+
+    records = split(source.read_bytes())
+    recording = read_recording(source)
+    seal = Seal()
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        writer.start(profile="", library="other")
+        writer.add_metadata("run", dict(recording.metadata))
+        seal.add_metadata(recording.metadata)
+        for name, data in recording.attachments.items():
+            writer.add_attachment(0, 0, name, "application/octet-stream", data)
+            seal.add_attachment(name, data)
+        schema = writer.register_schema("eidrive.Frame", "jsonschema", b"{}")
+        channel = writer.register_channel("/frame", "json", schema)
+        for opcode, body in records:
+            for inner, message in messages(unpack(body)) if opcode == CHUNK else ():
+                if inner == 5:
+                    tick, text = int.from_bytes(message[2:6], "little"), change(message[22:])
+                    writer.add_message(channel, tick, text, tick, sequence=tick)
+                    seal.add_frame(tick, tick, text)
+        writer.flush()
+        writer.add_metadata("end", seal.entries())
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("number", range(11))
+def test_a_hostile_recording_with_valid_checksums_is_no_internal_error(
+    originals: list[Path], tmp_path: Path, number: int
+) -> None:
+    import random
+
+    from .mutants import EDITS
+
+    draw = random.Random(number)
+    path = _forged(tmp_path / "forged.mcap", originals[1], lambda text: EDITS[number](text, draw))
+    code, error, _ = view(path)
+    assert code in (0, 2)
+    assert "internal error" not in error
+
+
+def test_names_in_a_recording_do_not_become_markup(originals: list[Path], tmp_path: Path) -> None:
+    attack = b"</script><img src=x onerror=alert(1)>"
+    path = _forged(tmp_path / "forged.mcap", originals[1], lambda text: text.replace(b'"Ego"', b'"' + attack + b'"'))
+    code, _, page = view(path)
+    assert code == 0
+    assert attack.decode() not in page
+    assert "<img" not in page
+
+
+def test_a_file_that_is_not_regular_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mcap")
+    for path in (tmp_path / "pipe.mcap", Path("/dev/zero")):
+        with pytest.raises(InputError, match="not a regular file"):
+            read_recording(path)
+
+
+def test_a_chunk_in_chunks_is_not_followed(originals: list[Path], tmp_path: Path) -> None:
+    """Many chunks of one bomb each: the content as a whole is bounded."""
+    records = split(originals[1].read_bytes())
+    place = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
+    bomb = (CHUNK, pack(records[place][1], b"\x05" + (2**26).to_bytes(8, "little") + bytes(2**26)))
+    path = tmp_path / "bombs.mcap"
+    path.write_bytes(join([*records[:place], *[bomb] * 20, *records[place:]]))
+    code, error, _ = view(path)
+    assert code in (0, 2)
+    assert "internal error" not in error
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MAX_BYTES
