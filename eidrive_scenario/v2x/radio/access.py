@@ -16,6 +16,7 @@ from pydantic import Field
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.message import Message
 from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.fading import FadingDraws
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,8 @@ class Transmission:
     """Which subchannels it takes."""
     reserves: bool = False
     """Whether its control information announces another use of the resource."""
+    gain: Array | None = None
+    """(N,) its power at each station over that of the link budget [dB]: fading; None: it has none."""
     control: NDArray[np.int8] | None = None
     """(N,) what became of its control information at each station, as a cause of loss or 0; None where it has none."""
 
@@ -82,6 +85,8 @@ class Access(ABC):
         self._period_busy = np.zeros(count)
         self._period: int | None = None
         """Which period of congestion control goes on; None before the first message."""
+        self.fading: FadingDraws | None = None
+        """Draws the power of each message at each station; None: it is that of the link budget."""
         self.on_air: list[Transmission] = []
         """What may overlap with something whose end is not reached."""
 
@@ -140,6 +145,9 @@ class Access(ABC):
             ("_period_busy", 0.0),
         ):
             setattr(self, field, moved(getattr(self, field), rows, fresh))
+        for entry in self.on_air:
+            if entry.gain is not None:
+                entry.gain = moved(entry.gain, rows, 0.0)
         self.gate = self.gate.rearranged(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
@@ -188,6 +196,8 @@ class Access(ABC):
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
         """The first message in the queue of a station goes on the air."""
         transmission.start, transmission.end = start, start + transmission.duration
+        if self.fading is not None:
+            transmission.gain = self.fading.gain_db(row, transmission.message.number)
         self._waiting[row].popleft()
         self._last_start[row], self._last_use[row] = start, transmission.duration * self.share(transmission)
         self.on_air.append(transmission)

@@ -27,6 +27,7 @@ from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import Gate
 from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import Batch, Dropped
+from eidrive_scenario.v2x.radio.fading import FadingDraws, Nakagami
 from eidrive_scenario.v2x.radio.ledger import Ledger
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.profile import RadioProfile
@@ -78,7 +79,9 @@ class RadioChannel(LinkChannel):
         self._draws = LinkDraws(seed)
         self._rows: dict[str, int] = {}
         self._listeners: dict[str, tuple[list[str], Rows]] = {}
+        self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         self._access = self._new_access(())
+        self._access.fading = self._fading
         self._ledger = Ledger(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self._jitter_keys: list[int] = []
@@ -183,6 +186,8 @@ class RadioChannel(LinkChannel):
         own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
         self._keys = joined(own[:, None], own[None, :])
         self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
+        if self._fading is not None:
+            self._fading.rearrange(names)
         for entry in [*lost, *gone]:
             for receiver in entry.receivers:
                 self._lose(entry, receiver, ABSENT)
@@ -202,6 +207,8 @@ class RadioChannel(LinkChannel):
         if not self._open and not self._access.waiting:
             self._access.rest(now)
             return
+        if self._fading is not None:
+            self._fading.distance = self._budget.distance
         power = self.profile.radiated - self._budget.loss
         started, dropped = self._access.advance(now, power)
         for entry in dropped:

@@ -62,7 +62,11 @@ class Csma(Access):
             transmission = self._head[row]
             assert transmission is not None
             self._begin(row, transmission, start)
-            self._occupy(row, transmission, sensed[row], starts)
+            notice = sensed[row]
+            if transmission.gain is not None:
+                notice = power[row] + transmission.gain >= self.sensing_dbm
+                notice[row] = True
+            self._occupy(row, transmission, notice, starts)
             self._next(row)
             started.append(transmission)
         if math.isfinite(until):

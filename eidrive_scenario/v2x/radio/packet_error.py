@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,6 +64,26 @@ def interpolated(x: float, places: Sequence[float], values: Sequence[float]) -> 
 _WILAB = "WiLabV2Xsim, IEEE 802.11p at 6 Mbit/s (MCS 2), 350 bytes, channel model "
 _GOUBET_RATIOS, _GOUBET_ERRORS = ieee80211p.FRAME_ERRORS
 
+_FREE_DISTANCE = 10
+_BIT_ERROR_WEIGHTS = (36, 211, 1404, 11633, 77433, 502690, 3322763, 21292910, 134365911)
+"""Of the convolutional code (133, 171) of rate 1/2, at Hamming distances 10, 12, …, 26 (P. Frenger et al., 1999)."""
+_NIST_SIZE = 100
+_NIST_RATIOS = tuple(round(3.0 + 0.05 * place, 2) for place in range(181))
+
+
+def nist_qpsk_errors(ratio_db: float, size: int) -> float:
+    """Packet error rate of QPSK with rate 1/2 (6 Mbit/s in 10 MHz) in white noise, for packets of `size` bytes.
+
+    NIST model of ns-3 (G. Pei, T. Henderson: Validation of OFDM error rate model in ns-3, 2010): Chernoff and union
+    bound of the bit errors behind a Viterbi decoder with hard decisions, and bits that fail independently.
+    """
+    ratio = 10.0 ** (ratio_db / 10.0)
+    raw = 0.5 * math.erfc(math.sqrt(ratio / 2.0))
+    bound = math.sqrt(4.0 * raw * (1.0 - raw))
+    weighted = sum(weight * bound ** (_FREE_DISTANCE + 2 * place) for place, weight in enumerate(_BIT_ERROR_WEIGHTS))
+    return 1.0 - (1.0 - min(1.0, weighted / 2.0)) ** (8 * size)
+
+
 _PSCCH_ERRORS = (
     1.0, 0.9883, 0.9784, 0.9721, 0.9631, 0.9517, 0.9325, 0.9133, 0.8783, 0.849, 0.8048, 0.7565, 0.6958, 0.6325, 0.5703,
     0.5049, 0.4273, 0.3733, 0.2989, 0.2437, 0.1932, 0.1467, 0.1126, 0.0785, 0.0592, 0.0423, 0.0265, 0.0186, 0.011,
@@ -94,6 +115,12 @@ CURVES = {
         None,
         "O. Goubet et al., IEEE TVT 64(9), 2015, fig. 14, at 6 Mbit/s in 10 MHz, as in Sepulcre et al. 2021",
         floor=0.001,
+    ),
+    "80211p_nist": ErrorCurve(
+        _NIST_RATIOS,
+        tuple(nist_qpsk_errors(ratio, _NIST_SIZE) for ratio in _NIST_RATIOS),
+        _NIST_SIZE,
+        "G. Pei, T. Henderson: Validation of OFDM error rate model in ns-3, 2010, at 6 Mbit/s in 10 MHz",
     ),
     "cv2x_r0.7": ErrorCurve(
         *cv2x_mode4.CODINGS[4][1:], cv2x_mode4.MESSAGE, "3GPP R1-160284, QPSK r = 0.7, 280 km/h, 190 bytes", floor=1e-4

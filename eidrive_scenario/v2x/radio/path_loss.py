@@ -13,7 +13,9 @@ from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.radio.propagation import (
     blockage_moments,
     building_nlos,
+    free_space,
     highway_los,
+    log_distance,
     urban_los,
     winner_b1,
 )
@@ -145,4 +147,50 @@ class WinnerB1(Settings):
         return max(clear, float(building_nlos(distance, frequency_ghz)))
 
 
-PathLoss = Annotated[Tr37885 | WinnerB1, Field(discriminator="kind")]
+class LogDistance(Settings):
+    """Log-distance path loss, with one loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+
+    exponent            10 times this many dB per decade of distance; 2 is free space
+    reference_distance  [m], with the loss `reference_loss_db` there and below; None: of free space at the carrier
+    Buildings have the NLOS of TR 37.885 where that loses more.
+    """
+
+    kind: Literal["log_distance"]
+    exponent: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
+    reference_distance: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
+    reference_loss_db: float | None = None
+    per_vehicle_db: NonNegativeFloat = 6.9
+
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
+    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
+    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
+
+    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+        clear = self._clear(between.distance, frequency_ghz)
+        if not between.states.any():
+            return clear
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self.per_vehicle_db * between.vehicles],
+            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
+        )
+
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        clear = float(self._clear(distance, frequency_ghz))
+        if link.state == LOS:
+            return clear
+        if link.state == NLOSV:
+            return clear + self.per_vehicle_db * link.vehicles
+        return max(clear, float(building_nlos(distance, frequency_ghz)))
+
+    def _clear(self, distance: Array | float, frequency_ghz: float) -> Array:
+        reference = self.reference_loss_db
+        at_reference = free_space(self.reference_distance, frequency_ghz) if reference is None else reference
+        return log_distance(distance, self.exponent, self.reference_distance, at_reference)
+
+
+PathLoss = Annotated[Tr37885 | WinnerB1 | LogDistance, Field(discriminator="kind")]

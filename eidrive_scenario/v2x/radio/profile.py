@@ -16,6 +16,7 @@ from eidrive_scenario.v2x.load.table import ErrorTable
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoControl
+from eidrive_scenario.v2x.radio.fading import Fading, NoFading
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
@@ -60,6 +61,7 @@ class RadioProfile(ComposedProfile):
     path_loss      which model, and its settings
     line_of_sight  `rays` through the world, `random` after the probabilities of TR 37.885, `clear`
     shadowing_db   standard deviation, None is the model's, 0 is no shadowing;  decorrelation  its distance [m]
+    fading         of each message at each receiver around the link budget
     packet_errors  name of one curve, or a mapping from los, nlosv and nlos to one each; None is the technology's
     data_rate_mbps of 802.11p;  mtu  largest frame [bytes]
     jitter         from the tick to the moment when a message is ready: evenly up to this, anew for each message [s]
@@ -79,6 +81,7 @@ class RadioProfile(ComposedProfile):
     line_of_sight: Literal["rays", "random", "clear"] = "rays"
     shadowing_db: NonNegativeFloat | None = None
     decorrelation: PositiveFloat | None = None
+    fading: Fading = NoFading()
     packet_errors: PacketErrors | None = None
     data_rate_mbps: float = 6.0
     mtu: PositiveInt = 1400

@@ -62,6 +62,18 @@ def winner_b1(distance: Values, frequency_ghz: float, first: float, second: floa
     return loss
 
 
+def free_space(distance: Values, frequency_ghz: float) -> Array:
+    """Friis: 20 lg(4 pi d f / c) [dB]; distance in m."""
+    loss: Array = 20.0 * np.log10(4.0 * np.pi * distance * frequency_ghz * 1e9 / SPEED_OF_LIGHT)
+    return loss
+
+
+def log_distance(distance: Values, exponent: float, reference: float, reference_loss: Values) -> Array:
+    """Log-distance model [dB]: `reference_loss` up to `reference` [m], then 10 `exponent` dB per decade of distance."""
+    loss: Array = reference_loss + 10.0 * exponent * np.log10(np.maximum(distance, reference) / reference)
+    return loss
+
+
 def probability_of_los(distance: Values, environment: str) -> Array:
     """That nothing stands between two cars of random traffic (3GPP TR 37.885, table 6.2-1), `highway` or `urban`."""
     if environment == "urban":

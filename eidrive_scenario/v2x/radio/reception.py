@@ -80,7 +80,11 @@ class Receiver:
         same_band = together & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
 
         senders = rows[own]
-        signal = power[senders]
+        received = power[rows]
+        for index, entry in enumerate(on_air):
+            if entry.gain is not None:
+                received[index] += entry.gain
+        signal = received[own]
         noise_dbm = np.array([self.noises_dbm[entry.bands - 1] for entry in ended])[:, None]
         snr = signal - noise_dbm
         numbers = np.array([entry.message.number for entry in ended])[:, None]
@@ -94,7 +98,7 @@ class Receiver:
         if int(last.max() - first.min()) > 1:
             common = np.minimum(last[None, :], last[own, None]) - np.maximum(first[None, :], first[own, None])
             shares = common / (last - first)
-        interference, busy, deaf = self._together(together, same_band, shares, start, own, rows, power)
+        interference, busy, deaf = self._together(together, same_band, shares, start, own, rows, received)
         if same_band.any():
             disturbed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + interference)
             causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
@@ -116,6 +120,12 @@ class Receiver:
     ) -> Receptions:
         """The same in plain numbers, one reception after the other."""
         powers, links = power.tolist(), keys.tolist()
+        faded = {
+            id(entry): powers[budget.rows[entry.message.sender]]
+            if entry.gain is None
+            else (power[budget.rows[entry.message.sender]] + entry.gain).tolist()
+            for entry in on_air
+        }
         states, mean_loss = budget.states.tolist(), budget.mean_loss.tolist()
         senders = [budget.rows[entry.message.sender] for entry in ended]
         causes, ratios = [], []
@@ -123,37 +133,37 @@ class Receiver:
             together = [other for other in on_air if other is not entry and _overlap(other, entry)]
             talking = {budget.rows[other.message.sender] for other in together}
             disturbing = sorted(
-                (budget.rows[other.message.sender], other.start, _common_share(other, entry))
-                for other in together
-                if _common_share(other, entry) > 0.0
+                (other for other in together if _common_share(other, entry) > 0.0),
+                key=lambda other: budget.rows[other.message.sender],
             )
-            earlier = {row for row, start, _ in disturbing if start < entry.start} if self.locks else set()
+            shares = [(faded[id(other)], _common_share(other, entry)) for other in disturbing]
+            earlier = [faded[id(other)] for other in disturbing if self.locks and other.start < entry.start]
             noise_dbm = self.noises_dbm[entry.bands - 1]
             controls = None if entry.control is None else entry.control.tolist()
             number, size = entry.message.number, entry.message.size
             found = []
-            for station, signal in enumerate(powers[sender]):
+            for station, signal in enumerate(faded[id(entry)]):
                 curve, draw = self.curves[states[sender][station]], uniform(links[sender][station], number)
                 cause = DELIVERED
                 if station in talking:
                     cause = HALF_DUPLEX
                 elif signal < self.sensing_dbm:
                     cause = SENSING
-                elif any(powers[row][station] >= self.sensing_dbm for row in earlier):
+                elif any(received[station] >= self.sensing_dbm for received in earlier):
                     cause = BUSY
                 elif draw < curve.of(signal - noise_dbm, size):
                     cause = PROPAGATION
                 elif controls is not None and controls[station] != DELIVERED:
                     cause = controls[station]
                 elif disturbing:
-                    others = sum(10.0 ** (powers[row][station] / 10.0) * share for row, _, share in disturbing)
+                    others = sum(10.0 ** (received[station] / 10.0) * share for received, share in shares)
                     floor = 10.0 * math.log10(10.0 ** (noise_dbm / 10.0) + others)
                     cause = COLLISION if draw < curve.of(signal - floor, size) else DELIVERED
                 if self.background is not None:
                     cause = self._in_background(cause, mean_loss[sender][station], links[sender][station], number)
                 found.append(cause)
             causes.append(found)
-            ratios.append([signal - noise_dbm for signal in powers[sender]])
+            ratios.append([signal - noise_dbm for signal in faded[id(entry)]])
         return Receptions(np.array(causes, dtype=np.int8), np.array(ratios), np.array(senders, dtype=np.int64))
 
     def _in_background(self, cause: int, mean_loss: float, link: int, number: int) -> int:
@@ -182,28 +192,29 @@ class Receiver:
         start: Array,
         own: Rows,
         rows: Rows,
-        power: Array,
+        received: Array,
     ) -> tuple[Array, Bools, Bools]:
         """Of each message at each station: the interference [mW], whether the receiver is taken by an earlier message,
         and whether it talks itself. Sums go in the order of the stations, not as a library of matrices likes it.
 
-        shares  (T, A) of the power of each interferer that falls into the band of a message; None: all of it
+        shares    (T, A) of the power of each interferer that falls into the band of a message; None: all of it
+        received  (A, N) power of each message on the air at each station [dBm]
         """
-        shape = (len(own), power.shape[1])
+        shape = (len(own), received.shape[1])
         interference, busy, deaf = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        milliwatts, sensed = 10.0 ** (power / 10.0), power >= self.sensing_dbm
+        milliwatts, sensed = 10.0 ** (received / 10.0), received >= self.sensing_dbm
         for place in np.flatnonzero(together.any(axis=1)).tolist():
             deaf[place, rows[together[place]]] = True
             others = np.flatnonzero(same_band[place])
             if len(others):
                 others = others[np.argsort(rows[others], kind="stable")]
-                disturbing = milliwatts[rows[others]]
+                disturbing = milliwatts[others]
                 if shares is not None:
                     disturbing = disturbing * shares[place, others][:, None]
                 interference[place] = disturbing.sum(axis=0)
                 if self.locks:
                     earlier = others[start[others] < start[own[place]]]
-                    busy[place] = sensed[rows[earlier]].any(axis=0)
+                    busy[place] = sensed[earlier].any(axis=0)
         return interference, busy, deaf
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:

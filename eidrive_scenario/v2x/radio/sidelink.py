@@ -226,6 +226,9 @@ class Sidelink(Access):
         widths = np.array([pdu.transmission.bands for pdu in due])
         blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
         power = self._power[rows]
+        for place, pdu in enumerate(due):
+            if pdu.transmission.gain is not None:
+                power[place] += pdu.transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
         self._history.proceed(due[-1].subframe + 1)
         subframes = self._history.receive(due, milliwatts / widths[:, None])

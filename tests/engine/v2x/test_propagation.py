@@ -10,10 +10,11 @@ import pytest
 from eidrive_scenario.v2x.counter_draws import uniform, uniforms
 from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
-from eidrive_scenario.v2x.radio.path_loss import Between, Tr37885, WinnerB1
+from eidrive_scenario.v2x.radio.path_loss import Between, Link, LogDistance, Tr37885, WinnerB1
 from eidrive_scenario.v2x.radio.propagation import (
     blockage_moments,
     building_nlos,
+    free_space,
     highway_los,
     probability_of_los,
     urban_los,
@@ -161,3 +162,22 @@ def test_one_draw_is_that_of_many_to_the_bit() -> None:
     keys = np.array([0, 1, 2**63, 2**64 - 1, 0x9E3779B97F4A7C15], dtype=np.uint64)
     for count in (-1, 0, 1, 12345678):
         assert [uniform(key, count) for key in keys.tolist()] == uniforms(keys, count).tolist()
+
+
+def test_log_distance_starts_from_free_space_at_its_reference() -> None:
+    """20 lg(4 pi 5.9e9 / 3e8) = 47.86 dB at 1 m; 25 dB per decade, ns-3's 46.6777 dB is that of 5.15 GHz."""
+    assert free_space(1.0, 5.9) == pytest.approx(47.86, abs=0.005)
+    assert free_space(1.0, 5.15) == pytest.approx(46.6777, abs=0.01)
+    model = LogDistance(kind="log_distance", exponent=2.5)
+    assert model.loss(between(LOS, 100.0), 5.9, np.array([0.5]))[0] == pytest.approx(97.86, abs=0.005)
+    assert model.loss_of(Link(100.0, NLOSV, 1.6, 1.6, 3.0, 2), 5.9, 0.5) == pytest.approx(97.86 + 2 * 6.9, abs=0.005)
+    assert model.loss(between(NLOS, 100.0), 5.9, np.array([0.5]))[0] == pytest.approx(111.42, abs=0.005)
+    given = LogDistance(kind="log_distance", exponent=3.0, reference_distance=10.0, reference_loss_db=60.0)
+    assert [given.loss_of(Link(d, LOS, 1.6, 1.6, 0.0, 0), 5.9, 0.5) for d in (1, 10, 100)] == [60, 60, 90]
+
+
+def test_nist_errors_of_qpsk_are_those_of_ns_3() -> None:
+    """ns-3 3.44 delivers 0.9825, 0.5325 and 0.231 of 20,000 packets of 336 bytes at 7.08, 6.05 and 5.80 dB."""
+    curve = CURVES["80211p_nist"]
+    ratios = np.array([23.0 - 47.86 - 25.0 * math.log10(metres) + 96.975 for metres in (400, 440, 450)])
+    assert 1.0 - curve.at(ratios, 336) == pytest.approx([0.9825, 0.53245, 0.23095], abs=0.01)

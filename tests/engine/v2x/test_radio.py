@@ -32,6 +32,8 @@ PROFILES: list[dict[str, object]] = [
     {"technology": "80211p", "background": {"kind": "80211p", "density": 0.1}},
     {"technology": "cv2x_mode4"},
     {"technology": "cv2x_mode4", "sidelink": {"interval": 0.05}, "queue": {"discipline": "lcfs"}},
+    {"technology": "80211p", "fading": {"kind": "nakagami", "m": 1}},
+    {"technology": "cv2x_mode4", "fading": {"kind": "nakagami", "m": [3, 1], "distances": [80]}},
     {"technology": "cv2x_mode4", "background": {"kind": "cv2x_mode4", "density": 0.2}, "line_of_sight": "random"},
 ]
 
@@ -79,7 +81,7 @@ def mixed_sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
     return SightLines(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
 
 
-@pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20)])
+@pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20), ("log_distance", 20)])
 @pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
 def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
     monkeypatch: pytest.MonkeyPatch, profile: dict[str, object], path_loss: str, power: float
