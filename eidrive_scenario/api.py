@@ -45,14 +45,14 @@ from eidrive_scenario.storyboard.distances import box_of, closing_speed, distanc
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.environments import changed as changed_environment
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
-from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve
+from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve, trajectory_of
 from eidrive_scenario.storyboard.progress import Progress, Watch
 from eidrive_scenario.storyboard.random_way import any_branch, random_route
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.storyboard.stand_in import StandIn
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.storyboard.trajectory import Layout, lay_out
+from eidrive_scenario.storyboard.trajectory import Layout, TrajectoryProgress, lay_out
 from eidrive_scenario.storyboard.transition import Transition as ValueTransition
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
@@ -137,6 +137,7 @@ __all__ = [
     "StateChange",
     "Steering",
     "Surroundings",
+    "TrajectoryProgress",
     "Transition",
     "ValueTransition",
     "Verdict",
@@ -175,6 +176,7 @@ __all__ = [
     "route_of",
     "suggestion",
     "traffic",
+    "trajectory_of",
     "turning_wheelbase",
     "wrap_angle",
 ]

@@ -8,7 +8,7 @@ from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Motion
-from eidrive_scenario.storyboard.trajectory import Layout
+from eidrive_scenario.storyboard.trajectory import Layout, TrajectoryProgress
 from eidrive_scenario.world.view import ActorState, WorldView
 
 STANDSTILL = 1e-3
@@ -48,8 +48,8 @@ class Actor:
         self.lateral = self.longitudinal = self._has_ours
         """Whether its own controller is active in the domain."""
         self.goal: Goal | None = None
-        self.trajectory: Layout | None = None
-        """What it is following."""
+        self.progress: TrajectoryProgress | None = None
+        """How far it is along the trajectory that it follows."""
         self.trailer: str | None = None
         """What it draws."""
         self.traveled = 0.0
@@ -73,6 +73,11 @@ class Actor:
         """Give it one more controller."""
         self._controllers = (*self._controllers, controller)
         self._has_ours = self._has_ours or is_ours(controller)
+
+    @property
+    def trajectory(self) -> Layout | None:
+        """What it is following."""
+        return None if self.progress is None else self.progress.layout
 
     @property
     def driven(self) -> bool:

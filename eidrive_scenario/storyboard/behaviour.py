@@ -80,6 +80,9 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
             raise self.problem("has no actor", "put it into a ManeuverGroup with Actors")
         return self.stage.actors[self.actor_name]
 
+    def settle(self) -> None:
+        """Finish the start in Init, once all its actions have started: places and speeds are known."""
+
     @abstractmethod
     def update(self) -> Status:
         """Decide on the step that begins now."""

@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.trajectory import Layout
+from eidrive_scenario.storyboard.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
 """x y z of the centre, length, width, height [m], yaw [rad]"""
@@ -153,21 +153,28 @@ def _offsets(
         return found[0] * sign, found[1] * sign
     if frame == "world":
         return there.x - here.x, there.y - here.y
-    trajectory = stage.actors[a].trajectory if frame == "trajectory" else None
-    if trajectory is not None:
-        return _along(trajectory, here, there)
+    progress = stage.actors[a].progress if frame == "trajectory" else None
+    if progress is not None:
+        return _along(progress, progress.at(stage.view.tick), here, there)
     dx, dy = there.x - here.x, there.y - here.y
     cos, sin = math.cos(here.h), math.sin(here.h)
     return dx * cos + dy * sin, dy * cos - dx * sin
 
 
-def _along(trajectory: Layout, here: Pose, there: Pose) -> tuple[float, float]:
-    """How much further along a trajectory and to its left a place is; the shorter way round on a closed one."""
-    (s, t), (other_s, other_t) = (trajectory.beside(pose.x, pose.y) for pose in (here, there))
+def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose) -> tuple[float, float]:
+    """How much further along a trajectory and to its left a place is; the shorter way round on a closed one.
+
+    `here` is at the actor's own station or next to it: the trajectory may come by the same place again.
+    """
+    trajectory = progress.layout
+    origin, tangent = trajectory.extended(station), trajectory.tangent(station)
+    dx, dy, cos, sin = here.x - origin.x, here.y - origin.y, math.cos(tangent), math.sin(tangent)
+    s, t = station + dx * cos + dy * sin, dy * cos - dx * sin
+    other_s, other_t = trajectory.beside(there.x, there.y, s)
     along = other_s - s
     if trajectory.closed and trajectory.length > 0.0:
         along = math.remainder(along, trajectory.length)
-    return along, other_t - t
+    return along * progress.way, (other_t - t) * progress.way
 
 
 def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value: float) -> float:

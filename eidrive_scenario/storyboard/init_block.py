@@ -33,6 +33,8 @@ class InitBlock(Composite):
             if len(late) == len(waiting):
                 raise late[0].problem("refers to an entity that nobody places", "place that entity in Init")
             waiting = late
+        for behaviour in self.running:
+            behaviour.settle()
 
     def _started(self, behaviour: ActionBehaviour) -> bool:
         try:

@@ -16,7 +16,7 @@ from eidrive_scenario.storyboard.geographic import height_of_level, plane_coordi
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.trajectory import lay_out
+from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 
 FIXED = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
 """Positions that mean the same place all the time."""
@@ -38,7 +38,7 @@ def resolve(position: model.Position, stage: Stage, actor: str | None = None) ->
         place = FRAMES[type(frame)](frame, stage, actor)
     except PositionError as error:
         raise _missing(frame, f"means no place: {error.problems[0].message}", error.problems[0].remedy) from error
-    if isinstance(frame, FIXED):
+    if _stands_still(frame, stage):
         stage.fixed_places[id(position)] = (position, place)
     return place
 
@@ -153,14 +153,33 @@ def _route(frame: model.RoutePosition, stage: Stage, actor: str | None) -> Place
 
 
 def _trajectory(frame: model.TrajectoryPosition, stage: Stage, actor: str | None) -> Place:
-    trajectory = frame.trajectory_ref.trajectory
-    if trajectory is None:
-        trajectory = stage.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
-    at = lay_out(trajectory, lambda position: resolve(position, stage, actor).pose).at(frame.s)
+    """s and t along and beside the curve; a relative heading counts from its tangent (1.3.1, TrajectoryPosition)."""
+    layout = trajectory_of(frame, stage, actor)
+    at, tangent = layout.at(frame.s), layout.tangent(frame.s)
     offset = frame.t or 0.0
-    x, y = at.x - offset * math.sin(at.h), at.y + offset * math.cos(at.h)
-    h, p, r = _angles(frame.orientation, at)
+    x, y = at.x - offset * math.sin(tangent), at.y + offset * math.cos(tangent)
+    h, p, r = _angles(frame.orientation, at._replace(h=tangent))
     return _on_ground(stage, Pose(x, y, at.z, h, p, r), z_given=True)
+
+
+def trajectory_of(frame: model.TrajectoryPosition, stage: Stage, actor: str | None = None) -> Layout:
+    """Return the trajectory along which a position counts, as it lies now."""
+    trajectory = _trajectory_in(frame, stage)
+    return lay_out(trajectory, lambda position: resolve(position, stage, actor).pose)
+
+
+def _trajectory_in(frame: model.TrajectoryPosition, stage: Stage) -> model.Trajectory:
+    if frame.trajectory_ref.trajectory is not None:
+        return frame.trajectory_ref.trajectory
+    return stage.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
+
+
+def _stands_still(frame: model.Element, stage: Stage) -> bool:
+    """Whether a position means the same place all the time."""
+    if not isinstance(frame, model.TrajectoryPosition):
+        return isinstance(frame, FIXED)
+    inner = (one for one in _trajectory_in(frame, stage).walk() if isinstance(one, model.Position))
+    return all(_stands_still(one.chosen(), stage) for one in inner)
 
 
 def _geo(frame: model.GeoPosition, stage: Stage, actor: str | None) -> Place:

@@ -21,6 +21,9 @@ from eidrive_scenario.storyboard.nurbs import Nurbs, along_the_curve
 ROUNDING = 2.0
 """How far from a corner of a polyline the heading begins to turn [m]."""
 
+SAME_PLACE = 1e-3
+"""Two passes of a trajectory by a point that are as near as this are by the same place [m]."""
+
 Resolve = Callable[[model.Position], Pose]
 
 
@@ -32,6 +35,7 @@ class Layout:
     times     at which the stations are passed [s], None for a trajectory without times
     given     True where the file gives headings
     stations  arc length of the points that have times [m]; empty: all have
+    tangents  direction of the curve at each point [rad]; empty: it is straight between points
     """
 
     s: tuple[float, ...]
@@ -40,6 +44,7 @@ class Layout:
     closed: bool = False
     given: bool = False
     stations: tuple[float, ...] = ()
+    tangents: tuple[float, ...] = ()
 
     @property
     def timed(self) -> tuple[float, ...]:
@@ -63,10 +68,41 @@ class Layout:
 
     def at(self, s: float) -> Pose:
         """The pose at arc length s; beyond the ends that of the end, on a closed one further round."""
-        if self.closed and s > self.length > 0.0:
-            s %= self.length
-        index, share = self._between(self.s, s)
+        index, share = self._between(self.s, self._round(s))
         return _blend(self.poses[index], self.poses[index + 1], share)
+
+    def tangent(self, s: float) -> float:
+        """Return the direction of the curve at arc length s [rad], whichever way its poses look."""
+        index, share = self._between(self.s, self._round(s))
+        if not self.tangents:
+            return self._directions[index]
+        return self.tangents[index] + share * wrap_angle(self.tangents[index + 1] - self.tangents[index])
+
+    def extended(self, s: float) -> Pose:
+        """Return the pose at arc length s; beyond the ends of an open trajectory straight on along its tangent."""
+        pose = self.at(s)
+        beyond = 0.0 if self.closed else s - min(max(s, 0.0), self.length)
+        if beyond == 0.0:
+            return pose
+        along = self.tangent(s)
+        return pose._replace(x=pose.x + beyond * math.cos(along), y=pose.y + beyond * math.sin(along))
+
+    def _round(self, s: float) -> float:
+        return s % self.length if self.closed and self.length > 0.0 and not 0.0 <= s <= self.length else s
+
+    @cached_property
+    def _directions(self) -> tuple[float, ...]:
+        """Direction of each straight piece [rad]; one of no length has that of the next, else of the one before."""
+        _, ways, lengths = self._stretches
+        found: list[float | None] = [
+            math.atan2(y, x) if length > 0.0 else None
+            for (x, y), length in zip(ways.tolist(), lengths.tolist(), strict=True)
+        ]
+        for order in (range(len(found) - 2, -1, -1), range(1, len(found))):
+            for index in order:
+                if found[index] is None:
+                    found[index] = found[index + (1 if order.step < 0 else -1)]
+        return tuple(pose.h if h is None else h for h, pose in zip(found, self.poses, strict=False))
 
     def at_time(self, time: float, speeds: Sequence[float] | None = None) -> float:
         """Arc length at a time [m]: between two points at constant speed, or as the `speeds` at the points ask."""
@@ -102,10 +138,11 @@ class Layout:
             speed = 2.0 * mean - speed
         return (*speeds, speed)
 
-    def beside(self, x: float, y: float) -> tuple[float, float]:
+    def beside(self, x: float, y: float, ahead_of: float | None = None) -> tuple[float, float]:
         """Arc length of the place that is nearest to a point, and how far to the left of it the point lies [m].
 
-        An open trajectory goes straight on beyond its ends.
+        An open trajectory goes straight on beyond its ends. Where it comes by several times, the first time after
+        `ahead_of` is meant.
         """
         corners, ways, lengths = self._stretches
         to = np.array([x, y]) - corners
@@ -114,7 +151,12 @@ class Layout:
         if not self.closed:
             held[0], held[-1] = min(along[0], held[0]), max(along[-1], held[-1])
         apart = to - held[:, None] * ways
-        nearest = int(np.argmin(np.einsum("ni,ni->n", apart, apart)))
+        square = np.einsum("ni,ni->n", apart, apart)
+        nearest = int(np.argmin(square))
+        if ahead_of is not None:
+            passes = np.flatnonzero(np.sqrt(square) <= math.sqrt(square[nearest]) + SAME_PLACE)
+            later = [n for n in passes.tolist() if self.s[n] + held[n] >= ahead_of - SAME_PLACE]
+            nearest = later[0] if later else nearest
         (ahead, left), (dx, dy) = ways[nearest].tolist(), to[nearest].tolist()
         return self.s[nearest] + float(held[nearest]), ahead * dy - left * dx
 
@@ -139,6 +181,27 @@ class Layout:
         return index, min(1.0, max(0.0, (value - grid[index]) / span)) if span > 0.0 else 1.0
 
 
+class TrajectoryProgress:
+    """How far an actor is along the trajectory that it follows.
+
+    layout  the trajectory
+    way     +1 where the actor's own forward direction leads towards the end, -1 where it drives tail first
+    """
+
+    def __init__(self, layout: Layout, s: float) -> None:
+        self.layout = layout
+        self.way = 1
+        self._tick, self._before, self._after = -2, s, s
+
+    def move(self, tick: int, before: float, after: float) -> None:
+        """Set the arc length in the view of a tick, and that in the next one [m]."""
+        self._tick, self._before, self._after = tick, before, after
+
+    def at(self, tick: int) -> float:
+        """Return the arc length in the view of a tick [m]."""
+        return self._after if tick > self._tick else self._before
+
+
 def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> Layout:
     """A trajectory in the world. `resolve` gives the pose that a position means now.
 
@@ -157,7 +220,7 @@ def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None =
 
 def _passed(course: Course, closed: bool) -> Layout:
     s, poses, times = course
-    return Layout(tuple(s), tuple(poses), times, closed)
+    return Layout(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
 def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
@@ -212,16 +275,18 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     count = min(max(2, math.ceil(rough / SPACING)), MOST_POINTS)
     poses = curve.sampled(count)
     given = any(has_heading(point.position) for point in shape.control_point)
+    smooth = along_the_curve(poses)
+    tangents = tuple(pose.h for pose in smooth)
     if not given:
-        poses = along_the_curve(poses)
+        poses = smooth
     s = [0.0, *accumulate(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(poses))]
     times = _times([point.time for point in shape.control_point])
     if times is None:
-        return Layout(tuple(s), tuple(poses), None, closed, given)
+        return Layout(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
     metres = 1 + int(rough)
     stations = [math.floor((number + 1) / count * metres) / metres * count for number in curve.peaks(count)]
     clock = np.interp(np.arange(count + 1), stations, times)
-    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given)
+    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given, tangents=tangents)
 
 
 def has_heading(position: model.Position) -> bool:

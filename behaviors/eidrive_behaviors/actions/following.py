@@ -87,48 +87,56 @@ class Pursuit:
         start = layout.at(s)
         self.on_path = math.hypot(start.x - pose.x, start.y - pose.y) < ON_PATH
 
-    def advance(self, way: float, dt: float) -> Pose:
-        """The pose after so many metres of path, driven within dt."""
-        goal = further(self._layout, self.s + way)
+    def advance(self, ds: float, dt: float, *, tail_first: bool = False) -> Pose:
+        """Return the pose after `ds` metres of the trajectory (back where negative), driven within dt.
+
+        With `tail_first` the vehicle looks against the trajectory.
+        """
+        way, sense = abs(ds), math.copysign(1.0, ds)
+        goal = self._goal(self.s + ds, tail_first)
         if self.on_path and abs(wrap_angle(goal.h - self.pose.h)) <= self._curvature * way + TINY:
-            self.s += way
+            self.s += ds
             self.pose = goal
             return goal
         self.on_path = False
-        curvature = self._towards(further(self._layout, self.s + max(self._wheelbase, PREVIEW * way / dt)))
+        back = math.pi if (sense < 0.0) != tail_first else 0.0
         x, y, _, h, _, _ = self.pose
+        h += back
+        curvature = self._towards(self._layout.extended(self.s + sense * max(self._wheelbase, PREVIEW * way / dt)), h)
         middle, h = h + 0.5 * curvature * way, wrap_angle(h + curvature * way)
         x, y = x + way * math.cos(middle), y + way * math.sin(middle)
-        self.s = self._beside(x, y, way)
-        goal = further(self._layout, self.s)
+        h = wrap_angle(h - back)
+        self.s = self._beside(x, y, ds)
+        goal = self._goal(self.s, tail_first)
         near = math.hypot(goal.x - x, goal.y - y) < ON_PATH
         self.on_path = near and abs(wrap_angle(goal.h - h)) <= self._curvature * way
         self.pose = goal if self.on_path else Pose(x, y, goal.z, h, goal.p, goal.r)
         return self.pose
 
-    def _towards(self, point: Pose) -> float:
+    def _goal(self, s: float, tail_first: bool) -> Pose:
+        pose = self._layout.extended(s)
+        if not tail_first:
+            return pose
+        back = pose.turned(math.pi)
+        return back._replace(h=wrap_angle(back.h))
+
+    def _towards(self, point: Pose, h: float) -> float:
+        """Curvature of the arc to a point, for a vehicle that moves in the direction `h` [1/m]."""
         dx, dy = point.x - self.pose.x, point.y - self.pose.y
-        ahead = math.cos(self.pose.h) * dx + math.sin(self.pose.h) * dy
-        left = math.cos(self.pose.h) * dy - math.sin(self.pose.h) * dx
+        ahead = math.cos(h) * dx + math.sin(h) * dy
+        left = math.cos(h) * dy - math.sin(h) * dx
         if ahead <= 0.0:
             return math.copysign(self._curvature, left)
         return min(max(2.0 * left / (dx * dx + dy * dy), -self._curvature), self._curvature)
 
-    def _beside(self, x: float, y: float, way: float) -> float:
+    def _beside(self, x: float, y: float, ds: float) -> float:
         """The arc length of the point of the trajectory beside a place; it does not go back."""
-        s = self.s + way
+        s, low, high = self.s + ds, min(self.s, self.s + 2.0 * ds), max(self.s, self.s + 2.0 * ds)
         for _ in range(3):
-            goal = further(self._layout, s)
-            s += math.cos(goal.h) * (x - goal.x) + math.sin(goal.h) * (y - goal.y)
-            s = min(max(s, self.s), self.s + 2.0 * way)
+            goal, tangent = self._layout.extended(s), self._layout.tangent(s)
+            s += math.cos(tangent) * (x - goal.x) + math.sin(tangent) * (y - goal.y)
+            s = min(max(s, low), high)
         return s
-
-
-def further(layout: Layout, s: float) -> Pose:
-    """The pose at an arc length of a trajectory; beyond the end of an open one straight on."""
-    pose = layout.at(s)
-    beyond = 0.0 if layout.closed else max(0.0, s - layout.length)
-    return pose._replace(x=pose.x + beyond * math.cos(pose.h), y=pose.y + beyond * math.sin(pose.h))
 
 
 def follows(dynamics: model.TransitionDynamics) -> bool:

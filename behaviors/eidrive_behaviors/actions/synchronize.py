@@ -7,7 +7,17 @@ from enum import Enum
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import Absent, ActionBehaviour, Domain, Place, model, resolve
+from eidrive_scenario.api import (
+    Absent,
+    ActionBehaviour,
+    Domain,
+    Layout,
+    Place,
+    TrajectoryProgress,
+    model,
+    resolve,
+    trajectory_of,
+)
 
 TINY = 1e-6
 ON_LINE = 0.1
@@ -34,7 +44,8 @@ class SynchronizeAction(ActionBehaviour):
     the last phase the speed lies on the line that ends in v1. Where the middle speed would be negative the actor stops
     and waits. While the master stands, so that it arrives never, the actor stands too. Without a final speed the
     acceleration is constant; an actor that is so fast that it would have to come back takes the mean speed of that
-    instant as its final speed. A steady state at the end shortens way and time.
+    instant as its final speed. A steady state at the end shortens way and time. Ways are along the trajectory that an
+    entity follows, else along the roads. An entity with a negative speed arrives backwards.
     """
 
     domains = Domain.LONGITUDINAL
@@ -45,39 +56,45 @@ class SynchronizeAction(ActionBehaviour):
         self._phase = Phase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
+        self._same: dict[str, tuple[Layout, bool]] = {}
+        """By entity, the trajectory that it follows, and whether its target is a TrajectoryPosition on that one."""
+        self._sense = 1.0
+        """-1 while the actor drives backwards."""
         self._mean: float | None = None
         """Speed at which to arrive where none is asked for and a constant deceleration would lead back [m/s]."""
 
     def update(self) -> Status:
         """The speed for the step."""
-        motion, dt = self.actor.motion, self.stage.dt
+        motion, dt, final = self.actor.motion, self.stage.dt, self._final_speed()
+        self._sense = -1.0 if motion.speed < 0.0 or (motion.speed == 0.0 and (final or 0.0) < 0.0) else 1.0
         try:
-            way = self._way(self.actor.name, self.action.target_position)
-            master_way = self._way(self.action.master_entity_ref, self.action.target_position_master)
+            master_speed = self.stage.speed(self.action.master_entity_ref)
+            way = self._way(self.actor.name, self.action.target_position, self._sense)
+            sense = math.copysign(1.0, master_speed)
+            master_way = self._way(self.action.master_entity_ref, self.action.target_position_master, sense)
         except Absent:
             return Status.RUNNING
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
         passed = way > self._last[0] or master_way > self._last[1]
         self._last = (way, master_way)
-        speed = self.stage.speed(self.action.master_entity_ref)
+        speed = abs(master_speed)
         time = max(master_way - theirs, TINY) / speed if speed > TINY else math.inf
-        final = self._final_speed()
         if way < mine + TINY or master_way < theirs + TINY or passed or time < dt + TINY:
             if final is not None:
                 motion.speed = final
             return Status.SUCCESS
-        way = max(way - mine, TINY)
-        if final is None and self._mean is None and math.isfinite(time) and motion.speed > 2.0 * way / time:
+        way, present = max(way - mine, TINY), self._sense * motion.speed
+        if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
-        final = self._mean if final is None else final
+        final = self._mean if final is None else self._sense * final
         if final is not None:
-            motion.speed = self._next(way, time, final, dt)
+            motion.speed = self._sense * self._next(way, time, final, dt)
         elif math.isfinite(time):
-            motion.speed += 2.0 * (way / time - motion.speed) / time * dt
+            motion.speed = self._sense * (present + 2.0 * (way / time - present) / time * dt)
         return Status.RUNNING
 
     def _next(self, way: float, time: float, final: float, dt: float) -> float:
-        speed = self.actor.motion.speed
+        speed = self._sense * self.actor.motion.speed
         steady = self._steady_way(final)
         if steady > 0.0 and final > TINY:
             if way - steady < TINY or time - steady / final < TINY:
@@ -124,7 +141,14 @@ class SynchronizeAction(ActionBehaviour):
                 return 0.0
         return speed + acceleration * dt
 
-    def _way(self, name: str, position: model.Position) -> float:
+    def _way(self, name: str, position: model.Position, sense: float) -> float:
+        """Return how far an entity has to go to its target [m]; negative if that lies behind on its trajectory.
+
+        `sense` is -1 for an entity that drives backwards.
+        """
+        actor = self.stage.actors[name]
+        if actor.progress is not None:
+            return self._along(actor.progress, name, position, sense)
         place: Place = resolve(position, self.stage, name)
         here = self.stage.pose(name)
         straight = math.hypot(place.pose.x - here.x, place.pose.y - here.y)
@@ -134,6 +158,24 @@ class SynchronizeAction(ActionBehaviour):
             return straight
         found = roads.distance(start, place.location)
         return straight if found is None else abs(found[0])
+
+    def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
+        """The way along the trajectory that the entity follows, in the direction in which it moves."""
+        layout, here = progress.layout, progress.at(self.stage.view.tick)
+        frame = position.chosen()
+        known = self._same.get(name)
+        if known is None or known[0] is not layout:
+            on_it = isinstance(frame, model.TrajectoryPosition) and (
+                trajectory_of(frame, self.stage, name).poses == layout.poses
+            )
+            self._same[name] = known = layout, on_it
+        if known[1] and isinstance(frame, model.TrajectoryPosition):
+            target = frame.s
+        else:
+            place = resolve(position, self.stage, name).pose
+            target = layout.beside(place.x, place.y, here)[0]
+        way = (target - here) * progress.way * sense
+        return way % layout.length if layout.closed and layout.length > 0.0 else way
 
     def _final_speed(self) -> float | None:
         final = self.action.final_speed

@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvature, wheelbase_of
 from eidrive_scenario.api import (
+    Absent,
     ActionBehaviour,
     Domain,
     Goal,
@@ -17,10 +18,12 @@ from eidrive_scenario.api import (
     Place,
     Pose,
     Stage,
+    TrajectoryProgress,
     has_times,
     lay_out,
     model,
     resolve,
+    wrap_angle,
 )
 
 TINY = 1e-6
@@ -43,6 +46,11 @@ class FollowTrajectoryAction(ActionBehaviour):
     following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
     speed and looks for its lane.
 
+    The heading is the one that the file gives, else that of the curve. A negative speed leads backwards: an actor that
+    looks along the curve goes back on it, and straight on beyond its start. One that looks the other way as the action
+    starts (by its own heading, by those of the file, or by the lane in which an actor without a place appears) drives
+    tail first to the end. Whether the position or the speed is set first in Init does not matter.
+
     In the mode `position` the actor is put on the trajectory. With `follow` a vehicle drives there from where it is and
     leaves the curve where its front wheels cannot turn as far; until it is on it again it catches up with the times
     within its Performance. Headings that the file gives are taken at their word in both.
@@ -61,6 +69,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         super().__init__(action, stage, actor=actor, parent=parent)
         self._pursuit: Pursuit | None = None
         self._run: Tracker | None = None
+        self._followed: TrajectoryProgress | None = None
         self._trajectory = self._found()
         self._timing = action.time_reference.timing
         if self._timing is not None and not has_times(self._trajectory.shape.chosen()):
@@ -70,7 +79,6 @@ class FollowTrajectoryAction(ActionBehaviour):
             )
             what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
             stage.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").problems
-        self._followed: Layout | None = None
 
     @property
     def controls(self) -> Domain:
@@ -84,72 +92,133 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Lay the trajectory out; positions relative to entities mean where those are now."""
-        self._layout: Layout = lay_out(self._trajectory, self._resolved, self.actor.motion.pose)
-        self.actor.trajectory = self._followed = self._layout
+        present, motion = self.actor.present, self.actor.motion
+        spline = self._trajectory.shape.clothoid_spline
+        if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
+            raise Absent(self.actor.name)
+        self._layout: Layout = lay_out(self._trajectory, self._resolved, motion.pose)
         self._s = self.action.initial_distance_offset or 0.0
+        self._progress = TrajectoryProgress(self._layout, self._s)
+        self.actor.progress = self._followed = self._progress
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
         self._started = self.stage.time
         follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
+        self._drives = follow and not self._layout.given and isinstance(self.actor.entity, model.Vehicle)
         swings = follow and self._timing is not None and self._trajectory.shape.polyline is not None
-        self._speeds = self._layout.speeds_from(abs(self.actor.motion.speed)) if swings else None
-        self._backwards = self.actor.present and self.actor.motion.speed < 0.0
+        self._speeds = self._layout.speeds_from(abs(motion.speed)) if swings else None
+        self._looks = motion.pose.h if present else None
+        """Heading before the action [rad]; None for an actor that the trajectory brings into the world."""
+        self._put: Pose | None = None
         self._pursuit = self._run = None
-        if follow and self.actor.present and not self._layout.given and not self._backwards:
-            self._pursue()
-        if self._timing is not None and self._pursuit is None:
+        self._begun = self._turned = self._jumps = False
+        if self._timing is not None and not (self._drives and present):
             self._s = self._layout.at_time(self._clock(0.0), self._speeds)
-        here, start = self.actor.motion.pose, self._layout.at(self._s)
-        self._jumps = math.hypot(start.x - here.x, start.y - here.y) > APART
 
-    def _pursue(self) -> None:
-        vehicle, motion = self.actor.entity, self.actor.motion
-        if not isinstance(vehicle, model.Vehicle):
+    def settle(self) -> None:
+        """All actions of Init have started: the speed, and whoever is placed by another one, are known."""
+        placed_here = self._put is not None and self.actor.motion.pose == self._put
+        self._look()
+        self._turn()
+        if placed_here:
+            self._enter(self._pose(self._s))
+
+    def _look(self) -> None:
+        """Notice where the actor looks, if another action has placed it."""
+        if self._put is not None and self.actor.motion.pose != self._put:
+            self._looks = self.actor.motion.pose.h
+            self._put = None
+
+    def _enter(self, pose: Pose) -> None:
+        self.stage.enter(self.actor.name, Place(pose))
+        self._put = self.actor.motion.pose
+
+    def _begin(self) -> None:
+        """The first step: from where the actor is by now."""
+        motion, layout = self.actor.motion, self._layout
+        self._begun = True
+        self._look()
+        placed = self._put is None
+        vehicle = self.actor.entity
+        if self._drives and isinstance(vehicle, model.Vehicle):
+            if placed and self._timing is not None:
+                self._s = self.action.initial_distance_offset or 0.0
+            self._pursuit = Pursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
+            if self._timing is not None:
+                top, faster, slower = self.actor.limits()
+                self._run = Tracker(self._s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top)
+        start = layout.at(self._s)
+        self._jumps = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > APART
+
+    def _turn(self) -> None:
+        """Decide whether the actor drives tail first, as soon as it moves."""
+        speed = self.actor.motion.speed
+        if self._turned or speed == 0.0:
             return
-        self._pursuit = Pursuit(self._layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
-        if self._timing is not None:
-            top, faster, slower = self.actor.limits()
-            self._run = Tracker(self._s, motion.speed, up=faster, down=slower, lowest=0.0, highest=top)
+        self._turned = True
+        if speed < 0.0:
+            pose, tangent = self._layout.at(self._s), self._layout.tangent(self._s)
+            looks = pose.h if self._layout.given else self._looks
+            if looks is None:
+                looks = self._looks_by_lane()
+            self._progress.way = -1 if looks is not None and math.cos(looks - tangent) < 0.0 else 1
+
+    def _looks_by_lane(self) -> float | None:
+        """Heading of the lane or road on which the first vertex lies; None where that says nothing."""
+        first = next(one for one in self._trajectory.walk() if isinstance(one, model.Position))
+        on_lane = isinstance(first.chosen(), model.LanePosition | model.RoadPosition)
+        return self._resolved(first).h if on_lane else None
 
     def terminate(self, new_status: Status) -> None:
         """Nothing measures along a trajectory that nobody follows any more."""
-        if self._followed is not None and self.actor.trajectory is self._followed:
-            self.actor.trajectory = None
+        if self._followed is not None and self.actor.progress is self._followed:
+            self.actor.progress = None
         self._followed = None
 
     def update(self) -> Status:
         """The pose at the end of the step."""
         if self.actor.driven:
             return self._ask_driver()
-        if self._pursuit is not None:
-            return self._drive(self._pursuit)
         motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
+        if dt > 0.0 and not self._begun:
+            self._begin()
+        if dt > 0.0:
+            self._turn()
+        if self._pursuit is not None or (dt == 0.0 and self._drives and self.actor.present and self._put is None):
+            return self._drive(self._pursuit)
+        way = self._progress.way
         if self._timing is None:
-            after, done = self._s + abs(motion.speed) * dt, False
-            if not layout.closed:
-                done = dt > 0.0 and after > layout.length - TINY
+            after = self._s + way * motion.speed * dt
+            done = not layout.closed and after > max(self._s, layout.length - TINY)
         else:
             clock = self._clock(dt)
             after = layout.at_time(clock, self._speeds)
             done = clock >= layout.end_time - TINY
             if dt > 0.0 and not (done and clock > layout.end_time + TINY):
-                motion.speed = math.copysign((after - self._s) / dt, motion.speed if self._backwards else 1.0)
+                motion.speed = self._forwards(after) * (after - self._s) / dt
+            if done:
+                after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
+        self._progress.move(self.stage.view.tick, self._s, after)
         self._s = after
         pose = self._pose(after)
-        if done:
-            rest = self._rest(after, dt)
-            pose = pose._replace(x=pose.x + rest * math.cos(pose.h), y=pose.y + rest * math.sin(pose.h))
         if dt == 0.0 or not self.actor.present:
-            self.stage.enter(self.actor.name, Place(pose))
+            self._enter(pose)
         else:
             motion.go_to(pose, land=done, jump=self._jumps)
         self._jumps = False
         return Status.SUCCESS if done else Status.RUNNING
 
-    def _drive(self, pursuit: Pursuit) -> Status:
+    def _forwards(self, s: float) -> float:
+        """+1 where the actor looks along the curve, -1 where it goes on it tail first."""
+        if not self._layout.given:
+            return self._progress.way
+        return -1.0 if math.cos(self._layout.at(s).h - self._layout.tangent(s)) < -TINY else 1.0
+
+    def _drive(self, pursuit: Pursuit | None) -> Status:
         """The pose at the end of the step of a vehicle that follows as far as it can."""
         motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
-        if dt == 0.0:
+        if pursuit is None or dt == 0.0:
             return Status.RUNNING
+        way, before = self._progress.way, pursuit.s
         if self._run is not None:
             clock = self._clock(dt)
             beyond = max(0.0, clock - layout.end_time) * self._last_speed()
@@ -159,10 +228,11 @@ class FollowTrajectoryAction(ActionBehaviour):
                 self._run.keep(wanted, dt)
             else:
                 self._run.advance(wanted, dt)
-            motion.speed = self._run.rate
-        pose = pursuit.advance(abs(motion.speed) * dt, dt)
+            motion.speed = way * self._run.rate
+        pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
-        done = not (layout.closed and self._run is None) and pursuit.s > layout.length - TINY
+        self._progress.move(self.stage.view.tick, before, pursuit.s)
+        done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - TINY)
         motion.go_to(pose, land=done)
         return Status.SUCCESS if done else Status.RUNNING
 
@@ -182,15 +252,12 @@ class FollowTrajectoryAction(ActionBehaviour):
             return (elapsed - self._timing.offset) / self._timing.scale
         return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
 
-    def _rest(self, s: float, dt: float) -> float:
-        """What the step has left beyond the end of the trajectory [m]."""
-        if self._timing is None:
-            return max(0.0, s - self._layout.length)
-        return max(0.0, self._clock(dt) - self._layout.end_time) * self._timing.scale * self.actor.motion.speed
-
     def _pose(self, s: float) -> Pose:
-        pose = self._layout.at(s)
-        return pose.turned(math.pi) if self._backwards and not self._layout.given else pose
+        pose = self._layout.extended(s)
+        if self._progress.way > 0 or self._layout.given:
+            return pose
+        back = pose.turned(math.pi)
+        return back._replace(h=wrap_angle(back.h))
 
     def _ask_driver(self) -> Status:
         count = max(2, math.ceil(self._layout.length / 2.0) + 1)

@@ -24,8 +24,11 @@ def reference_of(stage: Stage, entity: str, kind: model.AngleType, system: model
     if system is model.CoordinateSystem.ENTITY:
         return _of(stage.pose(entity), kind)
     if system is model.CoordinateSystem.TRAJECTORY:
-        pose, followed = stage.pose(entity), stage.actors[entity].trajectory
-        return _of(pose if followed is None else followed.at(followed.beside(pose.x, pose.y)[0]), kind)
+        pose, progress = stage.pose(entity), stage.actors[entity].progress
+        if progress is None:
+            return _of(pose, kind)
+        station = progress.at(stage.view.tick)
+        return _of(progress.layout.at(station)._replace(h=progress.layout.tangent(station)), kind)
     here = stage.location(entity)
     if stage.roads is None or here is None:
         return math.nan

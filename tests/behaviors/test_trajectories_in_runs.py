@@ -1,0 +1,230 @@
+"""Trajectories: motion backwards, what is measured along them, and arrivals together. All streets are straight."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from street_scene import after
+
+from eidrive_scenario.simulation import RunSettings
+
+HALF_TURN = math.pi
+
+
+def world(x: float, y: float, h: float | None = None) -> str:
+    heading = "" if h is None else f' h="{h}"'
+    return f'<WorldPosition x="{x}" y="{y}"{heading}/>'
+
+
+def on_road(s: float, t: float) -> str:
+    return f'<RoadPosition roadId="1" s="{s}" t="{t}"/>'
+
+
+def curve(*places: str, closed: bool = False, times: tuple[float, ...] = ()) -> str:
+    clock = [f' time="{time}"' for time in times] or [""] * len(places)
+    vertices = "".join(
+        f"<Vertex{at}><Position>{place}</Position></Vertex>" for place, at in zip(places, clock, strict=True)
+    )
+    shape = f"<Shape><Polyline>{vertices}</Polyline></Shape>"
+    return f'<Trajectory name="way" closed="{str(closed).lower()}">{shape}</Trajectory>'
+
+
+def follow(way: str, mode: str = "position", reference: str = "<None/>") -> str:
+    return f"""<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>{way}</TrajectoryRef>
+      <TimeReference>{reference}</TimeReference><TrajectoryFollowingMode followingMode="{mode}"/>
+      </FollowTrajectoryAction></RoutingAction></PrivateAction>"""
+
+
+def teleport(place: str) -> str:
+    return f"<PrivateAction><TeleportAction><Position>{place}</Position></TeleportAction></PrivateAction>"
+
+
+def speed(value: float, seconds: float = 0.0) -> str:
+    shape = "linear" if seconds else "step"
+    return f"""<PrivateAction><LongitudinalAction><SpeedAction>
+      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="time" value="{seconds}"/>
+      <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
+      </PrivateAction>"""
+
+
+WALKER = """<ScenarioObject name="Walker"><Pedestrian name="w" pedestrianCategory="pedestrian" mass="70">
+  <BoundingBox><Center x="0" y="0" z="0.9"/><Dimensions width="0.5" length="0.5" height="1.8"/></BoundingBox>
+  </Pedestrian></ScenarioObject>"""
+FINE = RunSettings(dt=0.01)
+
+
+def row(played: Any, time: float, name: str = "Ego", dt: float = 0.05) -> tuple[float, float, float, float]:
+    view = played.frames[round(time / dt)].view
+    index = view.rows[name]
+    x, y, _ = view.position[index].tolist()
+    return x, y, math.remainder(float(view.yaw[index]), math.tau), float(view.speed[index])
+
+
+def drive(run: Any, *actions: str, end: float = 3.0) -> Any:
+    """A run in which Ego does this in Init."""
+    return run(end, driven=False, init=f'<Private entityRef="Ego">{"".join(actions)}</Private>')
+
+
+AHEAD = curve(world(150.0, -2.0), world(900.0, -2.0))
+AHEAD_WITH_HEADING = curve(world(150.0, -2.0, 0.0), world(900.0, -2.0, 0.0))
+BACK_ON_ROAD = curve(on_road(500.0, 0.0), on_road(50.0, 0.0))
+
+
+@pytest.mark.element("FollowTrajectoryAction")
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("way", [AHEAD, AHEAD_WITH_HEADING])
+@pytest.mark.parametrize("order", ["teleport speed follow", "speed follow teleport", "follow teleport speed"])
+def test_negative_speed_on_a_trajectory_leads_backwards_in_any_order(run: Any, mode: str, way: str, order: str) -> None:
+    """At -5 m/s from x = 150, looking along the curve: x = 150 - 5 t."""
+    parts = {"teleport": teleport(world(150.0, -2.0, 0.0)), "speed": speed(-5.0), "follow": follow(way, mode)}
+    played = drive(run, *(parts[name] for name in order.split()))
+    for time in (0.05, 1.0, 3.0):
+        assert row(played, time) == pytest.approx((150.0 - 5.0 * time, -2.0, 0.0, -5.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("order", ["teleport speed follow", "speed follow teleport", "follow speed teleport"])
+def test_car_that_looks_against_its_trajectory_reverses_along_it(run: Any, mode: str, order: str) -> None:
+    """The reversing car of Euro NCAP's CPRA: it looks along the road, and its trajectory leads back on it."""
+    parts = {"teleport": teleport(world(500.0, 0.0, 0.0)), "speed": speed(-5.0), "follow": follow(BACK_ON_ROAD, mode)}
+    played = drive(run, *(parts[name] for name in order.split()))
+    for time in (0.0, 0.05, 1.0, 3.0):
+        assert row(played, time) == pytest.approx((500.0 - 5.0 * time, 0.0, 0.0, -5.0), abs=1e-6)
+
+
+def test_car_that_appears_on_a_trajectory_looks_as_its_lane_when_it_reverses(run: Any) -> None:
+    lane = '<LanePosition roadId="1" laneId="-1" s="{}"/>'
+    back = curve(lane.format(500), lane.format(50))
+    walker = WALKER
+    for order in ((speed(-5.0), follow(back)), (follow(back), speed(-5.0))):
+        init = f'<Private entityRef="Walker">{"".join(order)}</Private>'
+        played = run(2.0, driven=False, more=walker, init=init)
+        for time in (0.0, 1.0, 2.0):
+            assert row(played, time, "Walker") == pytest.approx((500.0 - 5.0 * time, -2.0, 0.0, -5.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_change_of_direction_on_a_trajectory_drives_the_same_curve_back(run: Any, mode: str) -> None:
+    """10 m/s forwards for 1 s, to -10 m/s within 2 s, so that after 2 s it turns 5 m further on, and goes back."""
+    way = curve(world(100.0, -2.0), world(900.0, -2.0))
+    played = run(
+        4.0,
+        ("Ego", speed(-10.0, 2.0), after(0.995)),
+        driven=False,
+        ego=(-1, 100.0, 10.0),
+        init=f'<Private entityRef="Ego">{follow(way, mode)}</Private>',
+        settings=FINE,
+    )
+    assert row(played, 1.0, dt=0.01)[0] == pytest.approx(110.0, abs=0.11)
+    assert row(played, 2.0, dt=0.01)[0] == pytest.approx(115.0, abs=0.2)
+    x, y, h, v = row(played, 4.0, dt=0.01)
+    assert (x, y, h, v) == (pytest.approx(100.0, abs=0.3), pytest.approx(-2.0), pytest.approx(0.0), -10.0)
+
+
+def test_reversing_car_in_mode_follow_turns_its_wheels_no_further_than_they_go(run: Any) -> None:
+    """tan 0.5 / 3 m is the largest curvature; the corner lies behind the car, at (80, -2)."""
+    way = curve(world(100.0, -2.0), world(80.0, -2.0), world(80.0, -42.0))
+    played = drive(run, teleport(world(100.0, -2.0, 0.0)), speed(-5.0), follow(way, "follow"), end=11.0)
+    largest = math.tan(0.5) / 3.0
+    places = [row(played, 0.05 * n) for n in range(len(played.frames))]
+    for before, now in pairwise(places):
+        turn, way_gone = math.remainder(now[2] - before[2], math.tau), math.dist(before[:2], now[:2])
+        assert abs(turn) <= largest * way_gone * 1.01 + 1e-6
+        ahead = (now[0] - before[0]) * math.cos(before[2]) + (now[1] - before[1]) * math.sin(before[2])
+        assert ahead < 0.0
+    assert places[-1][:2] == pytest.approx((80.0, -36.0), abs=1.5)
+    assert places[-1][2] == pytest.approx(math.pi / 2, abs=0.05)
+
+
+def test_timed_trajectory_with_headings_against_its_course_has_a_negative_speed(run: Any) -> None:
+    timed = curve(world(200.0, -2.0, 0.0), world(180.0, -2.0, 0.0), times=(0.0, 2.0))
+    reference = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
+    played = drive(run, follow(timed, reference=reference), end=4.0)
+    assert row(played, 1.0) == pytest.approx((190.0, -2.0, 0.0, -10.0), abs=1e-6)
+    assert row(played, 3.0) == pytest.approx((170.0, -2.0, 0.0, -10.0), abs=1e-6)
+
+
+def together(target: str, final: str, master: str = '<LanePosition roadId="1" laneId="-1" s="146"/>') -> str:
+    return f"""<PrivateAction><SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster>{master}
+      </TargetPositionMaster><TargetPosition>{target}</TargetPosition><FinalSpeed>{final}</FinalSpeed>
+      </SynchronizeAction></PrivateAction>"""
+
+
+CROSSING = curve(world(150.0, -6.0, math.pi / 2), world(150.0, 2.0, math.pi / 2))
+ON_IT = f'<TrajectoryPosition s="3.61"><TrajectoryRef>{CROSSING}</TrajectoryRef></TrajectoryPosition>'
+STEADY = '<AbsoluteSpeed value="1.389"><TargetDistanceSteadyState distance="3"/></AbsoluteSpeed>'
+
+
+@pytest.mark.element("SynchronizeAction")
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("target", [ON_IT, world(150.0, -2.39)])
+@pytest.mark.parametrize("begin", [None, 0.45])
+def test_synchronize_measures_along_the_trajectory_that_the_actor_follows(
+    run: Any, mode: str, target: str, begin: float | None
+) -> None:
+    """Ego needs 46 m / 8.333 m/s = 5.52 s; the walker stands until then, and ends with 3 m at 1.389 m/s."""
+    steps = ("Walker", together(target, STEADY), *(() if begin is None else (after(begin),)))
+    played = run(
+        7.0,
+        steps,
+        driven=False,
+        ego=(-1, 100.0, 8.333),
+        more=WALKER,
+        init=f'<Private entityRef="Walker">{follow(CROSSING, mode)}</Private>',
+        settings=FINE,
+    )
+    arrived = next(f.view.time for f in played.frames if row(played, f.view.time, "Walker", 0.01)[1] >= -2.39)
+    assert arrived == pytest.approx(46.0 / 8.333, abs=0.03)
+    for time in (3.5, 4.5, 5.4):
+        assert row(played, time, "Walker", 0.01)[3] == pytest.approx(1.389, abs=1e-3)
+    assert row(played, 1.0, "Walker", 0.01)[3] < 0.3
+    (end,) = [
+        c.time for f in played.frames for c in f.changes if c.element == "action 0" and c.after.value == "completeState"
+    ]
+    assert end == pytest.approx(46.0 / 8.333, abs=0.03)
+
+
+def test_synchronize_with_a_master_that_reverses_along_its_trajectory(run: Any) -> None:
+    """The master is at the target after 20 m at -5 m/s, at 4 s; the walker arrives with it, at its own speed 1 m/s."""
+    master_way = curve(on_road(500.0, 0.0), on_road(50.0, 0.0))
+    at_480 = f'<TrajectoryPosition s="20"><TrajectoryRef>{master_way}</TrajectoryRef></TrajectoryPosition>'
+    init = f'<Private entityRef="Ego">{teleport(world(500.0, 0.0, 0.0))}'
+    init += f'{speed(-5.0)}{follow(master_way)}</Private><Private entityRef="Walker">{follow(CROSSING)}</Private>'
+    played = run(
+        5.0,
+        ("Walker", together(ON_IT, '<AbsoluteSpeed value="1"/>', at_480)),
+        driven=False,
+        more=WALKER,
+        init=init,
+        settings=FINE,
+    )
+    assert row(played, 4.0, dt=0.01)[0] == pytest.approx(480.0, abs=1e-6)
+    assert row(played, 4.0, "Walker", 0.01)[1] == pytest.approx(-6.0 + 3.61, abs=0.03)
+
+
+def test_distance_on_a_trajectory_that_crosses_itself_counts_from_the_actor_s_own_pass(scene: Any) -> None:
+    """A loop that comes by (200, -2) after 100 m and, from the side, after 100 + 4 · 60 m less the crossing."""
+    corners = [(100.0, -2.0), (260.0, -2.0), (260.0, 58.0), (200.0, 58.0), (200.0, -100.0)]
+    way = curve(*(world(x, y) for x, y in corners))
+    far = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
+      </TriggeringEntities><EntityCondition><DistanceCondition coordinateSystem="trajectory" freespace="false"
+      relativeDistanceType="longitudinal" rule="lessThan" value="0.5"><Position><WorldPosition x="200" y="-2"/>
+      </Position></DistanceCondition></EntityCondition></ByEntityCondition>"""
+    nothing = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traffic="true"/></PrivateAction>'
+    played = scene(18, ("Ego", follow(way)), ("Ego", nothing, far), executions=2, edge="rising")
+    times = [c.time for c in played.changes if c.element == "event 1" and c.after.value == "runningState"]
+    lengths = [100.0, 160.0 + 60.0 + 60.0 + 60.0]
+    assert times == pytest.approx([length / 20.0 for length in lengths], abs=0.15)
+
+
+@pytest.mark.element("TrajectoryPosition")
+def test_trajectory_position_counts_from_the_tangent_not_from_headings_of_the_vertices(run: Any) -> None:
+    way = curve(world(100.0, 0.0, 0.0), world(200.0, 0.0, math.pi / 2))
+    place = f'<TrajectoryPosition s="50" t="-10"><TrajectoryRef>{way}</TrajectoryRef>{{}}</TrajectoryPosition>'
+    turned = '<Orientation type="relative" h="0.3"/>'
+    for orientation, h in (("", 0.0), (turned, 0.3)):
+        played = drive(run, teleport(place.format(orientation)), speed(0.0), end=0.1)
+        assert row(played, 0.0) == pytest.approx((150.0, -10.0, h, 0.0), abs=1e-9)
