@@ -10,7 +10,7 @@ from eidrive_scenario.roads.curves import Arc
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
-from eidrive_scenario.roads.poses import LEAST_STRETCH, banked_tangent, lane_at, lane_t
+from eidrive_scenario.roads.poses import LEAST_STRETCH, lane_at, lane_t
 
 if TYPE_CHECKING:
     from eidrive_scenario.roads.route import Route
@@ -185,7 +185,6 @@ def _along(
     if section.index == len(road.sections) - 1 and direction > 0:
         end = road.length
     steady = road.lane_offset.is_constant and (lane.id == 0 or lane.centre.is_constant)
-    steady = steady and road.superelevation.is_zero
     while remaining > 0.0:
         room = (end - s) * direction
         if room <= 0.0:
@@ -216,12 +215,9 @@ def _along(
 
 
 def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
-    """Metres of path at an offset from a lane's centre per metre of s."""
+    """Metres of path at an offset from a lane's centre per metre of s; in banked bends as if they were level."""
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
-    if not road.superelevation.is_zero:
-        tangent = banked_tangent(road, s, t + offset, slope, curvature, speed)
-        return math.hypot(tangent.along, tangent.sideways)
     across = speed * (1.0 - curvature * (t + offset))
     return max(math.hypot(across, slope) if slope else across, LEAST_STRETCH)
 

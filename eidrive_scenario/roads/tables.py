@@ -184,10 +184,7 @@ class RoadTables:
         t, slope = self.lane_t(row, s)
         road = self.section_road[self.lane_section[row]]
         curvature, speed = self.curves.bend(road, s)
-        along = speed * (1.0 - curvature * t)
-        if self.banked:
-            along, slope = self._banked_tangent(road, s, t, slope, curvature, speed)[3:5]
-        return np.asarray(np.maximum(np.hypot(along, slope), LEAST_STRETCH))
+        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
 
     def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
         """All lanes with their running numbers."""

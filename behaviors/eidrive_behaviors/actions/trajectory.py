@@ -137,10 +137,9 @@ class FollowTrajectoryAction(ActionBehaviour):
         motion, layout = self.actor.motion, self._layout
         self._begun = True
         self._look()
-        placed = self._put is None
         vehicle = self.actor.entity
-        if self._drives and isinstance(vehicle, model.Vehicle):
-            if placed and self._timing is not None:
+        if self._drives and self._put is None and isinstance(vehicle, model.Vehicle):
+            if self._timing is not None:
                 self._s = self.action.initial_distance_offset or 0.0
             self._pursuit = Pursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
             if self._timing is not None:
