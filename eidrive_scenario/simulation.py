@@ -16,7 +16,7 @@ from eidrive_scenario.driving.declared import possible_drivers
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Problem, SettingError, Together, suggestion
+from eidrive_scenario.errors import Problem, SettingError, SimulationError, Together, suggestion
 from eidrive_scenario.library import name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
@@ -150,6 +150,9 @@ class Simulation:
             resolved = resolved.of_distribution(source.number, source.assignments)
         self.resolved: ResolvedSettings = resolved
         """All settings of this run."""
+        self._last: tuple[Frame, str, float] | None = None
+        """The last frame, the reason for the end, and the wall time until then [s]."""
+        self._started = time.perf_counter()
 
     def __enter__(self) -> Self:
         return self
@@ -183,18 +186,26 @@ class Simulation:
 
     def run(self) -> RunResult:
         """Play to the end."""
-        started = time.perf_counter()
+        self._started = time.perf_counter()
         with self:
-            end = None
-            while end is None:
-                frame, end = self.tick()
-            return self._result(frame, end, time.perf_counter() - started)
+            while self._last is None:
+                self.tick()
+            return self.result()
+
+    def result(self) -> RunResult:
+        """Return the result of a run that `tick` has brought to its end. Raise SimulationError before that."""
+        if self._last is None:
+            raise SimulationError("the run has not ended; call tick until it gives a reason for the end, or run")
+        return self._result(*self._last)
 
     def tick(self) -> tuple[Frame, str | None]:
         """One step of the loop: the frame of this instant, and why the run ends with it (None: it goes on).
 
-        Raises ExtensionError if an extension raises an exception or returns something invalid.
+        Raises ExtensionError if an extension raises an exception or returns something invalid, SimulationError after
+        the end.
         """
+        if self._last is not None:
+            raise SimulationError("the run has ended; a second run needs a second Simulation")
         try:
             return self._tick()
         except BaseException as error:
@@ -234,6 +245,8 @@ class Simulation:
             self.stations.send(steps, view.time)
             self._apply(commands)
             self.world.step(commands.placements, self.stations.controls(steps, commands.overrides))
+        else:
+            self._last = frame, end, time.perf_counter() - self._started
         return frame, end
 
     def _end(self, frame: Frame) -> str | None:

@@ -1,0 +1,45 @@
+"""A run that is stepped by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+
+ONE = "coop/scenario_1"
+
+
+def test_result_of_stepped_run_is_that_of_a_run_in_one_go() -> None:
+    with Simulation(ONE) as simulation:
+        end = None
+        while end is None:
+            _, end = simulation.tick()
+        stepped = simulation.result()
+    whole = run_file(ONE)
+    assert stepped.trace_hash == whole.trace_hash
+    assert (stepped.metrics, stepped.criteria, stepped.warnings) == (whole.metrics, whole.criteria, whole.warnings)
+    assert simulation.result().trace_hash == whole.trace_hash
+
+
+def test_run_goes_on_from_where_it_was_stepped_to() -> None:
+    simulation = Simulation(ONE)
+    for _ in range(10):
+        simulation.tick()
+    assert simulation.run().trace_hash == run_file(ONE).trace_hash
+
+
+def test_result_before_the_end_is_an_error() -> None:
+    with Simulation(ONE) as simulation:
+        simulation.tick()
+        with pytest.raises(SimulationError, match="the run has not ended; call tick until"):
+            simulation.result()
+
+
+def test_tick_after_the_end_is_an_error() -> None:
+    with Simulation(ONE, settings=RunSettings(time_limit=0.1)) as simulation:
+        while simulation.tick()[1] is None:
+            pass
+        with pytest.raises(SimulationError, match="the run has ended; a second run needs a second Simulation"):
+            simulation.tick()
+        assert simulation.result().end == "time limit"
