@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,6 +26,8 @@ LANE_DEVIATION = math.radians(25.0)
 """How much an object's heading differs from the expected one [rad]."""
 HEADING_DEVIATION = 0.4
 """Of a heading that is a guess [rad]."""
+NEGLIGIBLE = 12.0
+"""Choices whose cost exceeds the least one by more are not likely enough to matter."""
 ABOVE_TOP = 0.3
 """A sensor this much above an object sees its top [m]."""
 
@@ -67,6 +69,11 @@ class _Choice(NamedTuple):
     shape: Rectangle
     spans: tuple[_Span, _Span]
 
+    @property
+    def total(self) -> float:
+        """Minus twice the log of its likelihood, up to a constant."""
+        return self.cost + self.astray
+
 
 def fit_box(
     points: Array,
@@ -76,13 +83,18 @@ def fit_box(
     pattern: Pattern,
     classes: Sequence[str],
     hidden: tuple[bool, bool] = (False, False),
+    cut: tuple[bool, bool] = (False, False),
     heading: float | None = None,
+    heading_cost: Callable[[float], float] | None = None,
 ) -> Fit:
     """The box of the likeliest of `classes` around points (N, 3) of a level frame, the sensor above its origin.
 
     ground   height of the ground below the object [m]; the box stands on it
     hidden   whether something nearer ends the object's points at its left and its right end, as the sensor sees it
+    cut      whether the sensor's field of view ends them there
     heading  of its length, where one is to be expected; taken if the points are too few to show one [rad]
+    heading_cost  squared deviations of a heading of the length from what else is known of it; None is the deviation
+             from `heading`
 
     Extents that the points show are believed as far as the gaps between the rays allow; sides that face away or are
     hidden are completed to the usual size of the class, towards the end that is not seen. The axis of the length
@@ -98,42 +110,76 @@ def fit_box(
         shapes, axes = [bounds(points[:, :2], heading)], (0,)
     elif shapeless:
         shapes = [bounds(points[:, :2], math.atan2(y, x))]
-    best: _Choice | None = None
+    choices: list[_Choice] = []
     for shape in shapes:
-        spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden)
+        spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden, cut)
         for lengthwise in axes:
-            turned = 0.0 if heading is None else _astray(shape.yaw + lengthwise * math.pi / 2.0 - heading)
+            yaw = shape.yaw + lengthwise * math.pi / 2.0
+            if heading_cost is not None:
+                turned = heading_cost(yaw)
+            else:
+                turned = 0.0 if heading is None else _astray(yaw - heading)
             for name in classes:
                 cost = _cost(prior_of(name), spans, lengthwise, top, highest)
-                if best is None or cost + turned < best.cost + best.astray - 1e-9:
-                    best = _Choice(cost, turned, name, lengthwise, shape, spans)
-    if best is None:
+                choices.append(_Choice(cost, turned, name, lengthwise, shape, spans))
+    if not choices:
         raise ValueError("a box needs a class to fit")
-    _, _, name, lengthwise, shape, spans = best
-    prior = prior_of(name)
-    order = (0, 1) if lengthwise == 0 else (1, 0)
+    best = choices[0]
+    for choice in choices:
+        if choice.total < best.total - 1e-9:
+            best = choice
+    sizes, centre, covariance = _placed(best, shapeless)
+    x, y = centre
+    yaw = best.shape.yaw + best.lengthwise * math.pi / 2.0
+    if math.cos(yaw) * x + math.sin(yaw) * y < 0.0:
+        yaw -= math.pi
+    prior = prior_of(best.name)
+    height = _blend(top, highest - top, prior.mean[2], prior.deviation[2])
+    return Fit(
+        (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
+        best.name,
+        covariance + _doubt(choices, best, centre, shapeless),
+        best.cost + 2.0 * math.log(prior.share),
+        hidden,
+    )
+
+
+def _placed(choice: _Choice, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:
+    """Length and width, the centre and its covariance (2, 2), if this choice is right."""
+    prior = prior_of(choice.name)
+    order = (0, 1) if choice.lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
     for place, axis in enumerate(order):
         sizes[place], middles[axis], variances[axis] = _completed(
-            spans[axis], prior.mean[place], prior.deviation[place]
+            choice.spans[axis], prior.mean[place], prior.deviation[place]
         )
     if shapeless:
         swing = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
         variances = [variance + swing for variance in variances]
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    x, y = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
-    yaw = shape.yaw + lengthwise * math.pi / 2.0
-    if math.cos(yaw) * x + math.sin(yaw) * y < 0.0:
-        yaw -= math.pi
-    height = _blend(top, highest - top, prior.mean[2], prior.deviation[2])
+    cos, sin = math.cos(choice.shape.yaw), math.sin(choice.shape.yaw)
+    centre = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
     turn = np.array([[cos, -sin], [sin, cos]])
-    return Fit(
-        (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
-        name,
-        turn @ np.diag(variances) @ turn.T,
-        best.cost + 2.0 * math.log(prior.share),
-        hidden,
-    )
+    return sizes, centre, turn @ np.diag(variances) @ turn.T
+
+
+def _doubt(choices: Sequence[_Choice], best: _Choice, centre: tuple[float, float], shapeless: bool) -> Array:
+    """(2, 2) how far the centre would be elsewhere by the other ways to see an object of this class in the points, each
+    as likely as its cost says [m²].
+
+    Spread of the means of a Gaussian mixture (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.16).
+    """
+    spread, total = np.zeros((2, 2)), 0.0
+    for choice in choices:
+        excess = choice.total - best.total
+        if choice.name != best.name or excess > NEGLIGIBLE:
+            continue
+        weight = math.exp(-0.5 * excess)
+        total += weight
+        if choice is not best:
+            there = _placed(choice, shapeless)[1]
+            off = np.array([there[0] - centre[0], there[1] - centre[1]])
+            spread += weight * np.outer(off, off)
+    return spread / total
 
 
 def _astray(angle: float) -> float:
@@ -143,7 +189,13 @@ def _astray(angle: float) -> float:
 
 
 def _spans(
-    points: Array, shape: Rectangle, above: float, top: float, pattern: Pattern, hidden: tuple[bool, bool]
+    points: Array,
+    shape: Rectangle,
+    above: float,
+    top: float,
+    pattern: Pattern,
+    hidden: tuple[bool, bool],
+    cut: tuple[bool, bool],
 ) -> tuple[_Span, _Span]:
     """Both axes; `above` is how high the sensor stands over the ground."""
     axes = ((math.cos(shape.yaw), math.sin(shape.yaw)), (-math.sin(shape.yaw), math.cos(shape.yaw)))
@@ -163,6 +215,10 @@ def _spans(
             spacing = min(spacing, outwards * rings + math.sqrt(1.0 - min(outwards**2, 1.0)) * columns)
         open_low, open_high = not low > 0.0, not high < 0.0
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
+        if any(cut):
+            # A side that faces the sensor ends the object: only the other end may lie beyond the field of view.
+            at_low, at_high = _ends_of(points[:, :2], (ax, ay), low, high, cut)
+            ends = ends[0] or (at_low and open_low), ends[1] or (at_high and open_high)
         if any(ends):
             open_low, open_high = ends
         gap = spacing * (2.0 if open_low and open_high else 1.0)
@@ -177,12 +233,20 @@ def _hidden_ends(
     if not any(hidden):
         return False, False
     x, y = plan.mean(axis=0).tolist()
-    bearing = np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1])
-    at_low = at_high = False
     across = abs(axis[0] * y - axis[1] * x) / max(math.hypot(x, y), 1e-9)
     if across < 0.5:
         return False, False  # the axis leads away from the sensor: its far end is hidden by the object itself
-    for is_hidden, row in zip(hidden, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):
+    return _ends_of(plan, axis, low, high, hidden)
+
+
+def _ends_of(
+    plan: Array, axis: tuple[float, float], low: float, high: float, flags: tuple[bool, bool]
+) -> tuple[bool, bool]:
+    """Whether the low and the high end along an axis is the left or right end that `flags` (left, right) name."""
+    x, y = plan.mean(axis=0).tolist()
+    bearing = np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1])
+    at_low = at_high = False
+    for is_hidden, row in zip(flags, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):
         if is_hidden:
             place = axis[0] * float(plan[row, 0]) + axis[1] * float(plan[row, 1])
             if place - low < high - place:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,14 @@ EDGE_DEVIATION = 1.5
 EDGE_SHARE = 0.02
 SHAPE_DEVIATION = 0.08
 """How far bodies of one size differ in where their edges are: bumpers, mirrors, roofs [m]."""
+CUT_DEVIATION = 0.35
+"""Of the lower edge of an object that the picture's left or right border cuts: its wheels may be beyond it, and what is
+seen lowest is a bumper or a sill, up to 0.7 m above the ground [m]."""
 AT_BORDER = 2.0
 """An edge this near to the picture's border is where the picture ends, not the object [px]."""
+HIDDEN_SHARE = 0.8
+"""An edge of which more lies in a nearer box is where that object begins, not where this one ends; else what is left
+of the edge shows where that is."""
 ROUNDS = 10
 FARTHEST = 300.0
 LEVEL = 0.1
@@ -53,10 +60,31 @@ _HULLS = {"car": _CAR, "van": _TALL, "truck": _TALL, "bus": _TALL}
 the roof, not at the corners of the box around the body: bumpers end well above the ground and roofs before the ends."""
 
 
+class ByGround(NamedTuple):
+    """What boxes of a picture are in the world.
+
+    boxes       (N, 7) in the world frame [m, rad]
+    covariance  (N, 2, 2) of their centres [m²]
+    headings    (N, HEADINGS) of the length, that were tried over half a turn [rad]
+    costs       (N, HEADINGS) squared errors of the best fit with each, in standard deviations
+    """
+
+    boxes: Array
+    covariance: Array
+    headings: Array
+    costs: Array
+
+    @property
+    def misfit(self) -> Array:
+        """(N,) squared error of the best fit: how little an object of this class can look like the box."""
+        found: Array = self.costs.min(axis=1, initial=np.inf) if len(self.costs) else np.empty(0)
+        return found
+
+
 def lift_by_ground(
     boxes: Array, classes: Sequence[str], camera: CameraReading, *, ground: float, surroundings: Surroundings
-) -> tuple[Array, Array]:
-    """(N, 7) boxes in the world that fill boxes (N, 4) of a picture [px], and (N, 2, 2) covariances of their centres.
+) -> ByGround:
+    """The boxes in the world that fill boxes (N, 4) of a picture [px].
 
     Each stands on the ground, has the usual size of its class, and is moved until the outline of its projection has
     the edges of the given box: least squares over the place (Levenberg and Marquardt) for some headings, of which the
@@ -65,16 +93,16 @@ def lift_by_ground(
     from the camera. Roads' heights come from the map, else they are `ground` [m].
     """
     if not len(boxes):
-        return np.empty((0, 7)), np.empty((0, 2, 2))
+        return ByGround(np.empty((0, 7)), np.empty((0, 2, 2)), np.empty((0, HEADINGS)), np.empty((0, HEADINGS)))
     view = _View(np.asarray(boxes, dtype=float), classes, camera)
     heights = surroundings.ground(view.far_as_tall(), ground)
     for _ in range(LOOKS):
-        found, covariance = view.place(heights, surroundings)
-        there = surroundings.ground(found[:, :2], ground)
+        found = view.place(heights, surroundings)
+        there = surroundings.ground(found.boxes[:, :2], ground)
         if np.all(np.abs(there - heights) <= LEVEL):
             break
         heights = there
-    return found, covariance
+    return found
 
 
 class _View:
@@ -103,8 +131,11 @@ class _View:
             axis=1,
         )
 
-    def place(self, ground: Array, surroundings: Surroundings) -> tuple[Array, Array]:
-        """Boxes in the world and covariances, for heights (N,) of the ground."""
+        self._known &= ~_behind_others(boxes)
+        self._lowest = np.where(self._known[:, 0] & self._known[:, 2], 0.0, CUT_DEVIATION)
+
+    def place(self, ground: Array, surroundings: Surroundings) -> ByGround:
+        """What the boxes are, for heights (N,) of the ground."""
         count = len(self._sizes)
         start = self._first_guess(ground)
         lane = surroundings.lane_heading(self._frame.to_world(start)) - self._frame.yaw
@@ -126,7 +157,12 @@ class _View:
         heading = np.where(np.cos(heading - along) < -1e-9, heading + np.pi, heading)
         boxes = np.column_stack([place, ground + self._sizes[:, 2] / 2.0, self._sizes, wrap_angle(heading)])
         covariance = self._covariance(information, heading) + doubt
-        return self._frame.boxes_to_world(boxes), self._frame.covariance_to_world(covariance)
+        return ByGround(
+            self._frame.boxes_to_world(boxes),
+            self._frame.covariance_to_world(covariance),
+            headings + self._frame.yaw,
+            costs,
+        )
 
     def far_as_tall(self) -> Array:
         """(N, 2) where the objects are in the world if they are as tall as usual, whatever the ground."""
@@ -204,7 +240,8 @@ class _View:
         upwards = self._deviations[:, 2, None] / depth
         blur = np.hypot(self._blur[:, None], SHAPE_DEVIATION / depth)
         sides = 1.0 / np.hypot(blur, across)
-        return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / blur], axis=-1)
+        lowest = np.hypot(blur, self._lowest[:, None] / depth)
+        return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / lowest], axis=-1)
 
     def _covariance(self, information: Array, heading: Array) -> Array:
         """(N, 2, 2) of the centres: of the fit, and of half the length and width that are not seen."""
@@ -215,6 +252,26 @@ class _View:
         axes = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         sizes = (self._deviations[:, :2] / 2.0) ** 2
         return np.asarray(fit + np.einsum("nij,nj,nkj->nik", axes, sizes, axes))
+
+
+def _behind_others(boxes: Array) -> NDArray[np.bool_]:
+    """(N, 4) which edges of boxes (N, 4) lie where another box hides the object: one that reaches lower in the picture,
+    so is nearer, and that the edge lies in along most of its length."""
+    low, high = boxes[:, :2], boxes[:, 2:]
+    size = np.maximum(high - low, 1e-6)
+    nearer = high[None, :, 1] > high[:, None, 1] + EDGE_DEVIATION
+    shared = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
+    beside = shared > HIDDEN_SHARE * size[:, None]
+    margin = EDGE_DEVIATION + EDGE_SHARE * size
+    hidden = np.zeros((len(boxes), 4), dtype=bool)
+    for edge in range(4):
+        axis = edge % 2
+        place = boxes[:, edge][:, None]
+        within = (place > low[None, :, axis] - margin[:, None, axis]) & (
+            place < high[None, :, axis] + margin[:, None, axis]
+        )
+        hidden[:, edge] = (nearer & within & beside[:, :, 1 - axis]).any(axis=1)
+    return hidden
 
 
 def _diagonal(matrices: Array) -> Array:

@@ -67,6 +67,12 @@ class LevelFrame:
         moved[:, 6] = np.pi - (np.pi - boxes[:, 6] - self.yaw) % (2.0 * np.pi)
         return moved
 
+    def covariance_to_local(self, covariance: Array) -> Array:
+        """(N, 2, 2) covariances in the plane, turned to this frame's axes."""
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        turn = np.array([[cos, sin], [-sin, cos]])
+        return np.asarray(turn @ covariance @ turn.T)
+
     def covariance_to_world(self, covariance: Array) -> Array:
         """(N, 2, 2) covariances in the plane, turned to the world's axes."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
@@ -75,11 +81,15 @@ class LevelFrame:
 
 
 class Pattern(NamedTuple):
-    """Angles between neighbouring rays, across and up, and that of the highest ring above the horizon [rad]."""
+    """Angles between neighbouring rays, across and up, and that of the highest ring above the horizon [rad].
+
+    half_field  half the horizontal field of view, about the sensor's heading [rad]; pi if it looks all around
+    """
 
     azimuth: float
     elevation: float
     highest: float
+    half_field: float = math.pi
 
 
 def pattern_from_settings(settings: LidarSettings) -> Pattern:
@@ -87,7 +97,12 @@ def pattern_from_settings(settings: LidarSettings) -> Pattern:
     columns = max(1, round(settings.points_per_second / settings.channels / settings.rotation))
     rings = settings.elevations or (settings.upper_fov, settings.lower_fov)
     spread = math.radians(max(rings) - min(rings)) / max(settings.channels - 1, 1)
-    return Pattern(2.0 * math.pi / columns, spread or USUAL_STEP, math.radians(max(rings)))
+    return Pattern(
+        2.0 * math.pi / columns,
+        spread or USUAL_STEP,
+        math.radians(max(rings)),
+        math.radians(settings.field_of_view) / 2.0,
+    )
 
 
 def pattern_from_points(points: Array) -> Pattern:

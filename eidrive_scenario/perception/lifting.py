@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_corners, overlap
 from eidrive_scenario.perception.box_fit import Fit
 from eidrive_scenario.perception.clustering import clusters
-from eidrive_scenario.perception.ground_lifting import AT_BORDER, lift_by_ground
+from eidrive_scenario.perception.ground_lifting import AT_BORDER, ByGround, lift_by_ground
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_points
 from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.perception.scan import Scan
@@ -39,8 +40,12 @@ GATE = 3.0
 """Clusters at a distance that differs by more deviations are not the object."""
 DOUBTFUL = 9.0
 """Sum of squared deviations from the sizes of its class up to which points suit it."""
+BODY_DEVIATION = 0.15
+"""Of the centre of a body from that of the rectangle around the points on it: bumpers, mirrors and wheel arches [m]."""
 UNLIKELY = 60.0
 """Sum of squared deviations from the sizes of its class beyond which points are not believed to be the object."""
+UNLIKELY_HEADING = 9.0
+"""Cost of a heading that the picture and the map rule out, as squared standard deviations."""
 MAY_BE: Mapping[str, tuple[str, ...]] = {
     "car": ("car", "van"),
     "truck": ("truck", "van", "bus"),
@@ -78,10 +83,11 @@ def lift(
     """
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
     surroundings = surroundings or Surroundings(None)
-    lifted, covariance = lift_by_ground(boxes, classes, camera, ground=ground, surroundings=surroundings)
+    by_ground = lift_by_ground(boxes, classes, camera, ground=ground, surroundings=surroundings)
+    lifted, covariance = by_ground.boxes, by_ground.covariance
     if lidar is not None and len(boxes):
         scan = Scan(lidar, pattern or pattern_from_points(lidar.points), ground)
-        for row, fit in enumerate(_by_points(boxes, classes, camera, scan, lifted, covariance)):
+        for row, fit in enumerate(_by_points(boxes, classes, camera, scan, by_ground)):
             if fit is not None:
                 lifted[row] = scan.frame.boxes_to_world(np.array([fit.box]))[0]
                 covariance[row] = scan.frame.covariance_to_world(fit.covariance[None])[0]
@@ -97,7 +103,7 @@ def lift(
 
 
 def _by_points(
-    boxes: Array, classes: Sequence[str], camera: CameraReading, scan: Scan, by_ground: Array, covariance: Array
+    boxes: Array, classes: Sequence[str], camera: CameraReading, scan: Scan, by_ground: ByGround
 ) -> list[Fit | None]:
     """What the points in each box say of its object."""
     places, _ = pixels(scan.world, camera)
@@ -107,7 +113,8 @@ def _by_points(
     places[behind, 1] = camera.rgb.shape[0] / 2.0
     away = np.hypot(*(scan.world[:, :2] - camera.pose[:2, 3]).T)
     found: list[Fit | None] = []
-    for box, name, guess, spread in zip(boxes, classes, by_ground, covariance, strict=True):
+    for row, (box, name) in enumerate(zip(boxes, classes, strict=True)):
+        guess, spread = by_ground.boxes[row], by_ground.covariance[row]
         place = guess[:2] - camera.pose[:2, 3]
         expected = max(float(np.linalg.norm(place)), 0.5)
         deviation = math.sqrt(float(place @ spread @ place)) / expected**2
@@ -118,9 +125,45 @@ def _by_points(
             min(math.hypot(deviation, LEAST_DEVIATION), LARGEST_DEVIATION),
             max(prior_of(name).mean[:2]) / 4.0,
             float(guess[6]) - scan.frame.yaw,
+            float(by_ground.headings[row, 0]) - scan.frame.yaw,
+            (by_ground.costs[row] - by_ground.costs[row].min()).tolist(),
+            scan.frame.to_local(guess[:2]),
+            scan.frame.covariance_to_local(spread),
+            bool(box[0] <= AT_BORDER or box[2] >= camera.rgb.shape[1] - AT_BORDER),
         )
-        found.append(_foreground(scan, camera, target, places, away))
+        fit = _foreground(scan, camera, target, places, away)
+        found.append(None if fit is None else replace(fit, covariance=_honest(fit, scan, target, camera)))
     return found
+
+
+def _honest(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Array:
+    """(2, 2) covariance of a fit with what it leaves unexplained [m²]: bodies are no boxes, and camera and points
+    disagree.
+
+    Where sizes are unusual, it grows by the Birge ratio, the squared deviations over their number. Where the points
+    are not at the place that the picture leads to expect, they may be those of something else: two hypotheses, equally
+    likely at worst, spread by a quarter of the squared distance between them.
+    """
+    box = target.box
+    spread = fit.covariance * max(1.0, fit.deviation / 3.0) + BODY_DEVIATION**2 * np.eye(2)
+    off = np.array(fit.box[:2]) - target.centre
+    spread += 0.25 * (1.0 - target.agreement(fit)) * np.outer(off, off)
+    outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
+    if np.isnan(outline).any():
+        return spread
+    width = camera.rgb.shape[1]
+    offsets = []
+    if box[0] > AT_BORDER:
+        offsets.append(float(outline[:, 0].min()) - box[0])
+    if box[2] < width - AT_BORDER:
+        offsets.append(float(outline[:, 0].max()) - box[2])
+    if not offsets:
+        return spread
+    x, y = fit.box[:2]
+    away = math.hypot(x, y)
+    aside = away / float(camera.intrinsics[0, 0]) * sum(offsets) / len(offsets)
+    across = np.array([-y, x]) / max(away, 1e-9)
+    return np.asarray(spread + aside**2 * np.outer(across, across))
 
 
 class _Target(NamedTuple):
@@ -130,6 +173,9 @@ class _Target(NamedTuple):
     distance from the camera at which it should be [m], and the deviation of the logarithm of that
     depth    from the points that are seen of it to its middle, about [m]
     heading  in the level frame, where the points are too few to show one [rad]
+    first    of the headings that were tried, evenly over half a turn [rad];  costs  of each, the least is 0
+    centre   where its middle should be (2,) [m];  covariance  of that (2, 2) [m²]; both in the level frame
+    cut      whether the picture's border cuts its left or right side off
     """
 
     box: list[float]
@@ -138,17 +184,42 @@ class _Target(NamedTuple):
     deviation: float
     depth: float
     heading: float
+    first: float
+    costs: list[float]
+    centre: Array
+    covariance: Array
+    cut: bool
+
+    def agreement(self, fit: Fit) -> float:
+        """How well a box agrees with where the object should be, 1 at best: Cauchy's density of the squared distance
+        in units of both covariances, as either may be of something else."""
+        off = np.array(fit.box[:2]) - self.centre
+        return 1.0 / (1.0 + 0.5 * float(off @ np.linalg.solve(self.covariance + fit.covariance, off)))
+
+    def heading_cost(self, heading: float) -> float:
+        """What the picture and the map say against a heading, between those that were tried; UNLIKELY_HEADING at most:
+        shapes differ, and vehicles turn."""
+        count = len(self.costs)
+        place = (heading - self.first) % math.pi / math.pi * count
+        row, part = int(place), place - int(place)
+        cost = (1.0 - part) * self.costs[row % count] + part * self.costs[(row + 1) % count]
+        return min(cost, UNLIKELY_HEADING)
 
     def likelihood(self, distance: float) -> float:
-        """How well something at this distance [m] agrees with what is expected, 1 at best; 0 beyond the gate."""
+        """How well something at this distance [m] agrees with what is expected, 1 at best; 0 beyond the gate, but where
+        so little of the object is in the picture that nothing certain can be expected."""
         off = math.log(max(distance + self.depth, 0.5) / self.distance) / self.deviation
-        return math.exp(-0.5 * off * off) if abs(off) <= GATE else 0.0
+        if abs(off) <= GATE:
+            return math.exp(-0.5 * off * off)
+        return math.exp(-0.5 * GATE * GATE) if self.cut else 0.0
 
 
 class _Candidate(NamedTuple):
-    """Points that may be the object, as rows of the scan, and how many of them at the right distance are in its box."""
+    """Points that may be the object, as rows of the scan; how many of them are in its box, and that times the
+    likelihood of their distance."""
 
     rows: Integers
+    inside: int
     weight: float
 
 
@@ -168,11 +239,13 @@ def _foreground(scan: Scan, camera: CameraReading, target: _Target, places: Arra
         ]
         candidates = _candidates([group for group in groups if group.tobytes() not in tried], inside, away, target)
         for candidate in candidates[:MOST_TRIED]:
-            fit = scan.fit(candidate.rows, target.classes, target.heading)
+            fit = scan.fit(candidate.rows, target.classes, target.heading, target.heading_cost)
             if fit is None:
                 continue
             fit = _with_pieces(scan, candidate, fit, candidates, target)
-            score = candidate.weight * _filled(fit, scan, target.box, camera) / (1.0 + fit.deviation / DOUBTFUL)
+            filled = _filled(fit, scan, target.box, camera)
+            count = candidate.inside if target.cut else candidate.weight
+            score = count * target.agreement(fit) * filled / (1.0 + fit.deviation / DOUBTFUL)
             if fit.deviation <= UNLIKELY and score > 0.0 and (best is None or score > best[0]):
                 best = score, fit
         if best is not None and best[1].deviation <= DOUBTFUL:
@@ -191,20 +264,24 @@ def _candidates(
         if count >= LEAST_POINTS:
             weight = count * target.likelihood(float(np.median(away[group])))
             if weight > 0.0:
-                found.append(_Candidate(group, weight))
+                found.append(_Candidate(group, count, weight))
     return sorted(found, key=lambda candidate: -candidate.weight)
 
 
 def _with_pieces(scan: Scan, candidate: _Candidate, fit: Fit, others: Sequence[_Candidate], target: _Target) -> Fit:
-    """The fit with those other clusters that lie in its box, where one box suits them all as well."""
+    """The fit with those other clusters that lie in its box, where one box suits them all as well; and where the points
+    alone are no such object, with those that make one of them."""
     for other in others:
         if not np.intersect1d(other.rows, candidate.rows).size:
-            piece = scan.fit(other.rows, target.classes, target.heading)
-            if piece is not None and overlap(fit.box, piece.box):
+            piece = scan.fit(other.rows, target.classes, target.heading, target.heading_cost)
+            near = piece is not None and overlap(fit.box, piece.box)
+            if near or fit.deviation > DOUBTFUL:
                 rows = np.concatenate([candidate.rows, other.rows])
-                whole = scan.fit(rows, target.classes, target.heading)
-                if whole is not None and whole.deviation <= max(fit.deviation, DOUBTFUL):
-                    candidate, fit = _Candidate(rows, candidate.weight), whole
+                whole = scan.fit(rows, target.classes, target.heading, target.heading_cost)
+                limit = max(fit.deviation, DOUBTFUL) if near else DOUBTFUL
+                if whole is not None and whole.deviation <= limit:
+                    candidate = _Candidate(rows, candidate.inside + other.inside, candidate.weight)
+                    fit = whole
     return fit
 
 

@@ -58,8 +58,14 @@ class Scan:
         """(N, 3) the points in the world."""
         return np.concatenate([self.frame.to_world(self.points[:, :2]), self.points[:, 2:3]], axis=1)
 
-    def fit(self, rows: Integers, classes: Sequence[str], heading: float | None = None) -> Fit | None:
-        """The box around these points, None where no road user is so large; `heading` as in `fit_box`."""
+    def fit(
+        self,
+        rows: Integers,
+        classes: Sequence[str],
+        heading: float | None = None,
+        heading_cost: Callable[[float], float] | None = None,
+    ) -> Fit | None:
+        """The box around these points, None where no road user is so large; headings as in `fit_box`."""
         points = self.points[rows]
         if math.hypot(*np.ptp(points[:, :2], axis=0).tolist()) > math.hypot(LARGEST[0], LARGEST[1]):
             return None
@@ -70,8 +76,18 @@ class Scan:
             pattern=self.pattern,
             classes=classes,
             hidden=self._hidden(rows),
+            cut=self._cut(rows),
             heading=heading,
+            heading_cost=heading_cost,
         )
+
+    def _cut(self, rows: Integers) -> tuple[bool, bool]:
+        """Whether the left and the right end of these points lie at the border of the field of view."""
+        border = self.pattern.half_field - BESIDE * self.pattern.azimuth
+        if self.pattern.half_field >= math.pi:
+            return False, False
+        bearing = self._bearing[rows]
+        return bool(bearing.max() > border), bool(bearing.min() < -border)
 
     def _hidden(self, rows: Integers) -> tuple[bool, bool]:
         """Whether something nearer stands right beside the left and the right end of these points."""

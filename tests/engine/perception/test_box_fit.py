@@ -107,6 +107,39 @@ def test_what_is_hidden_is_completed_behind_what_hides_it() -> None:
     assert none.box[1] == pytest.approx(0.0, abs=0.05)
 
 
+def test_body_cut_by_field_of_view_is_completed_beyond_it() -> None:
+    """The near end of a truck's flank, 3 m of 8.2 m, parallel to the sensor's heading on the left: the rest is behind.
+
+    The end that faces the sensor is where it is; only the other one goes on beyond the field of view.
+    """
+    rear = np.column_stack([np.full(14, 6.0), np.linspace(3.0, 5.6, 14)])
+    flank = np.column_stack([np.linspace(6.0, 9.0, 16), np.full(16, 3.0)])
+    # Seen from the origin the flank leads away to the right of the rear; the field of view ends at its right end.
+    points = standing(np.concatenate([rear, flank]), 3.4)
+    whole = fitted(points, classes=("truck",), sensor_height=1.9)
+    cut = fitted(points, classes=("truck",), cut=(False, True), sensor_height=1.9)
+    assert cut.box[3] == pytest.approx(8.2, abs=0.1)
+    assert cut.box[0] == pytest.approx(6.0 + 4.1, abs=0.1)
+    assert cut.box[4] == pytest.approx(2.6, abs=0.1)
+    assert cut.box[0] > whole.box[0] + 1.5
+    assert cut.covariance[0, 0] > (1.2 / 2.0) ** 2 * 0.9
+    other = fitted(points * (1, -1, 1), classes=("truck",), cut=(True, False), sensor_height=1.9)
+    np.testing.assert_allclose(np.array(other.box[:2]) * (1, -1), cut.box[:2], atol=1e-9)
+
+
+def test_headings_as_likely_as_each_other_widen_the_covariance() -> None:
+    """A rear of 2.5 m alone may be a truck seen from behind, or the cut end of its flank: centers 2.8 m apart."""
+    rear = np.column_stack([np.full(19, 15.0), np.linspace(-1.25, 1.25, 19)])
+    known = fitted(
+        standing(rear, 3.4),
+        classes=("truck",),
+        hidden=(True, False),
+        heading_cost=lambda yaw: 40.0 * math.sin(yaw) ** 2,
+    )
+    open_ = fitted(standing(rear, 3.4), classes=("truck",), hidden=(True, False), heading_cost=lambda yaw: 0.0)
+    assert np.trace(open_.covariance) > np.trace(known.covariance) + 1.0
+
+
 def test_few_points_take_the_heading_that_is_known() -> None:
     """Three points above each other 40 m away, on a lane that leads north-east."""
     column = np.array([[40.0, 0.0, z] for z in (0.4, 0.8, 1.2)])
