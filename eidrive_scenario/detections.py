@@ -12,6 +12,10 @@ from eidrive_scenario.records import made_often
 
 Array = NDArray[np.float64]
 
+NOT_ESTIMATED: Array = np.empty(0)
+"""Existence of objects that no tracker and no fusion has judged."""
+NOT_ESTIMATED.flags.writeable = False
+
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
 
 
@@ -26,6 +30,7 @@ class Detections:
     velocity    (N, 2) world frame [m/s], NaN where unknown
     covariance  (N, 2, 2) of the position x y [m²], NaN where unknown
     tracks      numbers of the tracks (N,), the same for one object over time; empty where nobody tracks
+    existence   (N,) probability that there is such an object, in [0, 1]; empty (0,) if it is not estimated
     """
 
     time: float
@@ -35,6 +40,7 @@ class Detections:
     velocity: Array = field(default_factory=lambda: np.empty((0, 2)))
     covariance: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
     tracks: tuple[int, ...] = ()
+    existence: Array = field(default_factory=lambda: NOT_ESTIMATED)
 
     def __post_init__(self) -> None:
         count = len(self.boxes)
@@ -50,6 +56,13 @@ class Detections:
             raise ValueError(f"{len(self.classes)} classes for {count} boxes")
         if self.tracks and len(self.tracks) != count:
             raise ValueError(f"{len(self.tracks)} tracks for {count} boxes")
+        if self.existence is not NOT_ESTIMATED and self.existence.shape not in ((count,), (0,)):
+            raise ValueError(f"existence has shape {self.existence.shape}, expected {(count,)} or (0,)")
+
+    @property
+    def confidence(self) -> Array:
+        """(N,) probability of existence if it is estimated, else the scores."""
+        return self.existence if len(self.existence) else self.scores
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -65,4 +78,5 @@ class Detections:
             self.velocity.take(picked, axis=0),
             self.covariance.take(picked, axis=0),
             tuple([self.tracks[row] for row in rows]) if self.tracks else (),
+            self.existence.take(picked) if len(self.existence) else NOT_ESTIMATED,
         )

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.learned.image_network import ImageDetections
 from eidrive_scenario.roads import RoadNetwork
@@ -15,6 +18,8 @@ from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,13 @@ class Detector(ABC):
     @abstractmethod
     def detect(self, readings: Readings) -> Detections:
         """The objects in these readings."""
+
+    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+        """(N,) share in [0, 1] of each of these boxes (N, 7) that these readings can show, where `found` may hide it.
+
+        A tracker does not expect to detect objects that are out of view. All are in view by default.
+        """
+        return np.ones(len(boxes))
 
     def signals(self) -> Sequence[SignalReading]:
         """The signals of the map that it found in the last readings, of the kinds that it `sees_signals` of."""

@@ -23,6 +23,7 @@ from eidrive_scenario.perception.lidar_geometry import (
 from eidrive_scenario.perception.lidar_objects import UNLIKELY, Found, objects
 from eidrive_scenario.perception.scan import Scan
 from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.perception.visibility import in_lidar
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.settings import Settings
@@ -63,6 +64,8 @@ class LidarDetector(Detector):
         self._surroundings = Surroundings(None)
         self._patterns: dict[str, Pattern] = {}
         self._turns: dict[str, _Turn] = {}
+        self._reach: dict[str, tuple[float, float]] = {}
+        """Half the field of view [rad] and the range [m] of each sensor."""
 
     def install(self, installation: Installation) -> None:
         """Learn the map and the patterns of the sensors."""
@@ -71,6 +74,7 @@ class LidarDetector(Detector):
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
                 self._turns[name] = _Turn(1.0 / sensor.rotation)
+                self._reach[name] = math.radians(sensor.field_of_view) / 2.0, sensor.range
 
     def detect(self, readings: Readings) -> Detections:
         """The road users in the sweeps of all LiDARs of the station."""
@@ -96,6 +100,14 @@ class LidarDetector(Detector):
             np.concatenate([frame.covariance_to_world(one.fit.covariance[None]) for one, frame in found]),
         )
         return detections if len(readings.lidars) < 2 else _without_doubles(detections)
+
+    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+        """(N,) the largest share of each box (N, 7) that one of the LiDARs can show."""
+        shares = [
+            in_lidar(boxes, reading, *self._reach.get(name, (math.pi, math.inf)), found.boxes)
+            for name, reading in readings.lidars.items()
+        ]
+        return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
 
 class _Turn:

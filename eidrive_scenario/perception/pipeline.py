@@ -43,7 +43,7 @@ class Perception:
         self._tracker = tracker
         self._localizer = localizer
         self._latency = latency
-        self._computing: deque[tuple[float, Detections]] = deque()
+        self._computing: deque[tuple[float, Detections, Readings]] = deque()
 
     @property
     def pose_covariance(self) -> Array | None:
@@ -65,21 +65,31 @@ class Perception:
         return (*found, *readings.signals)
 
     def perceive(self, readings: Readings) -> Detections | None:
-        """The newest objects that become known now; None if there is nothing new."""
+        """The newest objects that become known now; None if there is nothing new.
+
+        A tracker predicts them to the time of each tick, so that stations do not report where objects were when the
+        sensors were last read; less the latency, which is that of all that becomes known.
+        """
         now = readings.time
         if _has_all(readings, self.detector.needs):
             found = self.detector.detect(readings)
             if self._checked:
                 check_detections(self.detector, "detect", found)
             if self._latency <= 0.0 and not self._computing:
-                return found if self._tracker is None else self._tracker.update(found)
-            self._computing.append((now + self._latency, found))
+                return self._tracked(found, readings)
+            self._computing.append((now + self._latency, found, readings))
         newest = None
         while self._computing and self._computing[0][0] <= now + TIME_TOLERANCE:
-            newest = self._computing.popleft()[1]
-            if self._tracker is not None:
-                newest = self._tracker.update(newest)
+            _, found, seen = self._computing.popleft()
+            newest = self._tracked(found, seen)
+        if newest is None and self._tracker is not None:
+            newest = self._tracker.predicted(now - self._latency)
         return newest
+
+    def _tracked(self, found: Detections, readings: Readings) -> Detections:
+        if self._tracker is None:
+            return found
+        return self._tracker.update(found, lambda boxes: self.detector.in_view(boxes, readings, found))
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +13,16 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.perception.existence import (
+    BIRTH_DENSITY,
+    DETECTION_PROBABILITY,
+    LIFETIME,
+    MOST,
+    detected,
+    likelihood_ratio,
+    missed,
+    survived,
+)
 from eidrive_scenario.perception.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.settings import Settings
 
@@ -36,21 +46,38 @@ class TrackerSettings(Settings):
     """The property `tracker`: a kind, or a mapping with these.
 
     kind      cv: constant velocity; ctrv: constant turn rate and speed; none
-    confirm   [n, m]: an object is reported once it was detected in n of m successive detections
-    coast     how long an object that is no longer detected is reported where it should be [s]
+    confirm   [n, m]: an object is reported once it was detected in n of m successive detections, and
+    confirm_existence   it exists with at least this probability: 0.5 is the likelier of the two hypotheses
+    delete_existence    probability of existence below which a track is deleted
+    coast     maximum time without a detection, after which a track is deleted whatever its existence [s]
     gate      probability that a detection of an object is within its gate
+    detection_probability   that an object in full view is detected in a scan
+    birth_density       of new objects [1/m² per scan]
+    lifetime  mean time that an object remains [s]
+
+    The recursion of the probability of existence and the sources of its defaults are those of
+    `eidrive_scenario.perception.existence`.
     """
 
     kind: Literal["none", "cv", "ctrv"] = "cv"
     confirm: tuple[PositiveInt, PositiveInt] = (2, 3)
+    confirm_existence: float = Field(default=0.5, ge=0.0, lt=1.0)
+    delete_existence: float = Field(default=0.05, ge=0.0, lt=1.0)
     coast: NonNegativeFloat = 0.5
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
+    detection_probability: float = Field(default=DETECTION_PROBABILITY, gt=0.0, lt=1.0)
+    birth_density: float = Field(default=BIRTH_DENSITY, gt=0.0, le=1e6)
+    lifetime: float = Field(default=LIFETIME, gt=0.0, le=1e6)
 
     @model_validator(mode="after")
     def _n_of_m(self) -> TrackerSettings:
         if self.confirm[0] > self.confirm[1]:
             raise ValueError(
                 f"{self.confirm[0]} of {self.confirm[1]} detections can never be; write [n, m] with n <= m"
+            )
+        if self.delete_existence > self.confirm_existence:
+            raise ValueError(
+                f"delete_existence {self.delete_existence:g} is above confirm_existence {self.confirm_existence:g}"
             )
         return self
 
@@ -65,7 +92,9 @@ class Tracker:
 
     Pairs of tracks and boxes are the likeliest together (Hungarian method), each with a squared Mahalanobis distance
     within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor tracking, 1995, section
-    2.3.2). A box that no track explains begins a new one, which is reported once it has been seen often enough.
+    2.3.2). A box that no track explains begins a new one, which is reported once it has been seen often enough. Each
+    track has a probability of existence, see `eidrive_scenario.perception.existence`. The score that is reported of an
+    object is that of its last detection times this probability.
     """
 
     def __init__(self, settings: TrackerSettings) -> None:
@@ -78,13 +107,17 @@ class Tracker:
         self._tracks = Estimates(np.empty((0, self._model.size)), np.empty((0, self._model.size, self._model.size)))
         self._shape = np.empty((0, 5))
         """(N, 5) z, length, width, height, yaw."""
+        self._existence = np.empty(0)
         self._life: list[_Life] = []
         self._confirmed = 0
 
-    def update(self, detections: Detections) -> Detections:
+    def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
         """The confirmed objects at the time of these detections, with velocities, covariances and track numbers.
 
-        Raises ValueError if they are older than those of the last call.
+        in_view  gives the share (N,) of boxes (N, 7) that the sensors could see, in [0, 1]; None: all of them. An
+                 object out of view is not expected to be detected.
+
+        Raises ValueError if the detections are older than those of the last call.
         """
         step = 0.0 if self._time is None else detections.time - self._time
         if step < 0.0:
@@ -92,9 +125,11 @@ class Tracker:
         self._time = detections.time
         if step > 0.0 and self._life:
             self._tracks = self._model.predict(self._tracks, step)
+            self._existence = survived(self._existence, step, self.settings.lifetime)
         noise = _noise(detections.covariance)
         rows, columns = self._associate(detections.boxes, noise)
         hit = set(rows)
+        self._judge(rows, detections, columns, noise, in_view)
         if rows:
             self._correct(rows, detections, columns, noise)
         for row, life in enumerate(self._life):
@@ -118,7 +153,7 @@ class Tracker:
         distance = (d * x * x - 2.0 * b * x * y + a * y * y) / size
         # Minus twice the log of the likelihood, so that a track of which little is known does not win by its width.
         cost = np.where(distance <= self._gate, distance + np.log(size), OUTSIDE)
-        confirmed = np.array([life.confirmed for life in self._life], dtype=bool)
+        confirmed = np.array([life.number is not None for life in self._life], dtype=bool)
         rows: list[int] = []
         columns: list[int] = []
         for group in (np.flatnonzero(confirmed), np.flatnonzero(~confirmed)):
@@ -127,6 +162,40 @@ class Tracker:
                 rows.append(int(group[row]))
                 columns.append(int(free[column]))
         return rows, columns
+
+    def _judge(
+        self,
+        rows: list[int],
+        detections: Detections,
+        columns: list[int],
+        noise: Array,
+        in_view: Callable[[Array], Array] | None,
+    ) -> None:
+        """Update the existence of all tracks; those in `rows` are detected."""
+        settings = self.settings
+        if rows:
+            offset = detections.boxes[columns, :2] - self._tracks.state[rows, :2]
+            spread = self._tracks.covariance[rows][:, :2, :2] + noise[columns]
+            determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
+            squared = np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset)
+            ratio = likelihood_ratio(
+                squared,
+                determinant,
+                detections.scores[columns],
+                settings.detection_probability,
+                settings.birth_density,
+            )
+            self._existence[rows] = detected(self._existence[rows], ratio)
+        lost = np.setdiff1d(np.arange(len(self._life)), rows)
+        if len(lost):
+            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, self._tracks.state[lost])), 0.0, 1.0)
+            self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share)
+
+    def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:
+        """(N, 7) boxes of these tracks, which have these states (N, D)."""
+        shape = self._shape[rows]
+        yaw = math.pi - (math.pi - shape[:, 4:]) % (2.0 * math.pi)
+        return np.concatenate([state[:, :2], shape[:, :4], yaw], axis=1)
 
     def _correct(self, rows: list[int], detections: Detections, columns: list[int], noise: Array) -> None:
         boxes = detections.boxes[columns]
@@ -158,6 +227,7 @@ class Tracker:
             np.concatenate([self._tracks.state, new.state]), np.concatenate([self._tracks.covariance, new.covariance])
         )
         self._shape = np.concatenate([self._shape, boxes[:, 2:7]])
+        self._existence = np.concatenate([self._existence, np.clip(detections.scores[columns], 0.0, MOST)])
         for column in columns:
             life = _Life()
             life.note(True, self.settings)
@@ -165,46 +235,73 @@ class Tracker:
             self._life.append(life)
 
     def _bury(self, now: float) -> None:
-        """Forget tracks that cannot be confirmed any more, and those that have coasted for too long."""
-        kept = [row for row, life in enumerate(self._life) if life.goes_on(now, self.settings)]
+        """Delete tracks that cannot be confirmed any more, hardly exist, or have coasted for too long."""
+        existence = self._existence.tolist()
+        kept = [
+            row
+            for row, life in enumerate(self._life)
+            if existence[row] >= self.settings.delete_existence and life.goes_on(now, self.settings)
+        ]
         if len(kept) < len(self._life):
             self._tracks = Estimates(self._tracks.state[kept], self._tracks.covariance[kept])
             self._shape = self._shape[kept]
+            self._existence = self._existence[kept]
             self._life = [self._life[row] for row in kept]
 
+    def predicted(self, time: float) -> Detections | None:
+        """The confirmed objects as they should be at a time [s] after the last detections.
+
+        None if there were none yet, or more than `coast` ago: then nothing is known of that time.
+        """
+        if self._time is None or not 0.0 <= time - self._time <= self.settings.coast + 1e-9:
+            return None
+        step = time - self._time
+        shown = [
+            row for row, life in enumerate(self._life) if life.number is not None and life.goes_on(time, self.settings)
+        ]
+        tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
+        if shown and step > 0.0:
+            tracks = self._model.predict(tracks, step)
+        return self._report(time, shown, tracks, survived(self._existence[shown], step, self.settings.lifetime))
+
     def _reported(self, now: float) -> Detections:
-        shown = [row for row, life in enumerate(self._life) if life.confirmed]
-        lives = [self._life[row] for row in shown]
-        for life in lives:
-            if life.number is None:
+        for life, existence in zip(self._life, self._existence.tolist(), strict=True):
+            if life.number is None and life.often_seen and existence >= self.settings.confirm_existence:
                 self._confirmed += 1
                 life.number = self._confirmed
-        state = self._tracks.state[shown]
-        shape = self._shape[shown]
-        yaw = math.pi - (math.pi - shape[:, 4:]) % (2.0 * math.pi)
+        shown = [row for row, life in enumerate(self._life) if life.number is not None]
+        tracks = Estimates(self._tracks.state[shown], self._tracks.covariance[shown])
+        return self._report(now, shown, tracks, self._existence[shown])
+
+    def _report(self, time: float, rows: list[int], tracks: Estimates, existence: Array) -> Detections:
+        lives = [self._life[row] for row in rows]
         return Detections(
-            now,
-            np.concatenate([state[:, :2], shape[:, :4], yaw], axis=1),
-            np.array([life.score_at(now, self.settings.coast) for life in lives]),
-            tuple(life.name for life in lives),
-            self._model.velocity(state).copy(),
-            self._tracks.covariance[shown][:, :2, :2],
-            tuple(life.number or 0 for life in lives),
+            time,
+            self._boxes(rows, tracks.state),
+            np.array([life.score for life in lives]) * existence,
+            tuple([life.name for life in lives]),
+            self._model.velocity(tracks.state).copy(),
+            tracks.covariance[:, :2, :2],
+            tuple([life.number or 0 for life in lives]),
+            existence,
         )
 
 
 class _Life:
     """When a track was seen, how surely and as what."""
 
-    __slots__ = ("_names", "_recent", "_score", "_seen", "confirmed", "hits", "number")
+    __slots__ = ("_names", "_recent", "_seen", "hits", "number", "often_seen", "score")
 
     def __init__(self) -> None:
-        self.confirmed = False
+        self.often_seen = False
+        """Whether it was detected in n of m successive scans."""
         self.number: int | None = None
+        """Its number once it is confirmed."""
         self.hits = 0
+        self.score = 0.0
+        """Of its last detection."""
         self._recent: list[bool] = []
         self._names: dict[str, float] = {}
-        self._score = 0.0
         self._seen = -math.inf
 
     @property
@@ -215,26 +312,22 @@ class _Life:
     def note(self, hit: bool, settings: TrackerSettings) -> None:
         """Whether the detections just processed show the object."""
         self.hits += hit
-        if not self.confirmed:
+        if not self.often_seen:
             self._recent = [*self._recent, hit][-settings.confirm[1] :]
-            self.confirmed = sum(self._recent) >= settings.confirm[0]
+            self.often_seen = sum(self._recent) >= settings.confirm[0]
 
     def see(self, detections: Detections, column: int) -> None:
         """The object is this detection."""
         self._seen = detections.time
-        self._score = float(detections.scores[column])
+        self.score = float(detections.scores[column])
         name = detections.classes[column]
-        self._names[name] = self._names.get(name, 0.0) + self._score
+        self._names[name] = self._names.get(name, 0.0) + self.score
 
     def goes_on(self, now: float, settings: TrackerSettings) -> bool:
         """Whether the track is worth keeping."""
-        if self.confirmed:
+        if self.often_seen:
             return now - self._seen <= settings.coast + 1e-9
         return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
-
-    def score_at(self, now: float, coast: float) -> float:
-        """The last score, which falls to 0 while the object is not seen."""
-        return self._score * (1.0 - (now - self._seen) / (coast + 1e-9)) if now > self._seen else self._score
 
 
 def _assigned(cost: Array) -> list[tuple[int, int]]:

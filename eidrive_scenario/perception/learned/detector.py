@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from eidrive_scenario.detections import Detections
@@ -27,9 +28,12 @@ from eidrive_scenario.perception.learned.weight_files import (
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.perception.visibility import in_camera
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
+
+Array = NDArray[np.float64]
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
@@ -132,6 +136,11 @@ class LearnedDetector(Detector):
             for camera, found in self.pictures.items()
         ]
         return distinct(parts, readings.time)
+
+    def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
+        """(N,) the largest share of each box (N, 7) that one of the cameras can show."""
+        shares = [in_camera(boxes, reading, found.boxes) for reading in readings.cameras.values()]
+        return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
     def signals(self) -> tuple[SignalReading, ...]:
         """The traffic lights and stop signs of the map that were seen in the last pictures."""

@@ -53,22 +53,78 @@ def test_one_of_one_reports_at_once() -> None:
 
 
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
-def test_an_object_out_of_sight_coasts_and_is_forgotten(kind: str) -> None:
-    """10 m/s eastwards, last seen at 2.0 s: half a second later it is 5 m on, its score has sunk, then it is gone."""
+def test_coasting_track_out_of_view_keeps_existence_until_coast_ends(kind: str) -> None:
+    """10 m/s eastwards, last seen at 2.0 s, then out of view: half a second later it is 5 m on, then it is deleted.
+
+    Its existence falls by survival alone, exp(-t / 10 s), and its score with it.
+    """
     track = tracker(kind, coast=0.5)
     for tick in range(21):
         found = track.update(seen(tick * DT, (tick * 1.0, 0.0)))
-    assert found.scores.tolist() == [0.8]
-    scores, places, spread = [], [], []
+    assert found.scores.tolist() == pytest.approx([0.8], abs=1e-4)
+    places, spread, existence = [], [], []
     for tick in range(21, 26):
-        found = track.update(seen(tick * DT))
-        scores.append(float(found.scores[0]))
+        found = track.update(seen(tick * DT), lambda boxes: np.zeros(len(boxes)))
+        existence.append(float(found.existence[0]))
         places.append(float(found.boxes[0, 0]))
         spread.append(float(found.covariance[0, 0, 0]))
+        assert found.scores[0] == pytest.approx(0.8 * found.existence[0])
     np.testing.assert_allclose(places, [21, 22, 23, 24, 25], atol=0.3)
-    np.testing.assert_allclose(scores, 0.8 * np.array([0.8, 0.6, 0.4, 0.2, 0.0]), atol=1e-6)
+    np.testing.assert_allclose(existence, np.exp(-0.01 * np.arange(1, 6)), atol=1e-4)
     assert spread == sorted(spread)
-    assert len(track.update(seen(2.6))) == 0
+    assert len(track.update(seen(2.6), lambda boxes: np.zeros(len(boxes)))) == 0
+
+
+def test_missed_track_in_view_follows_bernoulli_recursion_until_deleted() -> None:
+    """Survival 0.99 per scan, detection 0.9: r' = 0.1 r / (1 - 0.9 r), by hand from r = 1: 0.908, 0.473, 0.081, 0.0086.
+
+    (0.99 (1 - 0.9)) / (1 - 0.99 * 0.9) = 0.0990 / 0.109 = 0.908; the last one is below 0.05.
+    """
+    track = tracker(lifetime=-0.1 / math.log(0.99))
+    for tick in range(30):
+        track.update(seen(tick * DT, (0.0, 0.0)))
+    existence = []
+    for tick in range(30, 33):
+        existence += track.update(seen(tick * DT)).existence.tolist()
+    np.testing.assert_allclose(existence, [0.9083, 0.4716, 0.0805], atol=2e-3)
+    assert len(track.update(seen(33 * DT))) == 0
+
+
+def test_track_half_in_view_loses_less_existence() -> None:
+    existence = []
+    for share in (0.0, 0.5, 1.0):
+        track = tracker()
+        for tick in range(10):
+            track.update(seen(tick * DT, (0.0, 0.0)))
+        existence.append(float(track.update(seen(1.0), lambda boxes, s=share: np.full(len(boxes), s)).existence[0]))
+    assert existence[0] > existence[1] > existence[2] > 0.5
+
+
+def test_existence_below_confirmation_is_not_reported() -> None:
+    """Two detections of confidence 0.02 at places 1.5 m apart do not make an object; two of 0.8 do."""
+    for score, reported in ((0.02, 0), (0.8, 1)):
+        track = tracker(confirm_existence=0.9)
+        first, second = seen(0.0, (0.0, 0.0)), seen(DT, (1.5, 0.0))
+        track.update(replace(first, scores=np.array([score])))
+        assert len(track.update(replace(second, scores=np.array([score])))) == reported
+
+
+def test_predicted_tracks_move_on_without_changing_the_tracker() -> None:
+    track, other = tracker(), tracker()
+    for tick in range(20):
+        track.update(seen(tick * DT, (tick * 1.0, 0.0)))
+        other.update(seen(tick * DT, (tick * 1.0, 0.0)))
+    later = track.predicted(1.95)
+    assert later is not None
+    assert later.time == 1.95
+    assert float(later.boxes[0, 0]) == pytest.approx(19.5, abs=0.1)
+    assert later.tracks == (1,)
+    one, same = track.update(seen(2.0, (20.0, 0.0))), other.update(seen(2.0, (20.0, 0.0)))
+    np.testing.assert_array_equal(one.boxes, same.boxes)
+    np.testing.assert_array_equal(one.existence, same.existence)
+    assert track.predicted(1.9) is None
+    assert track.predicted(2.51) is None
+    assert tracker().predicted(0.0) is None
 
 
 def test_numbers_stay_with_objects_that_pass_each_other() -> None:
@@ -218,6 +274,9 @@ def test_time_does_not_run_backwards() -> None:
         ({"confirm": [0, 2]}, "greater than 0"),
         ({"gate": 1.0}, "less than 1"),
         ({"coast": -1}, "greater than or equal to 0"),
+        ({"detection_probability": 1.0}, "less than 1"),
+        ({"birth_density": 0.0}, "greater than 0"),
+        ({"delete_existence": 0.6}, "delete_existence 0.6 is above confirm_existence 0.5"),
     ],
 )
 def test_wrong_settings_are_told(wrong: dict[str, Any], words: str) -> None:
