@@ -50,4 +50,5 @@ class ReceivedObjects:
             velocity,
             np.concatenate([one.covariance for one in known]),
             tuple(numbers),
+            np.concatenate([one.confidence for one in known]),
         )

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.association import FEW as FEW_PAIRS
 from eidrive_scenario.fusion.association import associate, associate_few
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -30,7 +30,7 @@ class AverageFusion(FusionMethod):
     Boxes of one station are never joined: it reports different objects. Classes are not compared, as detectors confuse
     them. Position, size and score are means, the yaw is a mean on the circle, the velocity a mean of those known, the
     class that of the most reports. The covariance is the mean of those known: an upper bound, however much the
-    reports' errors depend on each other.
+    reports' errors depend on each other. The probability of existence is that of at least one report.
     """
 
     def __init__(self, gate: float = GATE) -> None:
@@ -45,9 +45,12 @@ class AverageFusion(FusionMethod):
             only = present[0]
             if only.time == now:
                 return only
-            return Detections(now, only.boxes, only.scores, only.classes, only.velocity, only.covariance, only.tracks)
+            return replace(only, time=now)
         labels = self._labels(present)
-        return joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)
+        fused = joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)
+        if all([report.existence is NOT_ESTIMATED for report in present]):
+            return fused
+        return replace(fused, existence=joint_existence(present, labels))
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
         """The object of each box, over all boxes of all reports in order; objects are numbered as they appear."""
@@ -69,6 +72,14 @@ class AverageFusion(FusionMethod):
                     objects[label].add(x, y, z)
                 labels.append(label)
         return labels
+
+
+def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Array:
+    """(G,) probabilities that at least one report of each object is right: 1 - prod (1 - r), as stations report what
+    their own sensors detect. Where a report states no existence, its score counts."""
+    doubt = np.ones(max(labels) + 1)
+    np.multiply.at(doubt, np.array(labels, dtype=np.intp), 1.0 - np.concatenate([r.confidence for r in reports]))
+    return np.asarray(1.0 - doubt)
 
 
 @dataclass

@@ -32,7 +32,7 @@ class CovarianceIntersectionSettings(Settings):
     gate_distance  centres of one object are nearer than this where a report does not say how exact it is [m]
     max_age        an object of which its station has said nothing for so long is forgotten, and a message later than
                    this comes too late [s]. Objects at rest are told once a second (ETSI TS 103 324, T_GenCpmMax)
-    existence      an object is reported from this probability on that there is one
+    existence      an object is reported from this probability on that there is one; half is the likelier hypothesis
     """
 
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
@@ -48,7 +48,8 @@ class CovarianceIntersectionFusion(FusionMethod):
     Between stations, nobody knows how errors depend on each other: the same model of motion, the same map, the same
     look of an object from a like direction. Covariance intersection is right for any dependence, and so does not count
     twice what it hears twice. Stations are taken in the order of their names; each object takes one track of a station
-    at most, as a station reports different objects.
+    at most, as a station reports different objects. Probabilities of existence are those of different sensors, as
+    stations report only what their own detect: an object exists if at least one report is right, 1 - prod (1 - r).
     """
 
     settings_type: ClassVar[type[Settings] | None] = CovarianceIntersectionSettings
@@ -104,6 +105,7 @@ def _joined(tracks: Table, objects: list[list[int]], now: float, least: float) -
         tuple(CLASSES[word] for word in words.tolist()),
         velocity,
         covariance,
+        existence=existence,
     )
     likely = np.flatnonzero(existence >= least)
     return fused if len(likely) == len(fused) else fused.subset(likely.tolist())

@@ -13,6 +13,8 @@ from eidrive_scenario.fusion.headings import first_heading, known_turn, predicte
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import Gate, likely_pairs, matched_pairs
 from eidrive_scenario.fusion.prediction import predicted
+from eidrive_scenario.perception.existence import detected, likelihood_ratio, survived
+from eidrive_scenario.perception.existence import missed as after_miss
 from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking import LEAST_DEVIATION, UNKNOWN_DEVIATION
 
@@ -37,15 +39,14 @@ TRACK = np.dtype(
         ("facing", "f8"),  # how sure the front is the front
         ("score", "f8"),
         ("existence", "f8"),  # probability that there is such an object
+        ("judged", "?"),  # the station itself tracks the object, and states its existence
         ("votes", "f8", (len(CLASSES),)),
     ],
     align=True,  # else numpy copies every number that stands behind a flag before it reckons with it
 )
 
-DETECTION = 0.9
-"""Probability that a station which saw an object before sees it again."""
 LEAST_EXISTENCE = 0.05
-"""Below this an object is given up."""
+"""Below this an object is given up; as `delete_existence` of trackers."""
 MOST_WEIGHT = 10.0
 """So many sure reports of the size count at most, so that it can still change."""
 _ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
@@ -62,19 +63,21 @@ def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
     scores = np.concatenate([found.scores for found in lists])
     velocity = np.concatenate([found.velocity for found in lists])
     table = np.zeros(len(boxes), TRACK)
+    counts = [len(found) for found in lists]
     covariance = table["covariance"]
     covariance[:, :2, :2] = np.concatenate([found.covariance for found in lists])
     table["vague"] = _make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
-    table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
+    table["score"] = table["weight"] = np.minimum(np.maximum(scores, 0.0), 1.0)
+    table["existence"] = np.minimum(np.maximum(np.concatenate([found.confidence for found in lists]), 0.0), 1.0)
+    table["judged"] = np.repeat([len(found.existence) > 0 or len(found.tracks) > 0 for found in lists], counts)
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
     covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, KNOWN_SPEED**2, UNKNOWN_SPEED**2)
     table["heading"], table["heading_covariance"] = first_heading(boxes[:, 6])
     table["facing"] = 1.0
-    counts = [len(found) for found in lists]
     table["station"] = np.repeat(stations, counts)
     table["time"] = table["seen"] = np.repeat([found.time for found in lists], counts)
     table["number"] = [number for found in lists for number in found.tracks or (-1,) * len(found)]
@@ -114,6 +117,7 @@ def move_on(tracks: Table, time: Array) -> None:
     )
     mean[:], covariance[:] = predicted(mean, covariance, step, known_turn(heading, of_heading))
     heading[:], of_heading[:] = predicted_heading(heading, of_heading, step)
+    tracks["existence"] = survived(tracks["existence"], step)
     tracks["time"] = time
 
 
@@ -160,6 +164,10 @@ def _updated(old: Table, new: Table) -> Table:
     """Tracks, predicted to the time of a report, with the boxes `new` of that report, which become the answer."""
     after = new
     still = ~new["moving"]
+    again = ~(new["judged"] | new["moving"])
+    if again.any():
+        # A station that tracks has counted its past; of others each report is news.
+        after["existence"][again] = _existence_after(old[again], new[again])
     if still.any():
         mean, covariance = _filtered(old[still], new[still])
         after["mean"][still], after["covariance"][still] = mean, covariance
@@ -172,9 +180,17 @@ def _updated(old: Table, new: Table) -> Table:
     share = np.divide(new["weight"], total, out=np.zeros(len(total)), where=total > 0.0)
     after["body"] = old["body"] + share[:, None] * (new["body"] - old["body"])
     after["weight"] = total
-    after["existence"] = 1.0 - (1.0 - old["existence"]) * (1.0 - new["existence"])
     after["votes"] = old["votes"] + new["votes"]
     return after
+
+
+def _existence_after(old: Table, new: Table) -> Array:
+    """(N,) probabilities of existence of tracks that are detected again, as in `perception.existence`."""
+    spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
+    offset = new["mean"][:, :2] - old["mean"][:, :2]
+    squared = np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset)
+    determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
+    return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 
 def _filtered(old: Table, new: Table) -> tuple[Array, Array]:
@@ -195,7 +211,7 @@ def _miss(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: s
         if station in silent:
             continue
         before = min(float(tracks["existence"][row]), 0.999)
-        after = 0.0 if station in tracked else before * (1.0 - DETECTION) / (1.0 - before * DETECTION)
+        after = 0.0 if station in tracked else float(after_miss(np.array(before)))
         tracks["existence"][row] = after
         tracks["score"][row] *= after / before if before > 0.0 else 0.0
 

@@ -223,7 +223,7 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
     return {
         "objectID": number % 256,
         "timeOfMeasurement": delay,
-        "objectConfidence": _within(100.0 * float(detections.scores[row]), 0, 100),
+        "objectConfidence": _within(100.0 * float(detections.confidence[row]), 0, 100),
         "xDistance": _distance(cos * east + sin * north),
         "yDistance": _distance(cos * north - sin * east),
         "zDistance": _distance(z - state.z),

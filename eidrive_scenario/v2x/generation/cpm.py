@@ -61,7 +61,7 @@ class CpmTriggers:
         """What to send now [s]; None if nothing is due. `numbers` tells the objects apart from message to message."""
         if now - self._sent < shortest - EQUAL:
             return None
-        scores: list[float] = detections.scores.tolist()
+        scores: list[float] = detections.confidence.tolist()
         rows = [row for row, score in enumerate(scores) if quality(score) > LEAST_QUALITY]
         present = {row: _said(detections, row, now) for row in rows}
         vulnerable = [row for row in rows if detections.classes[row] in VULNERABLE]
@@ -113,7 +113,7 @@ class CpmTriggers:
 
 
 def quality(score: float) -> int:
-    """The perception quality, 0 to 15, of an object with this confidence in [0, 1]."""
+    """The perception quality, 0 to 15, of an object with this probability of existence in [0, 1]."""
     return math.floor(15.0 * score + 0.5)
 
 
