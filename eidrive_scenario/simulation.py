@@ -28,6 +28,7 @@ from eidrive_scenario.recording.criteria_text import (
     unbuilt_criteria,
 )
 from eidrive_scenario.recording.criterion import Criterion, Verdict, checked_metrics, checked_verdict
+from eidrive_scenario.recording.false_tracks import FalseTracks
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -129,6 +130,7 @@ class Simulation:
         if self._weather is not None:
             self.world.set_weather(self._weather)
         self._trace = TraceHash()
+        self._false_tracks = FalseTracks()
         doubts = self.roads.doubts if self.roads is not None else ()
         self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario), *doubts)]
         self._warn(areas_off_road(scenario, self.stations.settings, self.roads))
@@ -236,6 +238,7 @@ class Simulation:
         if self._motionless.watching:
             self._motionless.observe(view, commands.driven)
         self._trace.observe(frame)
+        self._false_tracks.observe(frame, self.stations.min_existence)
         for observer in self._observers:
             observer.observe(frame)
         for criterion in self.criteria:
@@ -339,6 +342,7 @@ class Simulation:
         for criterion in self.criteria:
             metrics.update(checked_metrics(criterion))
         metrics.update(self.stations.metrics(frame.view.time))
+        metrics.update(self._false_tracks.metrics())
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
         time_s = frame.view.time
         self._warn(self._motionless.warnings(self.scenario, time_s))

@@ -17,7 +17,8 @@ from eidrive_scenario.world.actor import ActorSpec
 
 class ConflictAreaPlanner(RoutePlanner):
     """Follows the route, and brakes with a fixed deceleration from the instant in which the centre of any known object
-    lies in the area until `conflict_hold` has gone by since the last such instant.
+    lies in the area until `conflict_hold` has gone by since the last such instant. Objects that exist with less than
+    `min_existence` do not count.
 
     The rule of EI-Drive's cooperative scenarios: 35 ticks of 0.03 s from the last sighting on, brake 0.25, throttle 0,
     the steering goes on. Which deceleration that brake gives is our choice.
@@ -34,15 +35,26 @@ class ConflictAreaPlanner(RoutePlanner):
 
     def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
         plan = super().plan(ego, objects, goal, now)
-        reason = "an object was in the conflict area"
-        for index, (x, y) in enumerate(objects.boxes[:, :2].tolist()):
-            if any(inside(x, y, area) for area in self.areas):
-                self._last_sighting = now
-                reason = f"{objects.classes[index]} in the conflict area"
-                break
-        if now - self._last_sighting < self.settings.conflict_hold - 1e-9 or now == self._last_sighting:
-            return replace(plan, reason=reason, braking=self.settings.conflict_brake)
+        inside_area = self._in_areas(objects) if len(objects) else ()
+        if inside_area:
+            self._last_sighting = now
+            reason = f"{objects.classes[inside_area[0]]} in the conflict area"
+            return replace(plan, reason=reason, braking=self.settings.conflict_brake, objects=inside_area)
+        if now - self._last_sighting < self.settings.conflict_hold - 1e-9:
+            return replace(plan, reason="an object was in the conflict area", braking=self.settings.conflict_brake)
         return plan
+
+    def _in_areas(self, objects: Detections) -> tuple[int, ...]:
+        """The rows of the objects in an area that exist with enough probability."""
+        found = [
+            index
+            for index, (x, y) in enumerate(objects.boxes[:, :2].tolist())
+            if any([inside(x, y, area) for area in self.areas])
+        ]
+        if not found:
+            return ()
+        existence = objects.confidence.tolist()
+        return tuple([index for index in found if existence[index] >= self.settings.min_existence])
 
 
 def inside(x: float, y: float, polygon: Polygon) -> bool:

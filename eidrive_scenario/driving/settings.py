@@ -141,6 +141,8 @@ class AgentSettings(Settings):
     conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
     conflict_brake  [m/s²], until
     conflict_hold   has gone by since an object was last known there
+    min_existence   probability of existence (of an object without one: score) from which on the planner reacts to it;
+                    0.5 is the likelier of the two hypotheses, as in trackers and fusion
     """
 
     module: Literal["eidrive"] = "eidrive"
@@ -173,6 +175,7 @@ class AgentSettings(Settings):
     conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
     conflict_brake: PositiveFloat = 5.0
     conflict_hold: NonNegativeFloat = 1.05
+    min_existence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
     @model_validator(mode="after")
     def _one_truth_sensor(self) -> AgentSettings:

@@ -80,6 +80,8 @@ class Stations:
         """What became of the messages that were said in the last tick."""
         self.readings: Mapping[str, Readings] = {}
         """What the sensors of each station gave in the last tick."""
+        self.min_existence: dict[str, float] = {}
+        """Of the stations with a planner, the probability of existence from which on it reacts to objects."""
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
         self._lookouts: dict[str, SignalLookout] = {}
@@ -130,6 +132,8 @@ class Stations:
             detector=detector,
             encoder=self._encoders.get(spec.name),
         )
+        if self._agents[spec.name].planner is not None:
+            self.min_existence[spec.name] = settings.min_existence
         unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.sees_signals
         if settings.obey_signals and unseen:
             self._lookouts[spec.name] = SignalLookout(spec, self._roads, unseen)
@@ -139,6 +143,7 @@ class Stations:
     def leave(self, name: str) -> None:
         """An actor has left the world."""
         self._agents.pop(name, None)
+        self.min_existence.pop(name, None)
         self._rigs.pop(name, None)
         self._lookouts.pop(name, None)
         self._held.pop(name, None)

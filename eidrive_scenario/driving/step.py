@@ -47,6 +47,8 @@ class Plan:
     """With which the first speed is changing [m/s²]."""
     braking: float | None = None
     """A deceleration to apply whatever the speeds say [m/s²]."""
+    objects: tuple[int, ...] = ()
+    """The objects that make it look so, as rows of those that the planner was given."""
 
 
 @made_often

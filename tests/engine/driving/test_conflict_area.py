@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -100,3 +103,28 @@ def test_without_an_area_there_is_no_such_planner(car: ActorSpec) -> None:
 
 def test_it_comes_through_its_entry_point() -> None:
     assert registry("planners").load("conflict_area") is ConflictAreaPlanner
+
+
+def test_object_that_hardly_exists_does_not_brake(car: ActorSpec) -> None:
+    """Existence counts where it is estimated, else the score; 0.5 by default."""
+
+    def brakes(existence: float | None, score: float = 1.0, **settings: object) -> bool:
+        known = replace(objects(0.0, SEEN_IN), scores=np.array([score]))
+        if existence is not None:
+            known = replace(known, existence=np.array([existence]))
+        return planner(car, **settings).plan(EGO, known, None, 0.0).braking is not None
+
+    assert not brakes(0.4)
+    assert brakes(0.6)
+    assert brakes(0.6, score=0.1), "the existence is what counts"
+    assert not brakes(None, score=0.4)
+    assert brakes(0.4, min_existence=0.3)
+    assert not brakes(0.9, min_existence=0.95)
+    assert not brakes(math.nan)
+
+
+def test_plan_names_the_objects_that_it_brakes_for(car: ActorSpec) -> None:
+    known = replace(objects(0.0, SEEN_IN, SEEN_OUT, SEEN_IN, SEEN_IN), existence=np.array([0.2, 1.0, 0.9, 0.7]))
+    rule = planner(car)
+    assert rule.plan(EGO, known, None, 0.0).objects == (2, 3)
+    assert rule.plan(EGO, objects(0.05), None, 0.05).objects == ()
