@@ -16,6 +16,8 @@ def check_plan(planner: Planner, plan: object) -> None:
     """Raise InvalidResult unless `plan` is a Plan of at least two different points and as many speeds, all finite."""
     if not isinstance(plan, Plan):
         raise InvalidResult(planner, "plan", f"returned {describe(plan)} (expected Plan)")
+    if not isinstance(plan.objects, tuple):
+        raise InvalidResult(planner, "plan", f"returned objects as {describe(plan.objects)} (expected a tuple of rows)")
     points, speeds = plan.points, plan.speeds
     for name, array in (("points", points), ("speeds", speeds)):
         if not isinstance(array, np.ndarray):

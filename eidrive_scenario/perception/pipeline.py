@@ -12,7 +12,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
-from eidrive_scenario.perception.result_checks import check_detections, describe, is_checked
+from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking import Tracker
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 
@@ -89,7 +89,13 @@ class Perception:
     def _tracked(self, found: Detections, readings: Readings) -> Detections:
         if self._tracker is None:
             return found
-        return self._tracker.update(found, lambda boxes: self.detector.in_view(boxes, readings, found))
+
+        def in_view(boxes: Array) -> Array:
+            shares = self.detector.in_view(boxes, readings, found)
+            check_in_view(self.detector, shares, len(boxes))
+            return shares
+
+        return self._tracker.update(found, in_view)
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:

@@ -28,6 +28,8 @@ def check_detections(extension: object, method: str, found: object) -> None:
     try:
         # One product per array is a third of the time of np.isfinite; a sum that overflows is looked at closely.
         quick = found.time + np.vdot(boxes, boxes) + np.vdot(scores, scores)
+        if found.existence.size:
+            quick += np.vdot(found.existence, found.existence)
         if math.isfinite(quick) and not (np.isinf(found.velocity).any() or np.isinf(found.covariance).any()):
             return
     except TypeError:
@@ -39,10 +41,19 @@ def check_detections(extension: object, method: str, found: object) -> None:
             "time": found.time,
             "boxes": boxes,
             "scores": scores,
+            "existence": found.existence,
             "velocity": _without_nan(found.velocity),
             "covariance": _without_nan(found.covariance),
         },
     )
+
+
+def check_in_view(extension: object, shares: object, count: int) -> None:
+    """Raise InvalidResult unless `shares` is an array of `count` finite numbers."""
+    if not isinstance(shares, np.ndarray) or shares.shape != (count,):
+        shape = f"an array of shape {shares.shape}" if isinstance(shares, np.ndarray) else describe(shares)
+        raise InvalidResult(extension, "in_view", f"returned {shape} (expected an array of shape {(count,)})")
+    raise_not_finite(extension, "in_view", {"shares": shares})
 
 
 def raise_not_finite(extension: object, method: str, fields: dict[str, object]) -> None:

@@ -11,6 +11,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.building import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.oracle import OracleDetector
@@ -154,3 +155,50 @@ def test_what_a_slow_detector_found_is_fused_and_sent_with_the_time_of_measureme
     assert [len(step.fused) for step in steps] == [0, 0, 1, 1, 1]
     assert [round(float(step.detections.boxes[0, 0]), 6) for step in steps[2:]] == [0.0, 0.5, 1.0]
     assert [round(step.outbox[0].detections.time, 6) for step in steps[2:]] == [0.0, 0.05, 0.1]
+
+
+def test_perceive_between_scans_predicts_tracks_to_the_tick() -> None:
+    """Scans at 10 Hz, ticks at 20 Hz: what is known moves on at 10 m/s, and ends when the scans have ended for long."""
+    perception = Perception(OracleDetector(), tracker=Tracker(TrackerSettings(coast=0.5)))
+    for tick in range(40):
+        new = perception.perceive(readings(tick * DT, 0.5 * tick if tick % 2 == 0 else None))
+    assert new is not None
+    assert new.time == pytest.approx(39 * DT)
+    assert new.boxes[0, 0] == pytest.approx(0.5 * 39, abs=0.05)
+    assert known(Perception(OracleDetector(), tracker=Tracker(TrackerSettings(coast=0.1))), 8, every=7) == [
+        *(0.0, 0.05, 0.1),
+        *(None, None, None, None),
+        0.35,
+    ]
+
+
+class Sees(Blind):
+    """Answers `in_view` with what it is given."""
+
+    def __init__(self, shares: Any) -> None:
+        super().__init__()
+        self.shares = shares
+
+    def in_view(self, boxes: np.ndarray, readings: Readings, found: Detections) -> Any:
+        return self.shares
+
+
+@pytest.mark.parametrize("shares", [None, 1.0, np.ones(3), np.array([np.nan])])
+def test_in_view_with_a_wrong_result_is_an_error_of_the_detector(shares: Any) -> None:
+    perception = Perception(Sees(shares), tracker=Tracker(TrackerSettings()))
+    for tick in range(4):
+        perception.perceive(readings(tick * DT, 0.5 * tick))
+    with pytest.raises(InvalidResult, match="in_view"):
+        perception.perceive(readings(4 * DT, 200.0))
+
+
+def test_in_view_zero_keeps_tracks_that_are_not_detected() -> None:
+    left = []
+    for share in (0.0, 1.0):
+        perception = Perception(Sees(np.array([share])), tracker=Tracker(TrackerSettings(coast=10.0)))
+        for tick in range(30):
+            perception.perceive(readings(tick * DT, 5.0))
+        for tick in range(30, 36):
+            new = perception.perceive(readings(tick * DT, 200.0))
+        left.append(0 if new is None else int((new.boxes[:, 0] < 100.0).sum()))
+    assert left == [1, 0]
