@@ -17,7 +17,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.report import reported
+from eidrive_scenario.reporting.reported_run import reported
 from eidrive_scenario.reporting.road_drawing import recorded_roads
 from eidrive_scenario.reporting.settings_text import run_facts, shortened
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
 from eidrive_scenario.reporting.page import write_page
+from eidrive_scenario.reporting.reported_run import ReportedRun, reported
+from eidrive_scenario.reporting.run_groups import group_runs
 
 PREFERRED = ("min_distance", "time_to_collision", "collision.count", "messages.lost")
 """Metrics that the overview shows before others, by how their names begin."""
@@ -22,43 +24,11 @@ _UNITS = {"count": "", "impact_speed": "m/s"}
 """Of metrics that have another unit than the value of their criterion, by the last part of their name."""
 
 
-class ReportedCriterion(BaseModel):
-    """A verdict as `--json` prints it."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    name: str
-    passed: bool
-    value: float | None = None
-    limit: float | None = None
-    unit: str = ""
-    reason: str = ""
-
-
-class ReportedRun(BaseModel):
-    """A run as `--json` prints it."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    scenario: str
-    seed: int
-    channel: str = ""
-    passed: bool
-    end: str
-    criteria: tuple[ReportedCriterion, ...] = ()
-    metrics: dict[str, float | None] = {}
-    simulated_s: float = 0.0
-    run: int | None = None
-    parameters: dict[str, str] = {}
-
-    @property
-    def finished(self) -> bool:
-        """False where the run was cut off by its time limit."""
-        return self.end != "time limit"
-
-
 def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str = "") -> Path:
     """One page over these results, given as `--json` prints them. Returns the page's path.
+
+    Runs are grouped by the settings in which those of a scenario differ. A run that lies in several folders is listed
+    each time, and counts once.
 
     `out` is the page if it ends in `.html`, else the folder in which `report.html` is written. Raises InputError if
     there are no results, or one of them is none.
@@ -67,9 +37,7 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
     runs = [reported(result) for result in results]
     if not runs:
         raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
-    groups: dict[tuple[str, str], list[ReportedRun]] = {}
-    for run in sorted(runs, key=lambda run: (run.scenario, run.channel, run.run or 0, run.seed)):
-        groups.setdefault((run.scenario, run.channel), []).append(run)
+    groups = group_runs(runs)
     metrics = _common_metrics(runs)
     return write_page(
         page,
@@ -82,31 +50,24 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
         metrics=[_title(name, runs) for name in metrics],
         groups=[
             {
-                "scenario": scenario,
-                "channel": channel,
+                "scenario": group.scenario,
+                "channel": group.channel,
+                "content": group.content,
+                "differing": group.differing,
                 "anchor": f"group-{index}",
-                "runs": group,
-                "varied": _varied(group),
-                "share": wilson(sum(run.passed for run in group), len(group)),
-                "summaries": [_summary(group, name) for name in metrics],
+                "runs": group.runs,
+                "copies": len(group.runs) - len(group.distinct),
+                "varied": _varied(group.runs),
+                "share": wilson(sum(run.passed for run in group.distinct), len(group.distinct)),
+                "summaries": [_summary(group.distinct, name) for name in metrics],
             }
-            for index, ((scenario, channel), group) in enumerate(groups.items())
+            for index, group in enumerate(groups)
         ],
         number=_number,
+        has_settings=any(run.settings_sha256 for run in runs),
+        all_settings=lambda run: json.dumps(run.settings, indent=1, ensure_ascii=False),
         footer=footer or f"eidrive-scenario {version('eidrive-scenario')}",
     )
-
-
-def reported(result: Mapping[str, Any]) -> ReportedRun:
-    """What pages tell of a run, from what `--json` prints. Raises InputError if it is none."""
-    try:
-        return ReportedRun.model_validate(result)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InputError(
-            Problem(f"a result's {where!r}: {first['msg'].lower()}", "give what eidrive run --json prints")
-        ) from error
 
 
 def _common_metrics(runs: Sequence[ReportedRun]) -> list[str]:
@@ -137,7 +98,8 @@ def _varied(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
 
 
 def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
-    values = [value for run in runs if (value := run.metrics.get(metric)) is not None]
+    given = [run.metrics.get(metric) for run in runs]
+    values = [value for value in given if value is not None and math.isfinite(value)]
     return summarise(values) if values else None
 
 

@@ -1,0 +1,61 @@
+"""A run as `--json` prints it, checked: what pages show of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from eidrive_scenario.errors import InputError, Problem
+
+
+class ReportedCriterion(BaseModel):
+    """A verdict as `--json` prints it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    name: str
+    passed: bool
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    reason: str = ""
+
+
+class ReportedRun(BaseModel):
+    """A run as `--json` prints it."""
+
+    model_config = ConfigDict(extra="ignore")
+
+    scenario: str
+    seed: int
+    channel: str = ""
+    passed: bool
+    end: str
+    criteria: tuple[ReportedCriterion, ...] = ()
+    metrics: dict[str, float | None] = {}
+    trace_hash: str = ""
+    simulated_s: float = 0.0
+    run: int | None = None
+    parameters: dict[str, str] = {}
+    settings: dict[str, Any] = {}
+    settings_sha256: str = ""
+    command: str = ""
+
+    @property
+    def finished(self) -> bool:
+        """False where the run was cut off by its time limit."""
+        return self.end != "time limit"
+
+
+def reported(result: Mapping[str, Any]) -> ReportedRun:
+    """What pages tell of a run, from what `--json` prints. Raises InputError if it is none."""
+    try:
+        return ReportedRun.model_validate(result)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(
+            Problem(f"a result's {where[:200]!r}: {first['msg'].lower()}", "give what eidrive run --json prints")
+        ) from error

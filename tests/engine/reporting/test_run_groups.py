@@ -1,0 +1,127 @@
+"""The report groups runs by the settings that differ, and shows the channel of each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import html
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.experiments.single_run import as_json_text, play
+from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.recording.run_files import read_results
+from eidrive_scenario.reporting.report import write_report
+from eidrive_scenario.reporting.reported_run import ReportedRun, reported
+from eidrive_scenario.reporting.run_groups import group_runs
+from eidrive_scenario.simulation import RunSettings
+
+PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
+
+
+def run(seed: int = 1, **settings: Any) -> dict[str, Any]:
+    result = play(PASSING_BY, seed=seed, settings=RunSettings(time_limit=0.1, **settings))
+    found: dict[str, Any] = load_json(as_json_text(result).encode())
+    return found
+
+
+def reports(*results: dict[str, Any]) -> list[ReportedRun]:
+    return [reported(result) for result in results]
+
+
+def late(seconds: float) -> str:
+    return f"{{delay: {{kind: constant, seconds: {seconds}}}}}"
+
+
+def test_groups_differ_by_channel_content_and_not_by_seed() -> None:
+    groups = group_runs(reports(*(run(seed, channel=late(delay)) for seed in (1, 2) for delay in (0.1, 0.2))))
+    assert [(group.channel, group.differing) for group in groups] == [
+        ("custom", {"channel.delay.seconds": "0.1"}),
+        ("custom", {"channel.delay.seconds": "0.2"}),
+    ]
+    assert [[one.seed for one in group.runs] for group in groups] == [[1, 2], [1, 2]]
+    assert "seconds: 0.1" in groups[0].content
+
+
+@pytest.mark.parametrize(
+    ("changes", "differing"),
+    [
+        ({"parameters": {"OtherY": "6"}}, {"parameters.OtherY": ("5.0", "6")}),
+        ({"dt": 0.1}, {"dt": ("0.05", "0.1")}),
+        ({"user_values": {"mood": "3"}}, {"user_values": ("{}", ""), "user_values.mood": ("", "3")}),
+        ({"weather": "storm"}, {"weather": ("null", "storm")}),
+    ],
+)
+def test_groups_state_the_setting_that_differs(changes: dict[str, Any], differing: dict[str, tuple[str, str]]) -> None:
+    groups = group_runs(reports(run(), run(**changes)))
+    assert len(groups) == 2
+    for name, values in differing.items():
+        assert {group.differing.get(name, "") for group in groups} == set(values)
+
+
+def test_a_scenario_file_that_changed_makes_another_group() -> None:
+    first, second = run(), run()
+    second["settings"]["files"][0]["sha256"] = "f" * 64
+    groups = group_runs(reports(first, second))
+    assert {group.differing["files.scenario passing_by.xosc"] for group in groups} == {
+        first["settings"]["files"][0]["sha256"][:12],
+        "f" * 12,
+    }
+
+
+def test_a_result_in_two_folders_counts_once_and_is_listed_twice(tmp_path: Path) -> None:
+    one = run()
+    page = write_report([one, dict(one), run(seed=2)], tmp_path).read_text(encoding="utf-8")
+    tree = html.fromstring(page)
+    assert tree.xpath("string((//tbody)[1]/tr/td[3])") == "0/2"
+    assert page.count(f"<summary>{one['settings_sha256'][:10]}</summary>") == 2
+    assert "1 of these results is a copy of another" in page
+
+
+def test_the_page_holds_channel_content_settings_and_command_of_each_run(tmp_path: Path) -> None:
+    page = write_report([run(channel=late(0.1)), run(channel=late(0.25))], tmp_path).read_text(encoding="utf-8")
+    text = html.fromstring(page).text_content()
+    assert "channel.delay.seconds: 0.1" in text
+    assert "delay: {kind: constant, seconds: 0.25}" in text
+    assert f"eidrive run {PASSING_BY} --channel '{late(0.25)}' --seed 1 --time-limit 0.1" in text
+    assert '"sha256"' in text
+
+
+def test_names_do_not_become_markup(tmp_path: Path) -> None:
+    attack = "<img src=x onerror=alert(1)>"
+    one = run()
+    one |= {"scenario": attack, "channel": attack, "command": attack, "end": attack}
+    one["settings"]["channel_profile"] = {attack: attack}
+    one["metrics"] = {attack: 1.0, "inf": float("inf")}
+    one["criteria"][0]["reason"] = attack
+    page = write_report([one, run()], tmp_path).read_text(encoding="utf-8")
+    assert "<img" not in page
+
+
+def test_odd_values_of_a_result_are_no_internal_error(tmp_path: Path) -> None:
+    for changes in (
+        {"settings": {"stations": [[1]], "parameters": 3, "drawn": 5, "files": [1, {"x": 2}], "channel_profile": "x"}},
+        {"metrics": {"a": 1e308, "b": float("nan")}, "settings": {}},
+        {"run": 3, "parameters": {"A": "1"}},
+        {"scenario": "\ud800", "seed": 10**50},
+    ):
+        assert write_report([run() | changes, run()], tmp_path).exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 100_000 + "]" * 100_000, "nested"),
+        ('{"trace_hash": ' + "[" * 900 + "]" * 900 + "}", "nested more than 40 deep"),
+        ('{"trace_hash": ' + "9" * 5000 + "}", "not JSON"),
+        ('{"trace_hash": [' + "0," * 10_000_001 + "0]}", "more than 10000000 values"),
+        ("\xff", "not the result of a run|not JSON"),
+        ("null", "not the result of a run"),
+    ],
+    ids=["deep", "rather deep", "long number", "many values", "no UTF-8", "null"],
+)
+def test_a_hostile_result_is_an_input_error(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "result.json").write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match=message):
+        read_results([tmp_path])
