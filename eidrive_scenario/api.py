@@ -9,11 +9,13 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import (
     EidriveError,
+    ExtensionError,
     InputError,
     Problem,
     ScenarioError,
     SettingError,
     SimulationError,
+    WallLimitError,
     suggestion,
 )
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -92,6 +94,7 @@ __all__ = [
     "EidriveError",
     "EntityCondition",
     "Environment",
+    "ExtensionError",
     "FateBlock",
     "Fates",
     "Frame",
@@ -142,6 +145,7 @@ __all__ = [
     "ValueTransition",
     "Verdict",
     "Visibility",
+    "WallLimitError",
     "Watch",
     "WorldView",
     "any_branch",

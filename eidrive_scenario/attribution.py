@@ -16,12 +16,13 @@ from types import FrameType, TracebackType
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult
+from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
 from eidrive_scenario.recording.criterion import Criterion
 from eidrive_scenario.registry import is_built_in, registration, third_party_files
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition
 from eidrive_scenario.storyboard.stand_in import StandIn
+from eidrive_scenario.wall_limit import LimitReached, current_limit
 from eidrive_scenario.world.actor import ActorSpec
 
 _ABSENT = object()
@@ -54,11 +55,18 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
     time       simulated time [s]; None before the run
     observers  of the run: those that are no part of this project count as extensions
 
-    Errors of the input, interruptions by the user and errors that are attributed already are left as they are.
+    Raises WallLimitError instead if the wall limit of the run was reached. Errors of the input, interruptions by the
+    user and errors that are attributed already are left as they are.
     """
-    if isinstance(error, InputError | KeyboardInterrupt | ExtensionError):
+    if isinstance(error, InputError | KeyboardInterrupt | ExtensionError | WallLimitError):
         return
     calls = list(_calls(error.__traceback__))
+    if isinstance(error, LimitReached):
+        limit = current_limit()
+        seconds = 0.0 if limit is None else limit.seconds
+        if limit is not None:
+            limit.armed = False
+        raise _wall_limit_error(calls, seconds, time, observers) from error
     if isinstance(error, InvalidResult):
         raise ExtensionError(_place_of_method(error, calls, time), str(error)) from error.__cause__
     place = extension_place(calls, time=time, observers=observers)
@@ -97,11 +105,12 @@ def attributed(
     return cast("Callable[Concatenate[Caller, Parameters], Result]", call)
 
 
-def running_extension(
-    frame: FrameType | None, *, time: float | None = None, observers: Collection[object] = ()
-) -> ExtensionPlace | None:
-    """Return the extension that is running in the stack that ends with this frame, or None."""
-    return extension_place([_Call(f, line) for f, line in traceback.walk_stack(frame)][::-1], time, observers)
+def wall_limit_error(
+    frame: FrameType | None, limit: float, *, time: float | None = None, observers: Collection[object] = ()
+) -> WallLimitError:
+    """Return the error of a run that executes this frame when its limit of wall time [s] is reached."""
+    calls = [_Call(one, line) for one, line in traceback.walk_stack(frame)][::-1]
+    return _wall_limit_error(calls, limit, time, observers)
 
 
 def extension_place(
@@ -124,6 +133,16 @@ def extension_place(
         file, line = _definition(calls[row].subject)
         return ExtensionPlace(kind, name, value, _for_whom(calls), time, file, line, calls[row].function)
     return ExtensionPlace(kind, name, value, _for_whom(calls), time, at.file, at.line, at.function)
+
+
+def _wall_limit_error(
+    calls: Sequence[_Call], limit: float, time: float | None, observers: Collection[object]
+) -> WallLimitError:
+    calls = [call for call in calls if Path(call.file).name not in ("wall_limit.py", "threading.py")]
+    place = extension_place(calls, time, observers)
+    last = calls[-1] if calls else None
+    where = "" if last is None else f"{last.file}:{last.line} in {last.function}"
+    return WallLimitError(limit, place, time, where)
 
 
 def traceback_from_extension(error: ExtensionError) -> str:
@@ -204,8 +223,8 @@ def _for_whom(calls: Sequence[_Call]) -> str:
             return _of_action(subject)
         if isinstance(subject, Condition) and hasattr(subject, "element"):
             return f"{subject.element.source}:{subject.element.line}"
-        if isinstance(subject, Criterion) and isinstance(getattr(subject, "name", None), str):
-            return f"criterion {subject.name!r}"
+        if isinstance(subject, Criterion):
+            return _of_criterion(subject)
         for value in call.frame.f_locals.values() if call.frame.f_code.co_name == "build_agent" else ():
             if isinstance(value, ActorSpec):
                 return f"station {value.name!r}"
@@ -219,6 +238,12 @@ def _of_action(action: ActionBehaviour) -> str:
     return f"actor {actor!r}, {where}" if actor is not None else where
 
 
+def _of_criterion(criterion: Criterion) -> str:
+    """The name that a criterion has in the run, if it is not that of its class."""
+    name = getattr(criterion, "name", None)
+    return f"verdict {name!r}" if isinstance(name, str) and name != getattr(type(criterion), "name", None) else ""
+
+
 def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float | None) -> ExtensionPlace:
     """The definition of the method that returned something invalid."""
     extension = error.extension
@@ -227,7 +252,7 @@ def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float |
     if not whom and isinstance(extension, Condition):
         whom = f"{extension.element.source}:{extension.element.line}"
     if not whom and isinstance(extension, Criterion):
-        whom = f"criterion {extension.name!r}"
+        whom = _of_criterion(extension)
     method = getattr(extension, error.method, None)
     file, line = _definition(method if inspect.isroutine(method) else extension)
     return ExtensionPlace(kind, name, value, whom, time, file, line, error.method)

@@ -54,8 +54,8 @@ class Registry:
         """
         point = self._points.get(name)
         if point is None:
-            singular = self.kind.removesuffix("s")
-            raise SettingError(Problem(f"unknown {singular} {name!r}", suggestion(name, self._points)))
+            what = self.kind.removesuffix("s")
+            raise SettingError(Problem(f"unknown {what} {name!r}", suggestion(name, self._points)))
         found = self._import(point)
         if found in _checked.get((self.kind, name, base), ()):
             return found
@@ -69,7 +69,7 @@ class Registry:
         if isinstance(found, type):
             for problem in _mismatches(found):
                 raise RegistryError(f"{described}: {problem}")
-            _loaded.setdefault(found, (_SINGULAR.get(self.kind, self.kind.removesuffix("s")), name, point.value))
+            _loaded.setdefault(found, (singular(self.kind), name, point.value))
             _checked[self.kind, name, base] = (found,)
         return found
 
@@ -90,6 +90,11 @@ _checked: dict[tuple[str, str, type | None], tuple[Any, ...]] = {}
 def registry(kind: str) -> Registry:
     """The registry of one kind, read once per process."""
     return Registry(kind)
+
+
+def singular(kind: str) -> str:
+    """Return what one extension of a kind is called."""
+    return _SINGULAR.get(kind, kind.removesuffix("s"))
 
 
 def construct(extension_class: Any, *given: Any, **named: Any) -> Any:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 from typing import Self
 
-from eidrive_scenario.attribution import attributed, report_extension
+from eidrive_scenario.attribution import attributed, report_extension, wall_limit_error
 from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
 from eidrive_scenario.driving.area_checks import areas_off_road
 from eidrive_scenario.driving.declared import possible_drivers
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Problem, SettingError, SimulationError, Together, suggestion
+from eidrive_scenario.errors import Problem, SettingError, SimulationError, Together, WallLimitError, suggestion
 from eidrive_scenario.library import name_of, resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
@@ -47,6 +48,7 @@ from eidrive_scenario.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.unstarted import unstarted
+from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.specs import actor_spec
@@ -186,10 +188,14 @@ class Simulation:
         """
         self.storyboard.give_pose(name, pose, speed)
 
-    def run(self) -> RunResult:
-        """Play to the end."""
+    @attributed
+    def run(self, *, wall_limit: float | None = None) -> RunResult:
+        """Run to the end, for at most `wall_limit` seconds of wall time.
+
+        Raises ExtensionError for a fault of an extension, WallLimitError if the limit is reached.
+        """
         self._started = time.perf_counter()
-        with self:
+        with limit_wall_time(wall_limit), self:
             while self._last is None:
                 self.tick()
             return self.result()
@@ -218,6 +224,13 @@ class Simulation:
         """Raise ExtensionError from an error that an extension of this run raised; return otherwise."""
         world: World | None = getattr(self, "world", None)
         report_extension(error, time=None if world is None else world.time, observers=self._observers)
+
+    def describe_hang(self, limit: float, frame: FrameType | None) -> WallLimitError:
+        """Return the error of this run, which executes this frame; its observers are closed, so that files end well."""
+        for observer in self._observers:
+            with suppress(Exception):
+                observer.close()
+        return wall_limit_error(frame, limit, time=self.world.time, observers=self._observers)
 
     def _tick(self) -> tuple[Frame, str | None]:
         view = self.world.view()
@@ -387,14 +400,18 @@ def run_file(
     seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
     observers: Sequence[Observer] = (),
+    wall_limit: float | None = None,
 ) -> RunResult:
     """Run a scenario to its end: the same run as `eidrive run` and the pytest plugin make of file, seed and settings.
 
-    source  what `load_for_seed` takes: a path, a library name such as `coop/scenario_1`, one run of a distribution, …
+    source      what `load_for_seed` takes: a path, a library name such as `coop/scenario_1`, one run of a distribution
+    wall_limit  of loading and run together [s]; see `limit_wall_time`
 
-    Raises InputError for a wrong file or setting.
+    Raises InputError for a wrong file or setting, ExtensionError for a fault of an extension, WallLimitError if the
+    limit is reached.
     """
-    return Simulation(source, seed=seed, settings=settings, observers=observers).run()
+    with limit_wall_time(wall_limit):
+        return Simulation(source, seed=seed, settings=settings, observers=observers).run()
 
 
 def load_for_seed(

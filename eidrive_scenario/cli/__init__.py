@@ -14,6 +14,7 @@ from eidrive_scenario.cli.failures import BROKEN, Guarded, tell
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
+from eidrive_scenario.cli.supervision import allow
 
 app = typer.Typer(
     name="eidrive",
@@ -54,6 +55,7 @@ def _options(
 def main() -> None:
     """Entry point; ends the process with the command's exit code."""
     make_writable()
+    allow()
     try:
         app()
     except OSError as error:

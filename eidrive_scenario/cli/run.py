@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from eidrive_scenario.cli.failures import BROKEN
 from eidrive_scenario.cli.places import check_places
+from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.streams import has_all_letters
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.cli.supervision import supervise
+from eidrive_scenario.errors import EidriveError, InputError, Problem, SettingError
 
 PRINTED = "-"
 """Instead of a file: standard output."""
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 
 
 def run(
+    ctx: typer.Context,
     scenario: Annotated[
         str,
         typer.Argument(
@@ -55,6 +60,10 @@ def run(
         int | None, typer.Option(min=1, help="Most runs of a distribution, spread over its values.", show_default="all")
     ] = None,
     dt: Annotated[float, typer.Option(help="Step, in seconds.")] = 0.05,
+    wall_limit: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Longest wall time of each run, loading included.", show_default="none"),
+    ] = None,
     time_limit: Annotated[float, typer.Option(help="Longest simulated time, in seconds.")] = 120.0,
     out: Annotated[
         Path | None,
@@ -90,6 +99,9 @@ def run(
     if json and log == PRINTED:
         raise SettingError(Problem("--log - and --json would both print", "give the log a file"))
 
+    failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
+    if wall_limit is not None:
+        supervise(failures.end_hung_run, partial(failures.report_dump, _positive("--wall-limit", wall_limit)))
     parameters = _assigned("--param", param or [])
     settings = RunSettings(
         channel=channel,
@@ -110,16 +122,25 @@ def run(
         for each in range(seed, seed + repeat):
             mark = [*marks, f"seed-{each}"] if repeat > 1 else marks
             explanations = [Explanation(name) for name in explain or ()]
-            result = play(
-                source,
-                seed=each,
-                settings=settings,
-                below=out,
-                record=not no_record,
-                csv=_marked(csv, mark) if csv is not None else None,
-                log=_marked(Path(log), mark) if log is not None and log != PRINTED else log,
-                explanations=explanations,
-            )
+            failures.begin(each, None if isinstance(source, Path) else source.number)
+            try:
+                result = play(
+                    source,
+                    seed=each,
+                    settings=settings,
+                    below=out,
+                    record=not no_record,
+                    csv=_marked(csv, mark) if csv is not None else None,
+                    log=_marked(Path(log), mark) if log is not None and log != PRINTED else log,
+                    explanations=explanations,
+                    wall_limit=wall_limit,
+                )
+            except InputError:
+                raise
+            except EidriveError as error:
+                failures.report(error)
+                code = max(code, BROKEN)
+                continue
             if json:
                 typer.echo(as_json_text(result, ascii_only=not has_all_letters()))
                 show_warnings(result)

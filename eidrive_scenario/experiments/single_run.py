@@ -27,6 +27,7 @@ from eidrive_scenario.recording.run_files import (
 )
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
+from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [
     "PICTURES",
@@ -51,6 +52,7 @@ def play(
     csv: Path | None = None,
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
+    wall_limit: float | None = None,
 ) -> RunResult:
     """Run a scenario, given by path, library name or as all else that load_scenario takes, or one run out of a
     parameter value distribution.
@@ -60,6 +62,7 @@ def play(
     csv     file for one row per actor and tick
     log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
     explanations  what shall be explained afterwards; they look on
+    wall_limit  of loading and run together, in wall time [s]; WallLimitError is raised when it is reached
 
     A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
     Its exception has notes with that recording and with the command that repeats the run.
@@ -71,7 +74,9 @@ def play(
     command = _command(source, seed, settings)
     recording: Path | None = None
     try:
-        with ExitStack() as stack:
+        with limit_wall_time(wall_limit) as limit, ExitStack() as stack:
+            if limit is not None and command:
+                limit.notes.append(f"reproduce: {command}")
             simulation = stack.enter_context(
                 Simulation(source, seed=seed, settings=settings, observers=tuple(explanations))
             )
@@ -87,6 +92,8 @@ def play(
                 simulation.add_observer(CsvWriter(stack.enter_context(whole(csv))))
             if folder is not None and record:
                 recording = folder.recording
+                if limit is not None:
+                    limit.notes.append(f"recording: {recording}")
                 _record(simulation, folder, source, settings, command)
             result = replace(simulation.run(), command=command)
             return result if folder is None else _keep(result, folder, record)

@@ -14,6 +14,7 @@ from eidrive_scenario.pytest_plugin.distributions import (
     pytest_testnodedown,
 )
 from eidrive_scenario.pytest_plugin.fixture import pytest_generate_tests, run_scenario
+from eidrive_scenario.pytest_plugin.hung_runs import pytest_handlecrashitem, pytest_unconfigure
 from eidrive_scenario.pytest_plugin.options import (
     pytest_addoption,
     pytest_configure,
@@ -28,9 +29,11 @@ __all__ = [
     "pytest_configure",
     "pytest_configure_node",
     "pytest_generate_tests",
+    "pytest_handlecrashitem",
     "pytest_report_header",
     "pytest_sessionfinish",
     "pytest_terminal_summary",
     "pytest_testnodedown",
+    "pytest_unconfigure",
     "run_scenario",
 ]

@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from eidrive_scenario.pytest_plugin import hung_runs
+
 MARKER = (
     "scenario(pattern, channel=None, seeds=None): run the test once for every scenario that matches the pattern "
     "(beside the test file, below the root, or in the library), channel and seed, through the fixture run_scenario"
@@ -64,6 +66,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help=f"most runs of a distribution that become tests, spread over its values (default: {_MOST_RUNS})",
     )
     group.addoption("--eidrive-out", metavar="DIR", help="keep recording.mcap and result.json of every run below DIR")
+    hung_runs.pytest_addoption(parser)
     parser.addini(
         "eidrive_paths",
         "folders whose .xosc files are tests (default: those given on the command line)",
@@ -98,6 +101,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker; note what was named on the command line."""
     config.addinivalue_line("markers", MARKER)
     config.stash[_GIVEN] = _given(config)
+    hung_runs.pytest_configure(config)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -149,4 +153,5 @@ def _given(config: pytest.Config) -> tuple[Path, ...]:
 @pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node: Any) -> None:
     """Tell a worker of pytest-xdist what was named on the command line: its own arguments do not say."""
+    hung_runs.pytest_configure_node(node)
     node.workerinput[_WORKER_KEY] = [str(path) for path in node.config.stash[_GIVEN]]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import InputError, Problem, SettingError, suggestion
+from eidrive_scenario.errors import EidriveError, ExtensionError, InputError, Problem, SettingError, suggestion
+from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
 from eidrive_scenario.pytest_plugin.options import Arm
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
@@ -62,6 +63,8 @@ def _play(
     from eidrive_scenario.experiments.single_run import play
     from eidrive_scenario.simulation import RunSettings
 
+    overrides = dict(overrides)
+    wall_limit = overrides.pop("wall_limit", wall_limit_of(config))
     known = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
         if keyword not in known:
@@ -69,7 +72,7 @@ def _play(
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
     below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None
-    return play(source, seed=arm.seed, settings=RunSettings(**settings), below=below)
+    return play(source, seed=arm.seed, settings=RunSettings(**settings), below=below, wall_limit=wall_limit)
 
 
 def _place(config: pytest.Config, source: Path) -> tuple[str, ...]:
@@ -126,4 +129,11 @@ def failure_text(error: BaseException) -> str | None:
     """The text of a failure that needs no traceback, or None for one that does."""
     if isinstance(error, ScenarioFailed | InputError):
         return str(error)
-    return None
+    if not isinstance(error, EidriveError):
+        return None
+    lines = [str(error), *getattr(error, "__notes__", ())]
+    if isinstance(error, ExtensionError):
+        from eidrive_scenario.attribution import traceback_from_extension
+
+        lines += ["", traceback_from_extension(error)]
+    return "\n".join(lines).rstrip()

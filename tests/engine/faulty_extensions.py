@@ -7,6 +7,7 @@ from pathlib import Path
 CODE = '''
 import itertools
 import math
+import os
 import sys
 import time
 
@@ -54,6 +55,11 @@ class HangsInC(Detector):
         if readings.time >= AFTER:
             sum(itertools.repeat(0))
         return Detections(readings.time)
+
+
+class EndsProcess(Detector):
+    def detect(self, readings):
+        os._exit(0)
 
 
 class HangsWhenBuilt(Detector):
@@ -280,6 +286,8 @@ class FaultyAction(ActionBehaviour):
                 self.stage.actors[next(iter(self.stage.actors))].motion.speed = math.nan
             case "raises":
                 raise LookupError("no such action")
+            case "fails below 5" if self.stage.actors["Ego"].motion.speed < 4.9:
+                raise ValueError("too slow")
         return Status.SUCCESS
 
 
@@ -304,6 +312,7 @@ POINTS = {
         "swallows": "Swallows",
         "sleeps": "Sleeps",
         "hangs_in_c": "HangsInC",
+        "ends_process": "EndsProcess",
         "hangs_when_built": "HangsWhenBuilt",
         "exits": "Exits",
         "exits_when_built": "ExitsWhenBuilt",
@@ -381,6 +390,7 @@ SCENARIO = """<?xml version="1.0"?>
     <ScenarioObject name="Ego">{vehicle}
       <ObjectController><Controller name="EgoStation"><Properties>
         <Property name="module" value="eidrive"/>
+        <Property name="detector" value="{detector}"/>
         <Property name="fusion" value="{fusion}"/>
         <Property name="planner" value="{planner}"/>
         <Property name="obey_signals" value="{signals}"/>
@@ -440,6 +450,7 @@ _START = """<PrivateAction><TeleportAction><Position><WorldPosition x="{0}" y="{
 def write_scenario(
     path: Path,
     *,
+    detector: str = "oracle",
     fusion: str = "average",
     planner: str = "route",
     criterion: str = "collision: {of: Ego}",
@@ -452,6 +463,7 @@ def write_scenario(
         "vehicle": _VEHICLE,
         "start_0": _START.format(0),
         "start_20": _START.format(20),
+        "detector": detector,
         "fusion": fusion,
         "planner": planner,
         "criterion": criterion,

@@ -1,0 +1,79 @@
+"""How `eidrive run` reports a run that was aborted, on standard error and as a line of `--json`."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import typer
+
+from eidrive_scenario.cli.failures import BROKEN, tell
+from eidrive_scenario.cli.streams import has_all_letters
+from eidrive_scenario.errors import EidriveError, SimulationError
+
+if TYPE_CHECKING:
+    from eidrive_scenario.wall_limit import Limit
+
+
+class RunFailures:
+    """Reports of the runs of one command.
+
+    scenario   as it was given
+    traceback  whether errors are raised on instead
+    """
+
+    def __init__(self, scenario: str, *, json: bool, traceback: bool) -> None:
+        self._scenario = scenario
+        self._json = json
+        self._traceback = traceback
+        self._seed: int | None = None
+        self._run: int | None = None
+
+    def begin(self, seed: int, run: int | None) -> None:
+        """Name the run that begins: its seed, and its number in a distribution."""
+        self._seed, self._run = seed, run
+
+    def report(self, error: EidriveError) -> None:
+        """Report the error of the present run; raise it where tracebacks are wanted."""
+        if self._traceback:
+            raise error
+        self._print_json(error)
+        tell(error)
+
+    def end_hung_run(self, limit: Limit, frame: FrameType | None) -> None:
+        """Report a run that executes this frame and cannot be interrupted, and end the process."""
+        from eidrive_scenario.hung_runs import describe_hung_run
+
+        error = describe_hung_run(limit, frame)
+        for note in limit.notes:
+            error.add_note(note)
+        try:
+            self._print_json(error)
+            tell(error)
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(BROKEN)
+
+    def report_dump(self, limit: float, dump: str) -> None:
+        """Report a run whose process ended with this dump of its stack."""
+        from eidrive_scenario.hung_runs import describe_dump
+
+        error = describe_dump(limit, dump)
+        self._print_json(error)
+        tell(error)
+
+    def _print_json(self, error: EidriveError) -> None:
+        """Print the run's object, where results are printed as such."""
+        if not self._json:
+            return
+        told = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
+        run = {} if self._run is None else {"run": self._run}
+        seed = {} if self._seed is None else {"seed": self._seed}
+        entry = {"scenario": self._scenario, **run, **seed, "passed": False, "end": "error", "error": told}
+        if notes := getattr(error, "__notes__", None):
+            entry["notes"] = notes
+        typer.echo(json.dumps(entry, ensure_ascii=not has_all_letters()))

@@ -1,0 +1,82 @@
+"""`eidrive run --wall-limit` in a process of its own, whose parent reports a run that no code in it can interrupt."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable
+from types import FrameType
+from typing import BinaryIO
+
+import typer
+
+from eidrive_scenario.cli.failures import BROKEN
+from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
+
+_FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of prctl(2)."""
+_allowed = False
+
+
+def allow() -> None:
+    """Let commands of this process use a process of their own: it is that of the command line."""
+    global _allowed
+    _allowed = True
+
+
+def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[str], None]) -> None:
+    """Continue in a child process; the parent waits for it and ends with its exit code, 3 where that is none of a run.
+
+    end     report a run that cannot be interrupted, in the child, with the frame that it executes
+    report  the same in the parent, with the stack that faulthandler wrote
+
+    Without `fork`, or in a process that is not the command line's, nothing is done but to limit runs that return to the
+    interpreter.
+    """
+    if not _allowed or not hasattr(os, "fork"):
+        return
+    dump = tempfile.TemporaryFile()  # noqa: SIM115 - stays open as long as the process
+    finished, finish = os.pipe()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    child = os.fork()
+    if child == 0:
+        os.close(finished)
+        os.setpgid(0, 0)
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+        atexit.register(os.write, finish, b".")
+        set_last_resort(LastResort(end, dump))
+        return
+    os.close(finish)
+    code = _exit_code(_wait(child), finished, dump, report)
+    raise typer.Exit(code)
+
+
+def _wait(child: int) -> int:
+    """Wait for a child and pass signals on to it. Returns its status."""
+    for name in _FORWARDED:
+        signal.signal(getattr(signal, name), lambda number, frame: os.kill(child, number))
+    return os.waitpid(child, 0)[1]
+
+
+def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str], None]) -> int:
+    dump.seek(0)
+    stack = dump.read().decode(errors="replace")
+    if stack:
+        report(stack)
+        return BROKEN
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        typer.echo(f"the run broke: its process was ended by {signal.Signals(-code).name}", err=True)
+        return BROKEN
+    if code != BROKEN and not os.read(finished, 1):
+        typer.echo("the run broke: an extension ended its process (os._exit)", err=True)
+        return BROKEN
+    return code

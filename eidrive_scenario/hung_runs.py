@@ -1,0 +1,81 @@
+"""Reports of runs that cannot be interrupted: from the frame of a thread, or from the stack that faulthandler wrote."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import traceback
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from types import FrameType
+
+from eidrive_scenario.attribution import wall_limit_error
+from eidrive_scenario.errors import ExtensionPlace, WallLimitError
+from eidrive_scenario.registry import GROUPS, registry, singular
+from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.wall_limit import Limit
+
+_DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
+
+
+def describe_hung_run(limit: Limit, frame: FrameType | None) -> WallLimitError:
+    """Return the error of a run that executes this frame, and close what its observers write."""
+    for one, _ in traceback.walk_stack(frame):
+        simulation = one.f_locals.get("self")
+        if isinstance(simulation, Simulation) and hasattr(simulation, "world"):
+            return simulation.describe_hang(limit.seconds, frame)
+    return wall_limit_error(frame, limit.seconds)
+
+
+def describe_dump(limit: float, dump: str) -> WallLimitError:
+    """Return the error of a run that ended with a dump of its stack by faulthandler."""
+    threads = re.split(r"^(?:Current thread|Thread) .*$", dump, flags=re.MULTILINE)
+    of_run = next((text for text in threads if "simulation.py" in text), dump)
+    calls = [(file, int(line), function) for file, line, function in _DUMPED.findall(of_run)]
+    for file, line, function in calls:
+        for kind, name, value in _extensions_at(file, line):
+            place = ExtensionPlace(kind, name, value, file=file, line=line, function=function)
+            return WallLimitError(limit, place)
+    where = "{}:{} in {}".format(*calls[0]) if calls else ""
+    return WallLimitError(limit, where=where)
+
+
+def _extensions_at(file: str, line: int) -> Iterator[tuple[str, str, str]]:
+    """The extensions of third parties whose class contains a line; without one, those of the module."""
+    of_module = []
+    for group in GROUPS:
+        known = registry(group)
+        for name in known:
+            value = known.value(name)
+            module, _, attribute = value.partition(":")
+            if _file_of(module) != file:
+                continue
+            of_module.append((singular(group), name, value))
+            if line in _lines_of(file).get(attribute.strip(), range(0)):
+                yield of_module[-1]
+    yield from of_module
+
+
+@cache
+def _file_of(module: str) -> str:
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return ""
+    return (spec.origin or "") if spec is not None else ""
+
+
+@cache
+def _lines_of(file: str) -> dict[str, range]:
+    """The lines of each class of a module."""
+    try:
+        tree = ast.parse(Path(file).read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return {}
+    return {
+        node.name: range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }

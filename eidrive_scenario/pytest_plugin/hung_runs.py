@@ -1,0 +1,153 @@
+"""The limit of the wall time of each run, and what becomes of a session in which a run cannot be interrupted.
+
+A run that returns to the interpreter fails as any other. Code that never does so ends its process after a time of
+grace: a worker of pytest-xdist is replaced and its test fails with the report that it left; without workers the session
+ends.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from argparse import ArgumentTypeError
+from pathlib import Path
+from types import FrameType
+from typing import IO, Any
+
+import pytest
+
+from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
+
+USUAL_LIMIT = 1800.0
+"""Default of the ini option `eidrive_wall_limit` [s]."""
+_ABORTED = 3
+_NO_LIMIT = "none"
+_WORKER_KEY = "eidrive_hung_runs"
+_reports = pytest.StashKey[Path]()
+"""Folder for the reports of workers."""
+_limit = pytest.StashKey["float | None"]()
+_before = pytest.StashKey["LastResort | None"]()
+_file = pytest.StashKey["IO[Any]"]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option and the ini option of the wall limit."""
+    group = parser.getgroup("eidrive", "OpenSCENARIO files")
+    group.addoption(
+        "--eidrive-wall-limit",
+        metavar="SECONDS|none",
+        type=_seconds,
+        help=f"maximum wall time of each run (default: the ini option eidrive_wall_limit, or {USUAL_LIMIT:g})",
+    )
+    parser.addini(
+        "eidrive_wall_limit",
+        f"maximum wall time of each run in seconds, or none (default: {USUAL_LIMIT:g})",
+        default=None,
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Read the limit, and let this process end if a run in it cannot be interrupted."""
+    config.stash[_limit] = _given_limit(config)
+    workerinput = getattr(config, "workerinput", None)
+    if workerinput is not None:
+        file: IO[Any] = (Path(workerinput[_WORKER_KEY]) / workerinput["workerid"]).open("wb", buffering=0)
+    else:
+        try:
+            file = os.fdopen(os.dup(2), "wb", buffering=0)
+        except OSError:  # the process has no standard error
+            return
+    config.stash[_file] = file
+    dump = None if _has_faulthandler_timeout(config) else file
+    config.stash[_before] = set_last_resort(LastResort(_Reporter(file), dump))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Take back what `pytest_configure` set."""
+    if _file in config.stash:
+        set_last_resort(config.stash[_before])
+        config.stash[_file].close()
+    if _reports in config.stash:
+        shutil.rmtree(config.stash[_reports], ignore_errors=True)
+
+
+def pytest_configure_node(node: Any) -> None:
+    """Tell a worker of pytest-xdist where to leave its report."""
+    if _reports not in node.config.stash:
+        node.config.stash[_reports] = Path(tempfile.mkdtemp(prefix="eidrive-hung-runs-"))
+    node.workerinput[_WORKER_KEY] = str(node.config.stash[_reports])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
+    """Add the report of a worker that ended to that of its test."""
+    node: Any = getattr(report, "node", None)
+    if node is None or _WORKER_KEY not in node.workerinput:
+        return
+    file = Path(node.workerinput[_WORKER_KEY]) / node.gateway.id
+    text = file.read_text(errors="replace").strip() if file.is_file() else ""
+    if text.startswith("Timeout"):
+        from eidrive_scenario.hung_runs import describe_dump
+
+        limit = node.config.stash[_limit] or 0.0
+        text = f"{describe_dump(limit, text)}\n\n{text}"
+    if text:
+        report.longrepr = f"{text}\n\n{report.longrepr}"
+
+
+def wall_limit_of(config: pytest.Config) -> float | None:
+    """Return the limit of the wall time of each run [s], or None."""
+    return config.stash[_limit]
+
+
+class _Reporter:
+    """Writes the report of a run that cannot be interrupted to a file, and ends the process."""
+
+    def __init__(self, file: IO[Any]) -> None:
+        self._file = file
+
+    def __call__(self, limit: Limit, frame: FrameType | None) -> None:
+        from eidrive_scenario.hung_runs import describe_hung_run
+
+        try:
+            report = "\n".join([str(describe_hung_run(limit, frame)), *limit.notes])
+            self._file.write(f"{report}\n".encode(errors="replace"))
+            sys.stdout.flush()
+        finally:
+            os._exit(_ABORTED)
+
+
+def _given_limit(config: pytest.Config) -> float | None:
+    given = config.getoption("eidrive_wall_limit")
+    if given is not None:
+        return None if given == _NO_LIMIT else float(given)
+    text = config.getini("eidrive_wall_limit")
+    if text is None:
+        return USUAL_LIMIT
+    try:
+        seconds = _seconds(str(text))
+    except ArgumentTypeError as error:
+        raise pytest.UsageError(f"eidrive_wall_limit: {error}") from None
+    return None if seconds == _NO_LIMIT else float(seconds)
+
+
+def _seconds(text: str) -> float | str:
+    if text.strip() == _NO_LIMIT:
+        return _NO_LIMIT
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds < float("inf"):
+        raise ArgumentTypeError(f"{text!r} is not a positive number of seconds, nor none")
+    return seconds
+
+
+def _has_faulthandler_timeout(config: pytest.Config) -> bool:
+    """Whether pytest dumps stacks after a time of its own: there is one such timer in a process."""
+    try:
+        return float(config.getini("faulthandler_timeout") or 0.0) > 0.0
+    except (KeyError, ValueError):
+        return False

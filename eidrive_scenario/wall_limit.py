@@ -1,0 +1,174 @@
+"""Limit of the wall time of a run, for runs that would never return.
+
+A watchdog thread interrupts the thread of the run by raising LimitReached in it: through a signal in the main thread,
+which also ends system calls that wait, else between two steps of the interpreter. It repeats that until the run ends,
+as code may catch the exception. Code that never returns to the interpreter cannot be interrupted: a process that is
+given a LastResort ends then. Nothing of the run depends on the clock before the limit is reached.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import math
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType, TracebackType
+from typing import IO, Any
+
+from eidrive_scenario.errors import Problem, SettingError, WallLimitError
+
+REPEAT = 1.0
+"""Time from one interruption to the next [s]."""
+GRACE = 3.0
+"""Time that a run gets to end after the first interruption before the last resort [s]."""
+_SIGNAL: int | None = getattr(signal, "SIGUSR2", None)
+
+
+class LimitReached(BaseException):
+    """Raised in a run whose limit is reached; Simulation turns it into WallLimitError."""
+
+
+@dataclass
+class Limit:
+    """The limit of a run in progress.
+
+    seconds  [s] of wall time
+    notes    lines that are added to the report of the last resort, such as the path of the recording
+    """
+
+    seconds: float
+    notes: list[str] = field(default_factory=list)
+    armed: bool = True
+    """Whether the run is interrupted; False once its error is on its way."""
+
+
+@dataclass(frozen=True)
+class LastResort:
+    """End of a process whose run cannot be interrupted.
+
+    end   called in the watchdog thread, with the limit and the topmost frame of the run; shall end the process
+    dump  file, kept open, for the stack of a process in which no thread can run; it is then ended with exit code 1
+    """
+
+    end: Callable[[Limit, FrameType | None], None]
+    dump: IO[Any] | None = None
+
+
+_of_thread = threading.local()
+_last_resort: LastResort | None = None
+
+
+def set_last_resort(resort: LastResort | None) -> LastResort | None:
+    """Let all later runs of this process end it if they cannot be interrupted; None does not. Returns the earlier."""
+    global _last_resort
+    before, _last_resort = _last_resort, resort
+    return before
+
+
+def check_wall_limit(seconds: float | None, origin: str = "wall_limit") -> None:
+    """Raise SettingError unless the limit is None or a positive number of seconds."""
+    if seconds is not None and not 0.0 < seconds < math.inf:
+        raise SettingError(Problem(f"{origin} is {seconds}", "give a positive number of seconds"))
+
+
+@contextmanager
+def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
+    """Bound the wall time of what this block does [s]; None does not, and an outer limit of the thread stays.
+
+    Raises WallLimitError when the limit is reached, SettingError for a limit that is not positive. Outside of the main
+    thread a system call that waits is not interrupted before it returns.
+    """
+    check_wall_limit(seconds)
+    if seconds is None or current_limit() is not None:
+        yield current_limit()
+        return
+    limit = _of_thread.limit = Limit(seconds)
+    watchdog = _Watchdog(limit)
+    try:
+        with watchdog:
+            yield limit
+    except LimitReached as error:
+        raise WallLimitError(seconds, where=running_line(error.__traceback__)) from error
+    finally:
+        _of_thread.limit = None
+
+
+def current_limit() -> Limit | None:
+    """Return the limit under which this thread runs, or None."""
+    limit: Limit | None = getattr(_of_thread, "limit", None)
+    return limit
+
+
+def running_line(trace: TracebackType | None) -> str:
+    """Return `file:line in function` of the innermost frame of a traceback, the watchdog's own aside."""
+    frames = [entry for entry in traceback.extract_tb(trace) if entry.filename != __file__]
+    return f"{frames[-1].filename}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
+
+
+class _Watchdog:
+    """Interrupts the thread that enters it, from the limit on."""
+
+    def __init__(self, limit: Limit) -> None:
+        self._limit = limit
+        self._target = threading.get_ident()
+        self._by_signal = _SIGNAL is not None and threading.current_thread() is threading.main_thread()
+        self._before: Callable[[int, FrameType | None], object] | int | None = None
+        self._ended = threading.Event()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._watch, name="eidrive wall limit", daemon=True)
+
+    def __enter__(self) -> None:
+        if self._by_signal and _SIGNAL is not None:
+            self._before = signal.signal(_SIGNAL, self._interrupted)
+        if _last_resort is not None and _last_resort.dump is not None:
+            deadline = self._limit.seconds + 2.0 * GRACE
+            faulthandler.dump_traceback_later(deadline, exit=True, file=_last_resort.dump)
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._limit.armed = False
+        with self._lock:
+            self._ended.set()
+        self._thread.join(REPEAT)
+        if not self._by_signal:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), None)
+        if _last_resort is not None and _last_resort.dump is not None:
+            faulthandler.cancel_dump_traceback_later()
+        if self._by_signal and _SIGNAL is not None:
+            signal.signal(_SIGNAL, signal.SIG_DFL if self._before is None else self._before)
+
+    def _watch(self) -> None:
+        if self._ended.wait(self._limit.seconds):
+            return
+        last = time.monotonic() + GRACE
+        while not self._ended.is_set():
+            self._interrupt()
+            if self._ended.wait(min(REPEAT, max(last - time.monotonic(), 0.01))):
+                return
+            if time.monotonic() >= last:
+                self._resort()
+                last = math.inf
+
+    def _interrupt(self) -> None:
+        with self._lock:
+            if self._ended.is_set() or not self._limit.armed:
+                return
+            if self._by_signal and _SIGNAL is not None:
+                signal.pthread_kill(self._target, _SIGNAL)
+            else:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), ctypes.py_object(LimitReached))
+
+    def _interrupted(self, number: int, frame: FrameType | None) -> None:
+        if self._limit.armed:
+            raise LimitReached
+
+    def _resort(self) -> None:
+        if _last_resort is not None:
+            _last_resort.end(self._limit, sys._current_frames().get(self._target))

@@ -1,0 +1,124 @@
+"""`eidrive run` of runs that an extension breaks: exit code, messages, lines of `--json`."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from faulty_extensions import install, line_of, write_scenario
+
+DISTRIBUTION = """<OpenSCENARIO>
+<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
+<ParameterValueDistribution><ScenarioFile filepath="s.xosc"/><Deterministic>
+<DeterministicSingleParameterDistribution parameterName="Speed">
+<DistributionSet><Element value="4"/><Element value="5"/></DistributionSet>
+</DeterministicSingleParameterDistribution></Deterministic></ParameterValueDistribution>
+</OpenSCENARIO>"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the package and a scenario."""
+    install(tmp_path)
+    write_scenario(tmp_path / "s.xosc")
+    return tmp_path
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    command = [sys.executable, "-m", "eidrive_scenario", "run", *arguments]
+    return subprocess.Popen(
+        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def run(folder: Path, *arguments: str) -> tuple[int, str, str]:
+    process = start(folder, *arguments)
+    out, err = process.communicate()
+    return process.returncode, out, err
+
+
+def test_sys_exit_of_detector_ends_the_run_with_3_and_others_go_on(folder: Path) -> None:
+    """Two seeds: each has its line of JSON and its message."""
+    code, out, err = run(folder, "s.xosc", "--detector", "exits", "--repeat", "2", "--json", "--out", "runs")
+    assert code == 3
+    entries = [json.loads(line) for line in out.splitlines()]
+    assert [(entry["seed"], entry["passed"], entry["end"]) for entry in entries] == [
+        (1, False, "error"),
+        (2, False, "error"),
+    ]
+    assert entries[0]["error"] == {
+        "kind": "detector",
+        "name": "exits",
+        "value": "faulty:Exits",
+        "subject": "station 'Ego'",
+        "time": 0.5,
+        "file": str(folder / "faulty.py"),
+        "line": line_of("sys.exit(0)"),
+        "function": "detect",
+        "problem": "SystemExit: 0 (an extension cannot end the process)",
+        "message": entries[0]["error"]["message"],
+    }
+    assert err.count("detector 'exits' (faulty:Exits) of station 'Ego' at t = 0.500 s: SystemExit: 0") == 2
+    assert "internal error" not in err
+    assert "please report" not in err
+    for note in entries[1]["notes"]:
+        if note.startswith("recording: "):
+            assert (folder / note.removeprefix("recording: ")).is_file()
+            break
+    else:
+        pytest.fail("no note names the recording")
+
+
+def test_runs_of_a_distribution_go_on_after_one_that_is_aborted(folder: Path) -> None:
+    """The action fails where the parameter is 4, and not where it is 5."""
+    text = write_scenario(folder / "s.xosc", action="fails below 5").read_text()
+    parameter = '<ParameterDeclaration name="Speed" parameterType="double" value="5"/>'
+    text = text.replace(
+        "<CatalogLocations/>", f"<ParameterDeclarations>{parameter}</ParameterDeclarations><CatalogLocations/>"
+    )
+    (folder / "s.xosc").write_text(text.replace('AbsoluteTargetSpeed value="5"', 'AbsoluteTargetSpeed value="$Speed"'))
+    (folder / "d.xosc").write_text(DISTRIBUTION)
+    code, out, err = run(folder, "d.xosc", "--json")
+    assert code == 3
+    entries = [json.loads(line) for line in out.splitlines()]
+    assert [(entry["run"], entry["end"]) for entry in entries] == [(0, "error"), (1, "stop trigger")]
+    assert "2 runs in d.xosc: 1 passed, 1 not passed" in err
+
+
+def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
+    code, out, err = run(folder, "s.xosc", "--detector", "hangs_in_c", "--wall-limit", "6", "--json")
+    assert code == 3
+    place = f"{folder / 'faulty.py'}:{line_of('sum(itertools.repeat(0))')}: detector 'hangs_in_c' (faulty:HangsInC)"
+    assert f"{place}: still running in detect after 6 s of wall time" in err
+    assert json.loads(out)["error"]["name"] == "hangs_in_c"
+
+
+def test_os_exit_of_extension_under_wall_limit_is_reported(folder: Path) -> None:
+    """Without a limit nobody is there to notice: the process is gone."""
+    code, _, err = run(folder, "s.xosc", "--detector", "ends_process", "--wall-limit", "600")
+    assert (code, err) == (3, "the run broke: an extension ended its process (os._exit)\n")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 3)])
+def test_signal_to_run_under_wall_limit_ends_it(folder: Path, number: signal.Signals, code: int) -> None:
+    process = start(folder, "s.xosc", "--detector", "sleeps", "--wall-limit", "600", "--out", "runs")
+    while not list(folder.glob("runs/*/recording.partial.mcap")):
+        assert process.poll() is None
+        time.sleep(0.1)
+    process.send_signal(number)
+    process.communicate()
+    assert process.returncode == code
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
+def test_wall_limit_that_is_not_positive_is_wrong_input(folder: Path, limit: str) -> None:
+    code, _, err = run(folder, "s.xosc", "--wall-limit", limit)
+    assert code == 2
+    assert "--wall-limit" in err

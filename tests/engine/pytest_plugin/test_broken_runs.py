@@ -1,0 +1,108 @@
+"""Runs that an extension breaks, as tests: all others finish, and the JUnit file is complete."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from faulty_extensions import install, line_of, write_scenario
+
+pytest_plugins = ["pytester"]
+
+LIMIT = 8
+"""Wall limit of each run [s]: far more than a sound run takes."""
+FAULTS: dict[str, dict[str, str]] = {
+    "hangs": {"detector": "hangs"},
+    "exits": {"detector": "exits"},
+    "nan": {"detector": "returns_nan"},
+    "none": {"planner": "planner_none"},
+    "criterion": {"criterion": "faulty: {fault: observe}"},
+}
+SOUND = [f"sound_{number}" for number in range(7)]
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """A folder with scenarios whose extensions are faulty, and with sound ones."""
+    monkeypatch.setenv("PYTHONPATH", str(install(pytester.mkdir("package"))), prepend=":")
+    folder = pytester.mkdir("xosc")
+    for name in SOUND:
+        write_scenario(folder / f"{name}.xosc")
+    for name, extensions in FAULTS.items():
+        write_scenario(folder / f"{name}.xosc", **extensions)  # type: ignore[arg-type]
+    pytester.makeini(f"[pytest]\neidrive_wall_limit = {LIMIT}\n")
+    return pytester
+
+
+def cases_of(junit: Path) -> dict[str, str]:
+    """Return the failure of each case by its name without channel and seed; "" for one that passed."""
+    cases = ElementTree.parse(junit).iter("testcase")
+    return {
+        str(case.get("name")).partition("[")[0]: "\n".join(
+            f"{entry.get('message')}\n{entry.text}" for entry in case if entry.tag in ("failure", "error")
+        )
+        for case in cases
+    }
+
+
+def test_faulty_extensions_over_two_workers_leave_other_runs_alone(project: pytest.Pytester) -> None:
+    """12 runs, 5 of which fail by a fault of an extension that the JUnit file names."""
+    arguments = ("xosc", "-n", "2", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-p", "no:cacheprovider")
+    result = project.runpytest_subprocess(*arguments)
+    result.assert_outcomes(passed=7, failed=5)
+    cases = cases_of(project.path / "junit.xml")
+    assert sorted(cases) == sorted([*FAULTS, *SOUND])
+    assert not any(cases[name] for name in SOUND)
+    code = re.escape(str(project.path / "package" / "faulty.py"))
+    at = r"of station 'Ego' at t = 0\.000 s: "
+    later = r"of station 'Ego' at t = 0\.500 s: "
+    for name, expected in {
+        "hangs": rf"{code}:\d+: detector 'hangs' \(faulty:Hangs\) {later}still running in detect after {LIMIT} s",
+        "exits": rf"{code}:{line_of('sys.exit(0)')}: detector 'exits' \(faulty:Exits\) {later}SystemExit: 0",
+        "nan": rf"detector 'returns_nan' \(faulty:ReturnsNaN\) {at}detect returned boxes with the value nan",
+        "none": rf"planner 'planner_none' \(faulty:PlannerNone\) {at}plan returned None",
+        "criterion": r"criterion 'faulty' \(faulty:FaultyCriterion\) at t = 0\.500 s: RuntimeError: this criterion",
+    }.items():
+        assert re.search(expected, cases[name]), cases[name]
+        assert "reproduce: eidrive run" in cases[name]
+        assert "recording.partial.mcap" in cases[name]
+
+
+def test_run_that_never_returns_to_python_fails_alone_over_workers(project: pytest.Pytester) -> None:
+    """The worker is replaced; what it left names the extension and its line."""
+    folder = project.mkdir("hung")
+    write_scenario(folder / "native.xosc", detector="hangs_in_c")
+    for name in SOUND[:3]:
+        write_scenario(folder / f"{name}.xosc")
+    arguments = ("hung", "-n", "2", "--junitxml", "junit.xml", "-p", "no:cacheprovider", "--eidrive-wall-limit", "6")
+    project.runpytest_subprocess(*arguments).assert_outcomes(passed=3, failed=1)
+    cases = cases_of(project.path / "junit.xml")
+    code = project.path / "package" / "faulty.py"
+    line = line_of("sum(itertools.repeat(0))")
+    assert f"{code}:{line}: detector 'hangs_in_c' (faulty:HangsInC): still running in detect" in cases["native"]
+    assert "crashed while running 'hung/native.xosc::native[seed1]'" in cases["native"]
+    assert not any(cases[name] for name in SOUND[:3])
+
+
+def test_wall_limit_option_wins_over_ini(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\neidrive_wall_limit = never\n")
+    refused = project.runpytest_subprocess("xosc/sound_0.xosc", "-p", "no:cacheprovider")
+    refused.stderr.fnmatch_lines(["*eidrive_wall_limit: 'never' is not a positive number of seconds, nor none*"])
+    sound = project.runpytest_subprocess("xosc/sound_0.xosc", "--eidrive-wall-limit", "none", "-p", "no:cacheprovider")
+    sound.assert_outcomes(passed=1)
+
+
+def test_wall_limit_of_run_scenario_fixture(project: pytest.Pytester) -> None:
+    project.makepyfile(
+        """
+        import pytest
+        from eidrive_scenario.api import WallLimitError
+
+        def test_hangs(run_scenario):
+            with pytest.raises(WallLimitError, match="the wall limit"):
+                run_scenario("xosc/hangs.xosc", wall_limit=2)
+        """
+    )
+    project.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)

@@ -1,0 +1,119 @@
+"""The limit of the wall time of a run: it interrupts Python code in any thread, and names what was running."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from faulty_extensions import install, line_of, write_scenario
+
+from eidrive_scenario.errors import InputError, WallLimitError
+from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.recording import read_recording
+from eidrive_scenario.registry import registry
+from eidrive_scenario.simulation import RunSettings, Simulation, run_file
+from eidrive_scenario.wall_limit import current_limit, limit_wall_time
+
+LONG = 3600.0
+"""A limit that no run here reaches [s]."""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The installed package of faulty extensions."""
+    folder = install(tmp_path_factory.mktemp("faulty"))
+    registry.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        yield folder
+    registry.cache_clear()
+    sys.modules.pop("faulty", None)
+
+
+def hung(tmp_path: Path, detector: str) -> WallLimitError:
+    """Return the error of a run that is interrupted; its time begins when all is loaded."""
+    simulation = Simulation(write_scenario(tmp_path / "s.xosc", detector=detector))
+    with pytest.raises(WallLimitError) as caught:
+        simulation.run(wall_limit=1.0)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("detector", "name", "time", "lines"),
+    [
+        ("hangs", "Hangs", 0.5, ("while readings.time >= AFTER:", "pass")),
+        ("swallows", "Swallows", 0.5, ("while readings.time >= AFTER:", "pass")),
+        ("sleeps", "Sleeps", 0.0, ("time.sleep(3600.0)",)),
+    ],
+)
+def test_hung_detector_is_interrupted_and_named(
+    package: Path, tmp_path: Path, detector: str, name: str, time: float, lines: tuple[str, ...]
+) -> None:
+    error = hung(tmp_path, detector)
+    assert error.place is not None
+    assert (error.place.kind, error.place.value, error.place.subject) == ("detector", f"faulty:{name}", "station 'Ego'")
+    assert (error.place.file, error.place.time) == (str(package / "faulty.py"), pytest.approx(time))
+    assert error.place.line is not None
+    assert (package / "faulty.py").read_text().splitlines()[error.place.line - 1].strip() in lines
+
+
+def test_hung_detector_in_another_thread_is_interrupted(package: Path, tmp_path: Path) -> None:
+    errors: list[WallLimitError] = []
+    thread = threading.Thread(target=lambda: errors.append(hung(tmp_path, "hangs")))
+    thread.start()
+    thread.join()
+    assert errors[0].place is not None
+    assert errors[0].place.name == "hangs"
+
+
+def test_hung_constructor_is_interrupted_while_loading(package: Path, tmp_path: Path) -> None:
+    with pytest.raises(WallLimitError, match=r"detector 'hangs_when_built'.*still running in __init__"):
+        run_file(write_scenario(tmp_path / "s.xosc", detector="hangs_when_built"), wall_limit=3.0)
+
+
+def test_hung_run_leaves_a_readable_partial_recording(package: Path, tmp_path: Path) -> None:
+    """0.5 s of frames at 0.05 s, and the hung tick is not among them."""
+    scenario = write_scenario(tmp_path / "s.xosc", detector="hangs")
+    with pytest.raises(WallLimitError) as caught:
+        play(scenario, out=tmp_path / "run", wall_limit=5.0)
+    (note,) = [note for note in caught.value.__notes__ if note.startswith("recording: ")]
+    recording = read_recording(Path(note.removeprefix("recording: ")))
+    assert [round(frame.view.time, 3) for frame in recording.frames()] == [round(0.05 * tick, 3) for tick in range(10)]
+
+
+def test_limit_that_is_not_reached_changes_nothing(package: Path, tmp_path: Path) -> None:
+    scenario = write_scenario(tmp_path / "s.xosc")
+    before = signal.getsignal(signal.SIGUSR2)
+    free, limited = run_file(scenario), run_file(scenario, wall_limit=LONG)
+    assert limited.trace_hash == free.trace_hash
+    assert limited.settings == free.settings
+    assert signal.getsignal(signal.SIGUSR2) is before
+    assert current_limit() is None
+    assert not [thread for thread in threading.enumerate() if thread.name == "eidrive wall limit" and thread.is_alive()]
+
+
+def test_limit_of_block_without_run_names_the_line(tmp_path: Path) -> None:
+    with pytest.raises(WallLimitError, match=rf"{__file__}:\d+ in test_limit_of_block"), limit_wall_time(0.2):
+        time.sleep(LONG)
+
+
+def test_outer_limit_stays_within_an_inner_one(tmp_path: Path) -> None:
+    with limit_wall_time(LONG) as outer, limit_wall_time(0.001) as inner:
+        assert inner is outer
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_limit_that_is_not_positive_is_refused(package: Path, tmp_path: Path, seconds: float) -> None:
+    with pytest.raises(InputError, match="give a positive number of seconds"):
+        run_file(write_scenario(tmp_path / "s.xosc"), settings=RunSettings(), wall_limit=seconds)
+
+
+def test_line_of_finds_the_package_line(package: Path) -> None:
+    text = (package / "faulty.py").read_text().splitlines()
+    assert "sys.exit(0)" in text[line_of("sys.exit(0)") - 1]
