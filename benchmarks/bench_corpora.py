@@ -28,6 +28,7 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.recording.csv_writer import neutralized
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model import Road
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -190,7 +191,9 @@ def main() -> None:
         with given.csv.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, list(dict.fromkeys(key for row in table for key in row)))
             writer.writeheader()
-            writer.writerows(table)
+            for row in table:
+                texts = {key: neutralized(value) for key, value in row.items() if isinstance(value, str)}
+                writer.writerow({**row, **texts})
 
 
 def compare(esmini: str, pairs: list[tuple[Play, float]]) -> None:

@@ -16,7 +16,7 @@ from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.output import whole
+from eidrive_scenario.recording.output import exclusive, whole
 from eidrive_scenario.recording.run_files import (
     PICTURES,
     RECORDING,
@@ -25,6 +25,7 @@ from eidrive_scenario.recording.run_files import (
     recording_in,
     result_of,
 )
+from eidrive_scenario.recording.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 from eidrive_scenario.wall_limit import limit_wall_time
@@ -87,6 +88,8 @@ def play(
             if place is not None:
                 folder = stack.enter_context(run_folder(place, simulation.resolved, own=out is None))
             if log is not None:
+                if str(log) != STANDARD_OUTPUT:
+                    stack.enter_context(exclusive(Path(log)))
                 simulation.add_observer(RunLog(log))
             if csv is not None:
                 simulation.add_observer(CsvWriter(stack.enter_context(whole(csv))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from eidrive_scenario.errors import InputError, Problem, SettingError
+from eidrive_scenario.recording.file_lock import FileLock
 
 PARTIAL = ".partial"
 """In the name of a file, before its suffix, while its run goes on; and afterwards, if that did not end."""
@@ -33,8 +35,8 @@ def whole(path: Path) -> Iterator[Path]:
     """Where to write a file that shall have its own name only once all of it is there.
 
     What was written before an error or an interruption is kept under the other name, so that nobody takes it for a
-    whole run; of wrong input nothing is kept. What is no plain file, such as /dev/stdout, is written as it is. Raises
-    SettingError if the place is a folder.
+    whole run; of wrong input nothing is kept. Two runs never write one file at the same time. What is no plain file,
+    such as /dev/stdout, is written as it is. Raises SettingError if the place is a folder, or another run writes there.
     """
     if os.path.isdir(path):
         raise SettingError(Problem("cannot write: Is a directory", "choose another place", str(path)))
@@ -42,10 +44,35 @@ def whole(path: Path) -> Iterator[Path]:
         yield path
         return
     unfinished = partial(path)
+    with exclusive(path):
+        try:
+            yield unfinished
+        except InputError:
+            with suppress(OSError):
+                unfinished.unlink()
+            raise
+        unfinished.replace(path)
+
+
+@contextmanager
+def exclusive(path: Path) -> Iterator[None]:
+    """Keep other processes from writing the same file through this function.
+
+    Raises SettingError if another one does. What is no plain file, and a place where no lock can be made, is not
+    locked.
+    """
+    if os.path.exists(path) and not os.path.isfile(path):
+        yield
+        return
+    lock = None
+    name = hashlib.sha256(path.name.encode(errors="surrogateescape")).hexdigest()[:16]
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = FileLock.acquire(path.parent / f".{name}.lock")
+        if lock is None:
+            raise SettingError(Problem("another run writes this file", "choose another file", str(path)))
     try:
-        yield unfinished
-    except InputError:
-        with suppress(OSError):
-            unfinished.unlink()
-        raise
-    unfinished.replace(path)
+        yield
+    finally:
+        if lock is not None:
+            lock.release()

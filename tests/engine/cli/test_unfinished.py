@@ -11,6 +11,7 @@ from typer.testing import Result
 
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.output import exclusive
 from eidrive_scenario.simulation import Simulation
 
 Eidrive = Callable[..., Result]
@@ -109,3 +110,16 @@ def test_a_link_or_a_pipe_is_written_as_it_is(eidrive: Eidrive, passing_by: Path
     assert table.read_text(encoding="utf-8").startswith("time,name,x")
     assert eidrive("run", passing_by, "--csv", null).exit_code == 0
     assert null.is_char_device()
+
+
+@pytest.mark.parametrize("option", ["--csv", "--log"])
+def test_a_file_that_another_run_writes_is_refused(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, option: str
+) -> None:
+    table = tmp_path / "table"
+    with exclusive(table):
+        result = eidrive("run", passing_by, option, table)
+    assert result.exit_code == 2
+    assert f"{table}: another run writes this file; choose another file" in result.stderr
+    assert eidrive("run", passing_by, option, table).exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["table"]

@@ -1,14 +1,17 @@
 """One row per actor and tick."""
 
 import csv
+import io
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import CsvWriter
+from eidrive_scenario.recording.csv_writer import csv_text, text_of_csv
 from eidrive_scenario.recording.frame import Frame
 
 
@@ -34,3 +37,46 @@ def test_rows(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="cannot write: Is a directory"):
         CsvWriter(tmp_path)
+
+
+NAMES = [
+    "=1+1",
+    "=cmd|' /C calc'!A0",
+    "+1",
+    "-2+3",
+    "@SUM(A1)",
+    "\t=1",
+    "\r=1",
+    "\n=1",
+    "\uff1d1+1",
+    "'=1",
+    "''",
+    "a;=1+1",
+    "a,=1",
+    'a"b',
+    " =1",
+    "Ego",
+    "it's",
+    "",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_in_csv_are_no_formulas_and_read_back(name: str) -> None:
+    line = f"0.0,{csv_text(name)},1.0\n"
+    (row,) = csv.reader(io.StringIO(line, newline=""))
+    assert len(row) == 3
+    assert not row[1].startswith(("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d"))
+    assert text_of_csv(row[1]) == name
+
+
+def test_table_of_an_actor_named_like_a_formula_holds_the_neutralized_name(
+    tmp_path: Path, make_frame: Callable[..., Frame]
+) -> None:
+    frame = make_frame(0)
+    named = replace(frame, view=replace(frame.view, names=("=1+1", "-x", *frame.view.names[2:])))
+    writer = CsvWriter(tmp_path / "run.csv")
+    writer.observe(named)
+    writer.close()
+    lines = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    assert [line.split(",")[1] for line in lines[1:3]] == ["'=1+1", "'-x"]
