@@ -43,10 +43,10 @@ from eidrive_scenario.storyboard.condition import (
     in_words,
     relation,
 )
-from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of
+from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of, same_way
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.environments import changed as changed_environment
-from eidrive_scenario.storyboard.motion import Motion, Place, Steering
+from eidrive_scenario.storyboard.motion import STEEPEST, Motion, Place, Steering
 from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve, trajectory_of
 from eidrive_scenario.storyboard.progress import Progress, Watch
 from eidrive_scenario.storyboard.random_way import any_branch, random_route
@@ -69,6 +69,7 @@ from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [
     "CLASSES",
+    "STEEPEST",
     "Absent",
     "ActionBehaviour",
     "Actor",
@@ -178,6 +179,7 @@ __all__ = [
     "relation",
     "resolve",
     "route_of",
+    "same_way",
     "suggestion",
     "traffic",
     "trajectory_of",

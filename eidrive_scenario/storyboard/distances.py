@@ -80,6 +80,21 @@ def distance(
     return _between(stage, a, b, frame, kind, value)
 
 
+def same_way(stage: Stage, a: str, b: str, frame: str) -> float:
+    """Return +1.0 where actor `b` points the way that `a` does, -1.0 where it comes towards it or away from it.
+
+    In the frames of lane and road that is along the road between them, else by their headings.
+    """
+    turn = stage.pose(b).h - stage.pose(a).h
+    if frame in ("lane", "road") and stage.roads is not None:
+        here, there = stage.location(a), stage.location(b)
+        runs = None if here is None or there is None else stage.roads.orientation(here, there)
+        if runs is not None and here is not None and there is not None:
+            lines = [stage.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
+            turn += lines[0] - lines[1] + (0.0 if runs > 0 else math.pi)
+    return 1.0 if math.cos(turn) >= 0.0 else -1.0
+
+
 def closing_speed(
     stage: Stage,
     a: str,

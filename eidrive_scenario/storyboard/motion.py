@@ -18,6 +18,8 @@ ACROSS = math.cos(math.radians(50.0))
 """An actor that is placed pointing further away from its lane than 50° crosses the road instead of following it."""
 
 
+STEEPEST = math.sqrt(0.5)
+"""Share of its speed that an actor goes sideways at most: as fast as forwards, at 45° to its lane."""
 APART = 0.01
 """A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
 
@@ -167,6 +169,7 @@ class Motion:
         if target is not None:
             self.pose = target
             self.location = None
+            self.end_of_road = False
             if self._landing:
                 self.land()
                 if self.roads is None:
@@ -205,6 +208,8 @@ class Motion:
                 if self.end_of_road:
                     self.speed = 0.0
                 self.end_of_road = True
+            else:
+                self.end_of_road = False
             if self._route is not None and there.road != here.road:
                 self._visit = self._route.visit(there.road, self._visit)
             self._begin_lap(here, there)

@@ -100,10 +100,14 @@ def test_relative_lanes_count_to_the_left_of_who_is_named(scene: Any, target: st
     assert (played.at(2.0).x - ego[1]) * (-1 if ego[0] > 0 else 1) == pytest.approx(40.0, abs=0.5)
 
 
-def test_who_stands_waits_and_who_crawls_slides_no_faster_than_it_drives(scene: Any) -> None:
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_who_stands_waits_and_who_crawls_goes_sideways_no_faster_than_forwards(scene: Any, speed: float) -> None:
     assert scene(2, ("Ego", change(lane(-2))), ego=(-1, 100, 0)).at(2.0).y == -2.0
-    played = scene(2, ("Ego", change(lane(-2), "linear", "time", 1)), ego=(-1, 100, 1))
-    assert played.at(1.0).y == pytest.approx(-3.0)
+    played = scene(2, ("Ego", change(lane(-2), "linear", "time", 1)), ego=(-1, 100, speed))
+    half = math.sqrt(0.5)
+    found = played.at(1.0)
+    assert (found.x, found.y) == pytest.approx((100.0 + math.copysign(half, speed), -2.0 - half))
+    assert found.yaw == pytest.approx(math.copysign(math.pi / 4, -speed))
 
 
 def test_a_lane_that_is_not_there_is_an_error(scene: Any) -> None:
@@ -259,9 +263,12 @@ def test_a_trajectory_takes_the_lateral_domain_and_leaves_the_speed_to_others(sc
 
 @pytest.mark.element("LateralDistanceAction")
 def test_a_distance_in_the_own_frame_does_not_make_the_actor_swing(scene: Any) -> None:
-    """Both drive beside each other; 2.5 m between cars of 2 m: middles 4.5 m apart, at once and then for good."""
+    """Both drive beside each other; 2.5 m between cars of 2 m: middles 4.5 m apart, at once and then for good.
+
+    Other looks the other way, so that its left is to the right of Ego.
+    """
     action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="2.5" freespace="true"
-      continuous="true" coordinateSystem="entity" displacement="rightToReferencedEntity"/>
+      continuous="true" coordinateSystem="entity" displacement="leftToReferencedEntity"/>
       </LateralAction></PrivateAction>"""
     played = scene(5, ("Ego", action), ego=(-1, 100.0, 20.0), other=(1, 100.0, -20.0))
     assert [row["Ego"].y for row in played.rows[1:]] == pytest.approx([played.at(0.0, "Other").y - 4.5] * 50)

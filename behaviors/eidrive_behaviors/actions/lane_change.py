@@ -11,6 +11,7 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.following import Tracker, follows, largest_curvature
 from eidrive_behaviors.actions.speed import dynamics_in_words
 from eidrive_scenario.api import (
+    STEEPEST,
     ActionBehaviour,
     Domain,
     Goal,
@@ -36,8 +37,8 @@ class LaneChangeAction(ActionBehaviour):
     """Takes the offset from the target lane's centre over to `targetLaneOffset` by the given dynamics.
 
     A distance is measured along the lane. The actor covers its speed's distance on the slanted way; a demand to go
-    sideways faster than that is cut to it. A standing actor waits. In the following mode `follow` a vehicle accelerates
-    sideways no more than its front wheels and its tyres allow, which brake as hard as its Performance says.
+    sideways faster than forwards is cut to that. A standing actor waits. In the following mode `follow` a vehicle
+    accelerates sideways no more than its front wheels and its tyres allow, which brake as hard as its Performance says.
     """
 
     domains = Domain.LATERAL
@@ -104,8 +105,9 @@ class LaneChangeAction(ActionBehaviour):
         if self._tracker is not None:
             followed = self._followed(self._tracker, wanted)
             wanted, rate = followed, rate if followed == wanted else None
-        if abs(wanted - self._offset) > way:
-            wanted, rate = self._offset + math.copysign(way, wanted - self._offset), None
+        most = STEEPEST * way
+        if abs(wanted - self._offset) > most:
+            wanted, rate = self._offset + math.copysign(most, wanted - self._offset), None
         self._offset = wanted
         arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
         self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way, rate=rate))

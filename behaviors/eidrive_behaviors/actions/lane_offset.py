@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Domain, LaneLocation, Steering, ValueTransition, model
+from eidrive_scenario.api import STEEPEST, ActionBehaviour, Domain, LaneLocation, Steering, ValueTransition, model
 
 STANDING = 1e-6
 
@@ -14,7 +14,8 @@ STANDING = 1e-6
 class LaneOffsetAction(ActionBehaviour):
     """Takes the offset from the lane's centre over to its target, as fast as `maxLateralAcc` lets it.
 
-    The shape runs over time; without `maxLateralAcc` the target holds at once. An offset relative to an entity counts
+    The shape runs over time; without `maxLateralAcc` the target holds at once. With it an actor goes sideways no faster
+    than forwards, so that one that stands waits. An offset relative to an entity counts
     from that entity's lateral place, left of its heading positive. A continuous action holds the offset, and follows
     the entity, until a younger action ends it.
     """
@@ -36,20 +37,27 @@ class LaneOffsetAction(ActionBehaviour):
             self._transition = ValueTransition(shape, start, target, 0.0)
         else:
             self._transition = ValueTransition.by_bend(shape, start, target, limit)
+        self._offset = start
 
     def update(self) -> Status:
         """The offset at the end of the step."""
         here = self.actor.motion.location
         if self.actor.driven or here is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
-        transition = self._transition
+        transition, speed, dt = self._transition, self.actor.motion.speed, self.stage.dt
+        if transition.extent > 0.0 and abs(speed) < STANDING:
+            return Status.RUNNING
         if transition.done and self.action.continuous:
             transition.target = self._target(here) * self._way(here)
-        offset = transition.advance(self.stage.dt)
-        done = transition.done
-        standing = abs(self.actor.motion.speed) < STANDING
-        heading = 0.0 if done or standing else None
-        self.actor.motion.steer(Steering(offset, heading, slows=False, rate=transition.slope))
+        offset, most = transition.advance(dt), STEEPEST * abs(speed) * dt
+        steep = transition.extent > 0.0 and abs(offset - self._offset) > most
+        if steep:
+            offset = self._offset + math.copysign(most, offset - self._offset)
+        self._offset = offset
+        done = transition.done and not steep
+        heading = 0.0 if done or abs(speed) < STANDING else None
+        rate = None if steep else transition.slope
+        self.actor.motion.steer(Steering(offset, heading, slows=steep, rate=rate))
         return Status.SUCCESS if done and not self.action.continuous else Status.RUNNING
 
     def _shape(self) -> model.DynamicsShape:

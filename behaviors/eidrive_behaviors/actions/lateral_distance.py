@@ -7,7 +7,7 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS
-from eidrive_scenario.api import ActionBehaviour, Domain, Steering, distance, frame_of, model
+from eidrive_scenario.api import STEEPEST, ActionBehaviour, Domain, Steering, distance, frame_of, model, same_way
 
 REACHED = 0.01
 """So near to the wanted distance an action that is not continuous ends [m]."""
@@ -15,6 +15,8 @@ REACHED = 0.01
 
 class LateralDistanceAction(ActionBehaviour):
     """Keeps `distance` metres beside an entity, on the side that `displacement` names (any: where the actor is).
+
+    Left and right are those of the other as it faces. Within limits an actor goes sideways no faster than forwards.
 
     Without a limit of acceleration the actor goes sideways as fast as `maxSpeed` lets it, without any at once. With
     one it follows like a critically damped spring with the stiffness of LongitudinalDistanceAction, 0.4 times the
@@ -33,10 +35,12 @@ class LateralDistanceAction(ActionBehaviour):
         if self.actor.motion.location is None:
             self.actor.motion.land()
         displacement = self.action.displacement
+        frame = frame_of(self.action.coordinate_system)
+        left = same_way(self.stage, self.actor.name, self.action.entity_ref, frame)
         if displacement is model.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY:
-            self._side = 1.0
+            self._side = left
         elif displacement is model.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY:
-            self._side = -1.0
+            self._side = -left
         else:
             self._side = -1.0 if self._beside() > 0.0 else 1.0
 
@@ -50,6 +54,11 @@ class LateralDistanceAction(ActionBehaviour):
         if math.isnan(error):
             return Status.RUNNING
         sideways = self._sideways(error, dt)
+        if self.action.dynamic_constraints is not None:
+            most = STEEPEST * abs(motion.speed) * dt
+            if abs(sideways) > most:
+                sideways = math.copysign(most, sideways)
+                self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
         motion.steer(Steering(offset, None if abs(motion.speed) > 1e-6 else 0.0))
         arrived = abs(error - sideways) < REACHED

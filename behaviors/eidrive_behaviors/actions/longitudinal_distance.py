@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Domain, distance, frame_of, model
+from eidrive_scenario.api import ActionBehaviour, Domain, distance, frame_of, model, same_way
 
 STIFFNESS = 0.4
 """Of the spring between actual and wanted distance, per m/s² of the largest acceleration [1/m]."""
@@ -16,6 +16,8 @@ REACHED = 0.1
 
 class LongitudinalDistanceAction(ActionBehaviour):
     """Keeps `distance` metres, or `timeGap` seconds of the other's speed, behind or ahead of an entity.
+
+    Trailing is behind the other as it faces, leading ahead of it, also where the two face each other.
 
     Without limits of acceleration the actor is moved to the wanted distance at once and takes the other's speed. With
     limits it follows like a critically damped spring whose stiffness goes with the limit, within the limits of
@@ -30,6 +32,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         self._acceleration = 0.0
         displacement = self.action.displacement
         self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
+        self._side *= self._same_way()
         if displacement is model.LongitudinalDisplacement.ANY:
             self._side = -1.0 if self._gap() < 0.0 else 1.0
 
@@ -49,7 +52,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         limits, motion = self.action.dynamic_constraints, self.actor.motion
         faster = _or_infinite(limits.max_acceleration if limits is not None else None)
         slower = _or_infinite(limits.max_deceleration if limits is not None else None)
-        other = self.stage.speed(self.action.entity_ref)
+        other = self._same_way() * self.stage.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
             motion.carry(error + other * self.stage.dt)
             motion.speed = other
@@ -81,6 +84,10 @@ class LongitudinalDistanceAction(ActionBehaviour):
             kind="longitudinal",
             freespace=self.action.freespace,
         )
+
+    def _same_way(self) -> float:
+        frame = frame_of(self.action.coordinate_system)
+        return same_way(self.stage, self.actor.name, self.action.entity_ref, frame)
 
     def _wanted(self) -> float:
         if self.action.time_gap is not None:

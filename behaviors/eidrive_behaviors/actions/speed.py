@@ -59,7 +59,7 @@ class SpeedAction(ActionBehaviour):
             self._tracker = speed_tracker(vehicle, start, backwards=start + target < 0.0)
 
     def _laid(self, start: float, target: float) -> ValueTransition:
-        _, faster, slower = self.actor.limits()
+        limit = slope_limit(start, target, *self.actor.limits()[1:])
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
             transition = ValueTransition.by_rate(shape, start, target, value)
@@ -67,7 +67,7 @@ class SpeedAction(ActionBehaviour):
             transition = ValueTransition(shape, start, target, duration_over(start, target, value))
         else:
             transition = ValueTransition(shape, start, target, value)
-        transition.limit_rate(faster if target > start else slower)
+        transition.limit_rate(limit)
         return transition
 
     def update(self) -> Status:
@@ -112,9 +112,9 @@ class SpeedAction(ActionBehaviour):
 
     def _approach(self, target: float) -> float:
         """The next speed after the transition, where a relative target moves on: as fast as the vehicle can."""
-        _, faster, slower = self.actor.limits()
         present = self.actor.motion.speed
-        return present + min(max(target - present, -slower * self.stage.dt), faster * self.stage.dt)
+        most = slope_limit(present, target, *self.actor.limits()[1:]) * self.stage.dt
+        return present + min(max(target - present, -most), most)
 
     def _target(self) -> float:
         top = self.actor.limits()[0]
@@ -139,6 +139,16 @@ class SpeedAction(ActionBehaviour):
             target = f"{self._relative.value:g} {sign} the speed of {self._relative.entity_ref}"
             target += ", kept up" if self._continuous else ""
         return f"speed to {target}, {dynamics_in_words(self._dynamics, 'm/s²')}"
+
+
+def slope_limit(start: float, target: float, faster: float, slower: float) -> float:
+    """Return the largest change of a signed speed [m/s²]: `slower` towards 0, `faster` away from it.
+
+    A change of the direction of travel does both, within the smaller.
+    """
+    if start * target < 0.0:
+        return min(faster, slower)
+    return faster if abs(target) > abs(start) else slower
 
 
 def duration_over(start: float, target: float, distance: float) -> float:

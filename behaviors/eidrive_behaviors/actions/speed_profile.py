@@ -9,6 +9,7 @@ from itertools import pairwise
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.speed import slope_limit
 from eidrive_scenario.api import ActionBehaviour, Domain, Goal, model
 
 TINY = 1e-6
@@ -48,6 +49,8 @@ class SpeedProfileAction(ActionBehaviour):
         self._pieces = straight(corners)
         if self.action.following_mode is model.FollowingMode.FOLLOW:
             up, down = self._limit("max_acceleration_rate"), self._limit("max_deceleration_rate")
+            if min(speed for _, speed in corners) < 0.0:
+                up, down = (down, up) if max(speed for _, speed in corners) <= 0.0 else (min(up, down),) * 2
             if 0.0 < up < math.inf and 0.0 < down < math.inf:
                 self._pieces = rounded(corners, up, down) or self._pieces
         self._elapsed = 0.0
@@ -78,7 +81,7 @@ class SpeedProfileAction(ActionBehaviour):
             target = min(max(entry.speed + base, -top), top)
             span = entry.time
             if span is None:
-                limit = self._limit("max_acceleration" if target > speed else "max_deceleration")
+                limit = slope_limit(speed, target, self._limit("max_acceleration"), self._limit("max_deceleration"))
                 span = abs(target - speed) / limit if math.isfinite(limit) and limit > 0.0 else 0.0
             if span > TINY:
                 corners.append((time + span, target))

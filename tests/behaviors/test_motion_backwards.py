@@ -1,0 +1,167 @@
+"""Actions of actors that drive backwards, stand, or look the other way than the one they refer to.
+
+Whatever is commanded, an actor moves where it looks, or straight back.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from eidrive_behaviors.actions.speed import slope_limit
+from street_scene import after
+
+LIMITS = '<DynamicConstraints maxAcceleration="4" maxDeceleration="4" maxSpeed="30"/>'
+
+
+def lateral(action: str) -> str:
+    return f"<PrivateAction><LateralAction>{action}</LateralAction></PrivateAction>"
+
+
+def longitudinal(action: str) -> str:
+    return f"<PrivateAction><LongitudinalAction>{action}</LongitudinalAction></PrivateAction>"
+
+
+def change(shape: str, dimension: str, value: float) -> str:
+    return lateral(f"""<LaneChangeAction>
+      <LaneChangeActionDynamics dynamicsShape="{shape}" dynamicsDimension="{dimension}" value="{value}"/>
+      <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction>""")
+
+
+def offset(value: float, acceleration: float = 1.0, continuous: str = "false") -> str:
+    return lateral(f"""<LaneOffsetAction continuous="{continuous}">
+      <LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="{acceleration}"/>
+      <LaneOffsetTarget><AbsoluteTargetLaneOffset value="{value}"/></LaneOffsetTarget></LaneOffsetAction>""")
+
+
+def beside(displacement: str = "any", limits: str = LIMITS) -> str:
+    return lateral(f"""<LateralDistanceAction entityRef="Other" distance="1" freespace="false" continuous="true"
+      coordinateSystem="lane" displacement="{displacement}">{limits}</LateralDistanceAction>""")
+
+
+def keep(displacement: str, limits: str = LIMITS) -> str:
+    return longitudinal(f"""<LongitudinalDistanceAction entityRef="Other" distance="20" freespace="false"
+      continuous="true" coordinateSystem="lane" displacement="{displacement}">{limits}</LongitudinalDistanceAction>""")
+
+
+def speed(value: float, dimension: str = "time", extent: float = 0.0) -> str:
+    shape = "linear" if extent else "step"
+    return longitudinal(f"""<SpeedAction>
+      <SpeedActionDynamics dynamicsShape="{shape}" dynamicsDimension="{dimension}" value="{extent}"/>
+      <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction>""")
+
+
+def largest_slip(played: Any, dt: float) -> float:
+    """Largest speed across the mean heading of a step [m/s]; nobody drives sideways."""
+    worst = 0.0
+    for before, now in pairwise(row["Ego"] for row in played.rows):
+        heading = before.yaw + 0.5 * math.remainder(now.yaw - before.yaw, math.tau)
+        across = (now.y - before.y) * math.cos(heading) - (now.x - before.x) * math.sin(heading)
+        worst = max(worst, abs(across) / dt)
+    return worst
+
+
+@pytest.mark.element("LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction")
+@pytest.mark.parametrize("value", [10.0, -10.0, 3.0, -3.0, 0.3, -0.3])
+@pytest.mark.parametrize(
+    "action",
+    [change("cubic", "time", 4.0), change("cubic", "distance", 40.0), offset(1.0), offset(1.0, 1.0, "true"), beside()],
+)
+def test_lateral_motion_leads_where_the_actor_looks_or_straight_back(scene: Any, action: str, value: float) -> None:
+    """Steps of 0.02 s; what is left are the steps in which a motion that is cut begins or ends, at half its angle."""
+    dt = 0.02
+    played = scene(6, ("Ego", action), ego=(-1, 300.0, value), other=(-1, 330.0, value), dt=dt)
+    cut = abs(value) * math.sin(math.pi / 8) if abs(value) < 1.0 else 0.0
+    assert largest_slip(played, dt) < 0.03 + cut
+
+
+@pytest.mark.element("LaneOffsetAction", "LateralDistanceAction", "LaneChangeAction")
+@pytest.mark.parametrize("action", [offset(1.0), beside(), change("cubic", "time", 4.0)])
+def test_lateral_motion_of_who_stands_waits_until_it_drives(scene: Any, action: str) -> None:
+    played = scene(8, ("Ego", action), ("Ego", speed(5.0), after(1.95)), ego=(-1, 300.0, 0.0), other=(-1, 330.0, 0.0))
+    assert {played.at(0.1 * n).y for n in range(21)} == {-2.0}
+    assert abs(played.at(8.0).y + 2.0) > 0.9
+
+
+def test_lane_offset_of_who_crawls_goes_sideways_as_fast_as_forwards(scene: Any) -> None:
+    """At 0.5 m/s, 0.354 m/s each way: for the 1 m that 1 m/s² would allow within 2.4 s it takes about 2.9 s."""
+    played = scene(6, ("Ego", offset(1.0)), ego=(-1, 100.0, 0.5))
+    end = played.when("action 0", "completeState")
+    assert end == pytest.approx(1.0 / (0.5 * math.sqrt(0.5)), abs=0.3)
+    steps = [now["Ego"].y - before["Ego"].y for before, now in pairwise(played.rows)]
+    assert max(steps) == pytest.approx(0.1 * 0.5 * math.sqrt(0.5))
+
+
+@pytest.mark.element("LongitudinalDistanceAction")
+@pytest.mark.parametrize("limits", [LIMITS, ""])
+@pytest.mark.parametrize(
+    ("displacement", "lane", "ahead"),
+    [
+        ("trailingReferencedEntity", -1, 20.0),
+        ("leadingReferencedEntity", -1, -20.0),
+        ("trailingReferencedEntity", 1, -20.0),
+        ("leadingReferencedEntity", 1, 20.0),
+    ],
+)
+def test_distance_to_who_faces_the_other_way_is_kept_on_the_side_that_it_calls_its_front(
+    scene: Any, limits: str, displacement: str, lane: int, ahead: float
+) -> None:
+    """Other drives towards +x in each case: forwards in lane -1, backwards in lane 1. Ego ends at its speed."""
+    other = (lane, 450.0, 10.0 if lane < 0 else -10.0)
+    played = scene(30, ("Ego", keep(displacement, limits)), ego=(-1, 440.0, 10.0), other=other)
+    ego, there = played.rows[-1]["Ego"], played.rows[-1]["Other"]
+    assert there.x - ego.x == pytest.approx(ahead, abs=0.05)
+    assert ego.speed == pytest.approx(10.0, abs=0.02)
+
+
+@pytest.mark.element("LateralDistanceAction")
+@pytest.mark.parametrize(
+    ("displacement", "lane", "y"),
+    [
+        ("leftToReferencedEntity", -1, -1.0),
+        ("rightToReferencedEntity", -1, -3.0),
+        ("leftToReferencedEntity", 1, 1.0),
+        ("rightToReferencedEntity", 1, 3.0),
+    ],
+)
+def test_lateral_distance_is_kept_on_the_side_that_the_other_calls_left(
+    scene: Any, displacement: str, lane: int, y: float
+) -> None:
+    other = (lane, 400.0, 10.0 if lane < 0 else -10.0)
+    played = scene(15, ("Ego", beside(displacement)), ego=(-1, 400.0, 10.0), other=other)
+    assert played.rows[-1]["Ego"].y == pytest.approx(y, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "limit"),
+    [(0, 10, 3.0), (10, 0, 8.0), (0, -10, 3.0), (-10, 0, 8.0), (-5, -10, 3.0), (-10, -5, 8.0), (10, -10, 3.0)],
+)
+def test_slope_limit_is_that_of_gaining_or_losing_speed(start: float, target: float, limit: float) -> None:
+    assert slope_limit(start, target, 3.0, 8.0) == limit
+
+
+@pytest.mark.element("SpeedAction")
+def test_braking_from_a_negative_speed_is_bounded_by_the_deceleration(scene: Any) -> None:
+    """From -20 m/s at 4 m/s² to rest takes 5 s, though 10 m/s² of acceleration would be there."""
+    played = scene(6, ("Ego", speed(0.0, "rate", 50.0)), ego=(-1, 500.0, -20.0), brakes=4.0)
+    assert played.at(2.0).speed == pytest.approx(-12.0)
+    assert played.when("action 0", "completeState") == pytest.approx(5.0)
+
+
+@pytest.mark.element("EndOfRoadCondition")
+def test_end_of_road_is_over_for_who_backs_away_from_it(run: Any) -> None:
+    """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s on it goes back."""
+    played = run(4.0, ("Ego", speed(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_note_end)
+    assert played.x("Ego")[round(1.5 / 0.05)] == pytest.approx(1000.0)
+    assert ENDS[1.5]
+    assert played.x("Ego")[-1] == pytest.approx(990.0, abs=0.3)
+    assert not ENDS[3.0]
+
+
+ENDS: dict[float, bool] = {}
+
+
+def _note_end(simulation: Any, frame: Any) -> None:
+    ENDS[round(frame.view.time, 3)] = simulation.storyboard.stage.actors["Ego"].end_of_road_since is not None
