@@ -98,9 +98,10 @@ class SensingHistory:
             self._until = until
         gap = min(until - self._until, WINDOW)
         if gap > 0:
-            rows = np.arange(until - gap, until) % WINDOW
-            self.rssi[rows] = 0.0
-            self.monitored[rows] = True
+            start = (until - gap) % WINDOW
+            for rows in (slice(start, start + gap), slice(0, max(0, start + gap - WINDOW))):
+                self.rssi[rows] = 0.0
+                self.monitored[rows] = True
             self._until = until
 
     def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Rows:

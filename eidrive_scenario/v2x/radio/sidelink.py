@@ -15,8 +15,8 @@ from eidrive_scenario.v2x.radio.access import EARLY, Access, QueueSettings, Tran
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import Gate
 from eidrive_scenario.v2x.radio.pscch import ControlChannel, Pdu
-from eidrive_scenario.v2x.radio.reception import PROPAGATION
-from eidrive_scenario.v2x.radio.resource_selection import Request, candidates
+from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
+from eidrive_scenario.v2x.radio.resource_selection import WINDOW, Request, candidates
 from eidrive_scenario.v2x.radio.sensing import SensingHistory
 from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
 
@@ -46,6 +46,16 @@ class Grant:
     used: int | None = None
 
 
+@dataclass
+class Sending:
+    """A transmission from `subframe`, the first that has not been sensed yet, to `end`, exclusive."""
+
+    row: int
+    transmission: Transmission
+    subframe: int
+    end: int
+
+
 class Sidelink(Access):
     """Resources are (subframe of the interval, subchannels); no station receives in a subframe in which it transmits.
 
@@ -73,15 +83,16 @@ class Sidelink(Access):
         self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
         self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
         self._grants: list[Grant | None] = [None] * len(names)
-        self._sent: list[deque[int]] = [deque() for _ in names]
+        self._sent: list[deque[range]] = [deque() for _ in names]
         """Subframes in which each station transmitted of late."""
-        self._choices = np.zeros(len(names))
+        self._choices: dict[str, int] = {}
+        """By name, how often each station has drawn a reselection counter, also before it left and came back."""
         self._next_event = np.full(len(names), math.inf)
         """When each station selects a resource, or starts its first message if it has one [s]."""
         self._scheduled = np.zeros(len(names), dtype=np.bool_)
         """Whether the event is the start of a message."""
-        self._pdus: list[Pdu] = []
-        """Parts of transmissions that have not been sensed yet."""
+        self._sending: list[Sending] = []
+        """Transmissions that have not been sensed to their end."""
         self._deaf_time, self._period_deaf = np.zeros(len(names)), np.zeros(len(names))
         """Time in which each station could not measure, as it transmitted itself [s]."""
         self._keys = self._sci_keys()
@@ -129,9 +140,11 @@ class Sidelink(Access):
         self._grants = [None if old is None else self._grants[old] for old in rows]
         self._sent = [deque() if old is None else self._sent[old] for old in rows]
         self._scheduled = moved(self._scheduled, rows, 0.0).astype(np.bool_)
-        for field, fresh in (("_choices", 0.0), ("_next_event", math.inf), ("_deaf_time", 0.0), ("_period_deaf", 0.0)):
+        for field, fresh in (("_next_event", math.inf), ("_deaf_time", 0.0), ("_period_deaf", 0.0)):
             setattr(self, field, moved(getattr(self, field), rows, fresh))
-        self._pdus = [Pdu(pdu.subframe, former[pdu.row], pdu.transmission) for pdu in self._pdus if pdu.row in former]
+        self._sending = [sending for sending in self._sending if sending.row in former]
+        for sending in self._sending:
+            sending.row = former[sending.row]
         for entry in self.on_air:
             if entry.control is not None:
                 entry.control = moved(entry.control, rows, PROPAGATION).astype(np.int8)
@@ -151,8 +164,8 @@ class Sidelink(Access):
             grant.counter = self._new_counter(row)
         transmission.reserves = grant.counter > 0
         length = round(transmission.duration / SUBFRAME)
-        self._pdus += [Pdu(subframe + part, row, transmission) for part in range(length)]
-        self._sent[row].extend(range(subframe, subframe + length))
+        self._sending.append(Sending(row, transmission, subframe, subframe + length))
+        self._sent[row].append(range(subframe, subframe + length))
         self._begin(row, transmission, subframe * SUBFRAME)
         self._next(row)
         return transmission
@@ -163,7 +176,7 @@ class Sidelink(Access):
         assert head is not None
         settings, ready = self._settings, float(self.ready[row])
         now = math.floor(ready / SUBFRAME + 1e-6)
-        free = self._sent[row][-1] + 1 if self._sent[row] else now
+        free = self._sent[row][-1].stop if self._sent[row] else now
         width, length = settings.extent(head.message.size)
         if grant is not None and grant.counter > 0 and grant.width >= width and grant.length >= length:
             # a message that waits for congestion control to let it go has been processed meanwhile
@@ -189,8 +202,8 @@ class Sidelink(Access):
         settings = self._settings
         self._sense(now * SUBFRAME)
         counter = self._new_counter(row)
-        sent = self._sent[row]
-        while sent and sent[0] < now - settings.interval_subframes:
+        sent, oldest = self._sent[row], now - settings.interval_subframes
+        while sent and sent[0].stop <= oldest:
             sent.popleft()
         request = Request(
             now=now,
@@ -202,25 +215,39 @@ class Sidelink(Access):
             uses=ATTEMPTS_PER_COUNT * counter,
             threshold=settings.pssch_rsrp_threshold_dbm,
         )
-        own = np.array([subframe for subframe in sent if subframe < now], dtype=np.int64)
+        own = [subframe for spell in sent for subframe in range(max(spell.start, oldest), min(spell.stop, now))]
         places = settings.subchannels - width + 1
         order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * places))
-        reported = candidates(request, self._history.of(row, now, own), order)
+        reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
         chosen = int(reported[math.floor(self._draw("choice", row) * len(reported))])
         start, band = divmod(chosen, places)
         return Grant(earliest + start, band, width, length, counter)
 
     def _new_counter(self, row: int) -> int:
-        self._choices[row] += 1
+        name = self.names[row]
+        self._choices[name] = self._choices.get(name, 0) + 1
         low, high = self._settings.counter_range
         return low + math.floor(self._draw("counter", row) * (high - low + 1))
 
     def _sense(self, until: float) -> None:
         """Let the stations receive the subframes that end by `until` [s]."""
-        due = [pdu for pdu in self._pdus if (pdu.subframe + 1) * SUBFRAME <= until + EARLY]
-        if not due:
-            return
-        self._pdus = [pdu for pdu in self._pdus if (pdu.subframe + 1) * SUBFRAME > until + EARLY]
+        ended = math.inf if math.isinf(until) else math.floor((until + EARLY) / SUBFRAME + 1e-9)
+        while self._sending:
+            first = min(sending.subframe for sending in self._sending)
+            if first >= ended:
+                return
+            self._receive(int(min(ended, first + WINDOW)))
+
+    def _receive(self, ended: int) -> None:
+        """Let the stations receive what is transmitted before subframe `ended`, at most one sensing window."""
+        due = [
+            Pdu(subframe, sending.row, sending.transmission)
+            for sending in self._sending
+            for subframe in range(sending.subframe, min(sending.end, ended))
+        ]
+        for sending in self._sending:
+            sending.subframe = max(sending.subframe, ended)
+        self._sending = [sending for sending in self._sending if sending.subframe < sending.end]
         due.sort(key=lambda pdu: (pdu.subframe, pdu.row))
         rows = np.array([pdu.row for pdu in due])
         widths = np.array([pdu.transmission.bands for pdu in due])
@@ -231,17 +258,18 @@ class Sidelink(Access):
                 power[place] += pdu.transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
         self._history.proceed(due[-1].subframe + 1)
-        subframes = self._history.receive(due, milliwatts / widths[:, None])
-        self._count_busy(subframes)
+        self._count_busy(self._history.receive(due, milliwatts / widths[:, None]))
         codes = self._control.decode(due, milliwatts / blocks, self._keys)
         for pdu, code in zip(due, codes, strict=True):
             before = pdu.transmission.control
-            pdu.transmission.control = code if before is None else np.where(before == 0, code, before)
+            pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
         codes[power < self.sensing_dbm] = PROPAGATION
-        reserving = [place for place, pdu in enumerate(due) if pdu.transmission.reserves]
+        self._note_reservations(due, codes, power - 10.0 * np.log10(SUBCARRIERS * blocks))
+
+    def _note_reservations(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
+        reserving = [place for place, pdu in enumerate(pdus) if pdu.transmission.reserves]
         if reserving:
-            rsrp = power[reserving] - 10.0 * np.log10(SUBCARRIERS * blocks[reserving])
-            self._history.reserve([due[place] for place in reserving], codes[reserving], rsrp)
+            self._history.reserve([pdus[place] for place in reserving], codes[reserving], rsrp[reserving])
 
     def _count_busy(self, subframes: NDArray[np.int64]) -> None:
         busy = self._history.busy(subframes, self._busy_above)
@@ -269,7 +297,7 @@ class Sidelink(Access):
         return joined(own[:, None], own[None, :])
 
     def _draw(self, purpose: str, row: int) -> float:
-        return uniform(self._key(purpose, row), int(self._choices[row]))
+        return uniform(self._key(purpose, row), self._choices[self.names[row]])
 
     def _key(self, purpose: str, row: int) -> int:
-        return key(self._seed, "sidelink", purpose, self.names[row], int(self._choices[row]))
+        return key(self._seed, "sidelink", purpose, self.names[row], self._choices[self.names[row]])
