@@ -279,7 +279,8 @@ def agent_settings(controller: Controller) -> AgentSettings:
         if name in data and data[name] not in known:
             message = f"unknown {name} {data[name]!r}"
             problems.append(Problem(message, suggestion(data[name], known), source, lines[name]))
-    if data.get("planner") == "conflict_area" and data.get("conflict_area") is None:
+    lacks_area = data.get("conflict_area") is None and ("conflict_area" in data or "conflict_area" not in lines)
+    if data.get("planner") == "conflict_area" and lacks_area:
         message = "planner 'conflict_area' has no area"
         problems.append(Problem(message, "add the property 'conflict_area'", source, lines["planner"]))
     try:

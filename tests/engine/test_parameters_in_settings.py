@@ -89,6 +89,51 @@ def test_distribution_varies_delay_and_results_tell_runs_apart(make: Make, tmp_p
     assert [link["mean_delay"] for link in links] == pytest.approx([0.0, 0.2, 0.4])
 
 
+def test_boolean_parameter_sets_whether_the_channel_carries_own_perception(make: Make) -> None:
+    path = make("{own_perception: $Own}")
+    assert ("Ego", "Ego") not in delays(path).links
+    assert ("Ego", "Ego") in delays(path, Own="true").links
+
+
+def test_text_parameter_names_a_criterion(make: Make) -> None:
+    path = make("none", ("collision: {of: Ego}", "collision: {of: Ego, name: $Profile}"))
+    assert "crash {of: x}" in [verdict.name for verdict in delays(path, Profile="crash {of: x}").criteria]
+
+
+def test_controller_of_a_catalog_uses_its_own_parameters(make: Make, tmp_path: Path) -> None:
+    header = '<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>'
+    catalog = (
+        f'<OpenSCENARIO>{header}<Catalog name="stacks"><Controller name="stack"><ParameterDeclarations>'
+        '<ParameterDeclaration name="West" parameterType="double" value="1"/></ParameterDeclarations><Properties>'
+        '<Property name="module" value="eidrive"/><Property name="planner" value="conflict_area"/>'
+        '<Property name="conflict_area" value="[$West, 32.0, ${$West / 10}, 10.5]"/></Properties></Controller>'
+        "</Catalog></OpenSCENARIO>"
+    )
+    (tmp_path / "stacks.xosc").write_text(catalog)
+    text = make("ideal").read_text()
+    start, end = text.index("<ObjectController>"), text.index("</ObjectController>")
+    path = make(
+        "ideal",
+        (
+            text[start:end],
+            '<ObjectController><CatalogReference catalogName="stacks" entryName="stack"><ParameterAssignments>'
+            '<ParameterAssignment parameterRef="West" value="$Gap"/></ParameterAssignments></CatalogReference>',
+        ),
+        ("<MiscObjectCatalog>", '<ControllerCatalog><Directory path="."/></ControllerCatalog><MiscObjectCatalog>'),
+    )
+    with Simulation(path, settings=RunSettings(parameters={"Gap": "28"})) as simulation:
+        area = simulation.stations.settings["Ego"].conflict_area
+    assert area is not None
+    assert area[0][0] == (28.0, 2.8)
+    (tmp_path / "stacks.xosc").write_text(catalog.replace("${$West", "${$Wst"))
+    with pytest.raises(InputError) as caught:
+        run_file(path)
+    (problem,) = caught.value.problems
+    assert str(problem).endswith(
+        "stacks.xosc:1: setting 'conflict_area.2': unknown parameter $Wst; did you mean 'West'?"
+    )
+
+
 def test_whole_channel_is_a_parameter(make: Make) -> None:
     path = make("$Profile")
     assert delays(path).channel == "ideal"
@@ -155,7 +200,7 @@ def test_controller_property_refers_inside_its_yaml(make: Make) -> None:
     for gap in (1.0, 2.0):
         scenario = load_scenario(path, {"Gap": str(gap)})
         with Simulation(scenario, settings=RunSettings(parameters={"Latency": "0.3"})) as simulation:
-            settings = simulation.stations._settings["Ego"]
+            settings = simulation.stations.settings["Ego"]
         assert settings.conflict_area is not None
         assert settings.conflict_area[0][0] == (gap, 4.5 * gap)
         assert settings.detector_latency == 0.3
