@@ -346,6 +346,14 @@ class Simulation:
             if name not in wanted:
                 yield f"no UserDefinedValueCondition asks for {name!r}; {suggestion(name, wanted)}"
 
+    def _late_warnings(self, time_s: float, end: str) -> Iterator[str]:
+        """Warnings that only the whole run can give."""
+        yield from map(str, self.storyboard.stage.warnings)
+        yield from self._mistaken_values()
+        yield from map(str, self._motionless.warnings(self.scenario, time_s))
+        if end not in _CUT_SHORT and not end.startswith("criterion: "):
+            yield from map(str, unstarted(self.storyboard.root, self.scenario, time_s, end))
+
     @attributed
     def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
         verdicts = [checked_verdict(criterion) for criterion in self.criteria]
@@ -357,10 +365,6 @@ class Simulation:
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update(self._false_tracks.metrics())
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
-        time_s = frame.view.time
-        self._warn(self._motionless.warnings(self.scenario, time_s))
-        if end not in _CUT_SHORT and not end.startswith("criterion: "):
-            self._warn(unstarted(self.storyboard.root, self.scenario, time_s, end))
         passed = all(verdict.passed for verdict in verdicts)
         timed_out = end == "time limit"
         return RunResult(
@@ -375,9 +379,7 @@ class Simulation:
             trace_hash=self._trace.hexdigest(),
             simulated_s=frame.view.time,
             wall_s=wall_s,
-            warnings=tuple(
-                dict.fromkeys([*self._warnings, *map(str, self.storyboard.stage.warnings), *self._mistaken_values()])
-            ),
+            warnings=tuple(dict.fromkeys([*self._warnings, *self._late_warnings(frame.view.time, end)])),
             parameters=dict(self.scenario.parameters),
             run=self._run,
             links=dict(self.stations.link_statistics(frame.view.time)),

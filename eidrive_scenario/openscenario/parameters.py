@@ -138,9 +138,9 @@ class Scope:
         used = {name: self.find(name) for name in expressions.parameters_of(body)}
         operands = {name: parameter.operand for name, parameter in used.items()}
         if expressions.joins_text(body, operands):
-            return expressions.concatenate(body, {name: parameter.text for name, parameter in used.items()})
+            return self._joined(body, {name: parameter.text for name, parameter in used.items()})
         if not EXPRESSION.fullmatch(text):
-            raise ExpressionError(f"{text!r} holds characters that an expression may not have", expressions.HELP)
+            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
         return expressions.evaluate(body, operands)
 
     def _evaluated(self, text: str, scalar: Scalar) -> Any:
