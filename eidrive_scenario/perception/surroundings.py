@@ -37,7 +37,7 @@ class Surroundings:
         if roads is not None:
             x0, y0, x1, y1 = roads.bounds()
             width, height = x1 - x0 + 2.0 * BEYOND, y1 - y0 + 2.0 * BEYOND
-            self._cell = max(CELL, math.sqrt(width * height / MOST_CELLS))
+            self._cell = max(CELL, math.sqrt(width * height / MOST_CELLS), max(width, height) / MOST_CELLS)
             self._corner = np.array([x0 - BEYOND, y0 - BEYOND])
             shape = (math.ceil(height / self._cell), math.ceil(width / self._cell))
             self._mask = np.full(shape, UNKNOWN, dtype=np.int8)

@@ -23,6 +23,10 @@ FLAT_PHASE = 1e7
 """Above this phase k²/(2c) a spiral is an arc to less than a millimetre, and Fresnel integrals lose their digits."""
 
 
+MOST_CUBICS = 20_000
+"""Cubics that stand for one poly3; those of a longer one than so many metres are longer than a metre."""
+
+
 class CurvePoint(NamedTuple):
     """A point of a reference line: x, y [m], heading [rad], curvature [1/m], metres of path per metre of s."""
 
@@ -177,7 +181,7 @@ def poly3(
         return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
 
     nodes, weights = np.polynomial.legendre.leggauss(5)
-    count = max(math.ceil(length), 4)
+    count = min(max(math.ceil(length), 4), MOST_CUBICS)
     edges = np.linspace(0.0, length, count * 4 + 1)
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])

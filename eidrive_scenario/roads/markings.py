@@ -19,6 +19,8 @@ APART = 0.24
 STRIPE = 0.5
 """Width of a crosswalk's stripes and of the gaps between them [m]."""
 MOST_STRIPES = 500
+MOST_DASHES = 20_000
+"""Dashes of one line; a line of more is drawn without gaps."""
 """Of one crosswalk."""
 FINEST = 0.01
 """Dashes and gaps that together are shorter than this look like a solid line [m]."""
@@ -55,7 +57,7 @@ def _mark_strips(
     kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
     for offset, width, dash, gap, phase in _lines(lane, mark):
         period = dash + gap
-        if dash > 0.0 and gap > 0.0 and period > FINEST:
+        if dash > 0.0 and gap > 0.0 and period > FINEST and end - start < MOST_DASHES * period:
             starts = np.arange(start + (phase if phase >= 0.0 else phase % period), end, period)
             if not starts.size:
                 continue

@@ -122,18 +122,20 @@ def cross_sections(network: RoadNetwork, road: Road, section: LaneSection, spaci
 
 def _keep(shape: Array, s: Array, kept: NDArray[np.bool_], first: int, last: int) -> None:
     """Mark the rows that a polyline through `shape` needs (Douglas and Peucker 1973)."""
-    if last - first < 2:
-        return
-    part = ((s[first + 1 : last] - s[first]) / (s[last] - s[first]))[:, None]
-    gap = np.abs(shape[first + 1 : last] - shape[first] - part * (shape[last] - shape[first])).max(axis=1)
-    worst = first + 1 + int(np.argmax(gap))
-    if gap.max() <= FLATNESS:
-        if s[last] - s[first] <= LONGEST:
-            return
-        worst = (first + last) // 2
-    kept[worst] = True
-    _keep(shape, s, kept, first, worst)
-    _keep(shape, s, kept, worst, last)
+    waiting = [(first, last)]
+    while waiting:
+        first, last = waiting.pop()
+        if last - first < 2:
+            continue
+        part = ((s[first + 1 : last] - s[first]) / (s[last] - s[first]))[:, None]
+        gap = np.abs(shape[first + 1 : last] - shape[first] - part * (shape[last] - shape[first])).max(axis=1)
+        worst = first + 1 + int(np.argmax(gap))
+        if gap.max() <= FLATNESS:
+            if s[last] - s[first] <= LONGEST:
+                continue
+            worst = (first + last) // 2
+        kept[worst] = True
+        waiting += [(first, worst), (worst, last)]
 
 
 def _lane_parts(

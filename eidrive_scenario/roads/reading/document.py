@@ -23,6 +23,7 @@ from eidrive_scenario.roads.model import (
     RoadType,
 )
 from eidrive_scenario.roads.polynomials import Polynomials
+from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.findings import Findings, line_of
 from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
@@ -64,6 +65,8 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
     signals = read_signals(elements, roads, findings)
     controllers = read_controllers(root, signals, findings)
     header = _read_header(root, findings)
+    if not findings.problems:
+        check_extent(roads, findings)
     if findings.problems:
         raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
     return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects), tuple(findings.flaws))
@@ -86,7 +89,7 @@ def _read_header(root: etree._Element, findings: Findings) -> Header:
     if header is None:
         return Header()
     revision = tuple(
-        int(text) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
+        int(text[:9]) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
     )
     return Header(
         name=header.get("name", ""),

@@ -7,11 +7,13 @@ from typing import Literal, overload
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Problem, RoadError, quoted, suggestion
 from eidrive_scenario.roads.flaws import Flaw
 
 MOST = 100
-"""Findings after which reading goes on in silence."""
+"""Problems after which reading ends."""
+MOST_DOUBTS = 5000
+"""Doubts that are remembered."""
 LARGEST = 1e9
 """Size of a number that is read at all: no length, place or coefficient of a road comes near it."""
 
@@ -29,19 +31,30 @@ class Findings:
         self.source = source
         self.problems: list[Problem] = []
         self.flaws: list[Flaw] = []
+        self._spent: dict[str, float] = {}
 
     def add(self, element: etree._Element | None, message: str, remedy: str) -> None:
         """Remember a problem at an element."""
         self.tell(Problem(message, remedy, self.source, line_of(element)))
 
     def tell(self, problem: Problem) -> None:
-        """Remember a problem."""
-        if len(self.problems) < MOST:
-            self.problems.append(problem)
+        """Remember a problem. Raises RoadError with all of them once there are too many."""
+        self.problems.append(problem)
+        if len(self.problems) >= MOST:
+            last = Problem(f"reading ends after {MOST} errors", "", self.source, problem.line)
+            raise RoadError([*sorted(self.problems, key=lambda one: one.line or 0), last])
+
+    def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
+        """Count what takes memory or time; the element that exceeds the limit is a problem."""
+        before = self._spent.get(what, 0.0)
+        self._spent[what] = before + amount
+        if before <= limit < before + amount:
+            self.add(element, f"the file has more than {limit:g} {what}", "split it")
 
     def doubt(self, element: etree._Element, rule: str, kind: str, message: str, remedy: str) -> None:
         """Remember what is against the standard, and is read all the same."""
-        self.flaws.append(Flaw(rule, kind, message, remedy, line_of(element)))
+        if len(self.flaws) < MOST_DOUBTS:
+            self.flaws.append(Flaw(rule, kind, message, remedy, line_of(element)))
 
     @overload
     def number(self, element: etree._Element, name: str) -> float: ...
@@ -64,7 +77,7 @@ class Findings:
         if abs(value) <= LARGEST:
             return value
         remedy = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
-        self.add(element, f"<{element.tag}> has {name}={text!r}", remedy)
+        self.add(element, f"<{element.tag}> has {name}={quoted(text)}", remedy)
         return 0.0
 
     def mark_number(self, element: etree._Element, name: str, default: float | None) -> float | None:
@@ -78,7 +91,7 @@ class Findings:
             value = math.nan
         if abs(value) <= LARGEST:
             return value
-        self.doubt_mark(element, f"<{element.tag}> has {name}={text!r}")
+        self.doubt_mark(element, f"<{element.tag}> has {name}={quoted(text)}")
         return default
 
     def doubt_mark(self, element: etree._Element, what: str) -> None:
@@ -113,11 +126,12 @@ class Findings:
             self._missing(element, name)
             return 0
         try:
-            if _plain(text):
-                return int(text)
+            value = int(text) if _plain(text) and len(text) < 100 else None
         except ValueError:
-            pass
-        self.add(element, f"<{element.tag}> has {name}={text!r}", "give a whole number")
+            value = None
+        if value is not None and abs(value) <= LARGEST:
+            return value
+        self.add(element, f"<{element.tag}> has {name}={quoted(text)}", "give a whole number")
         return 0
 
     def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
@@ -128,7 +142,7 @@ class Findings:
         if text == "end":
             return "end"
         if text is not None:
-            self.add(element, f"<{element.tag}> has {name}={text!r}", suggestion(text, ("start", "end")))
+            self.add(element, f"<{element.tag}> has {name}={quoted(text)}", suggestion(text, ("start", "end")))
         return None
 
     def flag(self, element: etree._Element, name: str) -> bool:

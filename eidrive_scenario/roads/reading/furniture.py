@@ -13,6 +13,12 @@ from eidrive_scenario.roads.reading.findings import Findings
 
 MOST_REPEATED = 100_000
 """How often an object may stand along its road."""
+MOST_PLACED = 200_000
+"""How often all objects together may stand along their roads."""
+LARGEST_OBJECT = 1e5
+"""Largest length, width, height or radius of an object [m]."""
+FURTHEST = 1e6
+"""Largest distance of an object or of its outline from its place at the road [m]."""
 
 
 def read_signals(
@@ -23,13 +29,17 @@ def read_signals(
     Some maps give one id to several signals: the second of them is found under 'id#2', and so on.
     """
     signals: dict[str, Signal] = {}
+    same_id: dict[str, int] = {}
     references: list[tuple[str, SignalPlace, etree._Element]] = []
     for number, element in elements:
         road = roads[number]
         for signal in element.iterfind("signals/signal"):
             read = _read_signal(road, signal, findings)
-            same = sum(1 for key in signals if key == read.id or key.startswith(f"{read.id}#"))
-            signals[f"{read.id}#{same + 1}" if same else read.id] = read
+            same = same_id[read.id] = same_id.get(read.id, 0) + 1
+            key = read.id
+            while key in signals:
+                key, same = f"{read.id}#{same}", same + 1
+            signals[key] = read
         for reference in element.iterfind("signals/signalReference"):
             references.append((findings.text(reference, "id"), _read_place(road, reference, findings), reference))
     for number, place, reference in references:
@@ -104,6 +114,13 @@ def _read_object(road: str, element: etree._Element, findings: Findings) -> Road
     def number(name: str) -> float:
         return findings.number(element, name, 0.0)
 
+    for name in ("length", "width", "height", "radius"):
+        if abs(number(name)) > LARGEST_OBJECT:
+            findings.add(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
+    for name in ("t", "zOffset"):
+        if abs(number(name)) > FURTHEST:
+            findings.add(element, f"<object> has {name}={number(name):g}", f"give a number within {FURTHEST:g}")
+    findings.spend(element, "objects", 1, MOST_PLACED)
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
     corners = [tuple(_read_corners(outline, findings)) for outline in outlines]
     return RoadObject(
@@ -137,6 +154,9 @@ def _read_corners(outline: etree._Element, findings: Findings) -> list[Corner]:
             x, y, z = findings.number(corner, "u"), findings.number(corner, "v"), findings.number(corner, "z", 0.0)
         else:
             continue
+        if max(abs(x), abs(y), abs(z)) > FURTHEST:
+            findings.add(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
+            continue
         corners.append(Corner(corner.tag == "cornerRoad", x, y, z, findings.number(corner, "height", 0.0)))
     return corners
 
@@ -152,6 +172,11 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, findings: Find
         message = f"<repeat> has length={length:g} and distance={distance:g}: the object stands there too often"
         findings.add(repeat, message, f"at most {MOST_REPEATED} of it are read")
         length = 0.0
+    step = distance if distance > 0.0 else 1.0
+    findings.spend(repeat, "places of objects", max(length, 0.0) / step, MOST_PLACED)
+    for name, own in (("width", "width"), ("height", "height"), ("t", "t"), ("zOffset", "zOffset")):
+        if max(map(abs, pair(name, own))) > LARGEST_OBJECT:
+            findings.add(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
     return Repeat(
         s=findings.number(repeat, "s", findings.number(element, "s", 0.0)),
         length=length,

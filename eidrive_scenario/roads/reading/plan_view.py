@@ -14,6 +14,8 @@ from eidrive_scenario.roads.reading.findings import Findings, line_of
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
 """Length of a road or geometry that is read at all [m]."""
+LONGEST_POLY3 = 2e5
+"""Length of all poly3 of a file, as one that is read takes memory by the metre [m]."""
 SHORTEST = 1e-9
 """Geometries of no length occur in real maps and are left out [m]."""
 
@@ -67,6 +69,7 @@ def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Cur
         return [curves.spiral(s, x, y, h, length, start, end, line)]
     if shape.tag == "poly3":
         a, b, c, d = (findings.number(shape, name) for name in "abcd")
+        findings.spend(geometry, "metres of poly3", length, LONGEST_POLY3)
         return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
     if shape.tag == "paramPoly3":
         return [_read_param_poly3(shape, s, x, y, h, length, findings)]

@@ -140,7 +140,7 @@ def test_dashes_stay_on_their_road(road: Text, map_of: Text, line: str) -> None:
 
 
 def test_a_crosswalk_has_a_bounded_number_of_stripes(road: Text, map_of: Text) -> None:
-    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((0, 0), (4, 0), (4, 9e8), (0, 9e8)))
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0"/>' for u, v in ((0, 0), (4, 0), (4, 9e5), (0, 9e5)))
     crosswalk = f'<object id="1" type="crosswalk" s="50" t="0"><outline>{corners}</outline></object>'
     network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<objects>{crosswalk}</objects>")))
     (paint,) = (mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")

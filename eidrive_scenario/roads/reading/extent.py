@@ -1,0 +1,64 @@
+"""Bounds on the extent of a road map, as everything that is laid over it takes memory by its size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from eidrive_scenario.errors import Problem
+from eidrive_scenario.roads.curves import Cubic
+from eidrive_scenario.roads.model import Road
+from eidrive_scenario.roads.reading.findings import Findings
+
+MAX_SHAPE = 1e6
+"""Largest distance of the points of one geometry from its start [m]."""
+MAX_WIDTH = 1e7
+"""Largest distance of a lane's edge from the reference line [m]."""
+MAX_HEIGHT = 1e5
+"""Largest height of a road [m]."""
+MAX_LANE_LENGTH = 2e7
+"""Length of all lanes together [m]."""
+_SHARES = (0.0, 0.5, 1.0)
+
+
+def check_extent(roads: Mapping[str, Road], findings: Findings) -> None:
+    """Report roads whose size nothing can be calculated with."""
+    lanes = 0.0
+    for road in roads.values():
+        _check_geometries(road, findings)
+        lanes += sum(section.length * len(section.lanes) for section in road.sections)
+        _check_cross_section(road, findings)
+    if lanes > MAX_LANE_LENGTH:
+        message = f"the lanes are {lanes:g} m long in total"
+        findings.tell(Problem(message, f"at most {MAX_LANE_LENGTH:g} m are read", findings.source, 1))
+
+
+def _check_geometries(road: Road, findings: Findings) -> None:
+    """A cubic may leave its start further than by its length, unlike all other geometries."""
+    for curve in road.reference.curves:
+        if not isinstance(curve, Cubic):
+            continue
+        points = [curve.at(share * curve.length) for share in _SHARES]
+        away = max(math.hypot(point.x - curve.x, point.y - curve.y) for point in points)
+        if not away <= MAX_SHAPE:
+            message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
+            place = curve.line or road.line
+            findings.tell(Problem(message, f"at most {MAX_SHAPE:g} m are read", findings.source, place))
+
+
+def _check_cross_section(road: Road, findings: Findings) -> None:
+    for section in road.sections:
+        for share in _SHARES:
+            ds = share * section.length
+            offset = road.lane_offset.value(section.s + ds)
+            outermost = (section.lanes[min(section.lanes)], section.lanes[max(section.lanes)])
+            edges = [abs(offset + lane.side * lane.outer.value(ds)) for lane in outermost]
+            if not max(edges) <= MAX_WIDTH:
+                message = f"a lane of road {road.id!r} reaches {max(edges):g} m from the reference line"
+                findings.tell(Problem(message, f"at most {MAX_WIDTH:g} m are read", findings.source, road.line))
+                return
+            height = abs(road.elevation.value(section.s + ds))
+            if not height <= MAX_HEIGHT:
+                message = f"road {road.id!r} is {height:g} m high"
+                findings.tell(Problem(message, f"at most {MAX_HEIGHT:g} m are read", findings.source, road.line))
+                return
