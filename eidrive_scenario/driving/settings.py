@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
@@ -15,6 +15,7 @@ from eidrive_scenario.perception.tracking import TrackerSettings, tracker_settin
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,
+    MAX_RANGE,
     AnySensorSettings,
     MountSetting,
     SensorSettings,
@@ -44,6 +45,9 @@ _OF_THE_TRUTH_SENSOR = ("range", "field_of_view", "visibility", "mount")
 
 PARTIAL_LIFETIME = 1.5
 """How long a report counts that leaves out what has not changed [s]; as `max_age` of covariance intersection."""
+
+MAX_TIME = 1e4
+"""Largest latency, lifetime and clock error [s]."""
 
 Polygon = tuple[tuple[float, float], ...]
 
@@ -148,7 +152,7 @@ class AgentSettings(Settings):
     module: Literal["eidrive"] = "eidrive"
     detector: str = "oracle"
     detector_settings: dict[str, Any] = Field(default_factory=dict)
-    detector_latency: NonNegativeFloat = 0.0
+    detector_latency: Annotated[float, Field(ge=0.0, le=MAX_TIME)] = 0.0
     tracker: Annotated[TrackerSettings | None, BeforeValidator(tracker_setting)] = None
     localization: Literal["oracle", "ekf"] = "oracle"
     obey_signals: bool = False
@@ -156,22 +160,22 @@ class AgentSettings(Settings):
     fusion_settings: dict[str, Any] = Field(default_factory=dict)
     planner: str | None = None
     sensors: Annotated[dict[str, AnySensorSettings] | None, BeforeValidator(_sensors)] = None
-    range: PositiveFloat | None = None
+    range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] | None = None
     field_of_view: Annotated[float, Field(gt=0.0, le=360.0)] | None = None
     visibility: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     mount: MountSetting = None
     cooperates_with: Annotated[tuple[str, ...] | None, BeforeValidator(_names)] = None
-    message_rate: PositiveFloat | None = None
-    report_timeout: PositiveFloat = 1.0
-    antenna_height: PositiveFloat | None = None
+    message_rate: Annotated[float, Field(ge=1e-3, le=10_000.0)] | None = None
+    report_timeout: Annotated[float, Field(gt=0.0, le=MAX_TIME)] = 1.0
+    antenna_height: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     messages: Annotated[tuple[Literal["cpm", "cam"], ...], BeforeValidator(_names)] = ("cpm",)
     generation: Literal["each_tick", "rate", "etsi"] | None = None
-    mtu: Annotated[int, Field(ge=200)] = 1400
-    security_bytes: NonNegativeInt = 0
-    clock_offset: float = 0.0
-    clock_drift: float = 0.0
+    mtu: Annotated[int, Field(ge=200, le=1_000_000)] = 1400
+    security_bytes: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    clock_offset: Annotated[float, Field(ge=-MAX_TIME, le=MAX_TIME)] = 0.0
+    clock_drift: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0
     asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
-    target_speed: NonNegativeFloat | None = None
+    target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
     conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
     conflict_brake: PositiveFloat = 5.0
     conflict_hold: NonNegativeFloat = 1.05

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveInt, model_validator
 from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
@@ -63,7 +63,7 @@ class TrackerSettings(Settings):
     confirm: tuple[PositiveInt, PositiveInt] = (2, 3)
     confirm_existence: float = Field(default=0.5, ge=0.0, lt=1.0)
     delete_existence: float = Field(default=0.05, ge=0.0, lt=1.0)
-    coast: NonNegativeFloat = 0.5
+    coast: float = Field(default=0.5, ge=0.0, le=1e4)
     gate: float = Field(default=0.99, gt=0.0, lt=1.0)
     detection_probability: float = Field(default=DETECTION_PROBABILITY, gt=0.0, lt=1.0)
     birth_density: float = Field(default=BIRTH_DENSITY, gt=0.0, le=1e6)

@@ -5,9 +5,18 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from eidrive_scenario.settings import Settings
+
+Rate = Annotated[float, Field(ge=0.01, le=10_000.0)]
+"""Readings per second [Hz]."""
+MAX_RANGE = 1e5
+"""Largest range of a sensor [m]."""
+MAX_RAYS = 2_000_000
+"""Maximum number of rays of one reading: of a revolution of a LiDAR, or between two readings."""
+MAX_PIXELS = 32_000_000
+"""Maximum number of pixels that are computed for one picture, those of supersampling counted."""
 
 MountName = Literal["front", "left", "right", "back", "roof"]
 
@@ -15,11 +24,11 @@ MountName = Literal["front", "left", "right", "back", "roof"]
 class Mount(Settings):
     """Where a sensor sits in the actor's frame [m] and where it looks [degrees]: yaw to the left, pitch downwards."""
 
-    x: float
-    y: float
-    z: float
-    yaw: float = 0.0
-    pitch: float = 0.0
+    x: Annotated[float, Field(ge=-1000.0, le=1000.0)]
+    y: Annotated[float, Field(ge=-1000.0, le=1000.0)]
+    z: Annotated[float, Field(ge=-1000.0, le=1000.0)]
+    yaw: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
+    pitch: Annotated[float, Field(ge=-3600.0, le=3600.0)] = 0.0
 
 
 def _mount(value: Any) -> Any:
@@ -38,7 +47,7 @@ class SensorSettings(Settings):
     """What all sensors have: a mount (None is the usual one of the kind) and a rate (None is each tick)."""
 
     mount: MountSetting = None
-    rate: PositiveFloat | None = None
+    rate: Rate | None = None
     """[Hz]"""
 
 
@@ -51,7 +60,7 @@ class TruthSettings(SensorSettings):
     """
 
     kind: Literal["truth"] = "truth"
-    range: PositiveFloat = 50.0
+    range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] = 50.0
     field_of_view: float = Field(default=360.0, gt=0.0, le=360.0)
     visibility: float = Field(default=0.1, gt=0.0, le=1.0)
 
@@ -59,8 +68,8 @@ class TruthSettings(SensorSettings):
 class NoiseSettings(Settings):
     """Of a camera's sensor, in electrons: what a pixel holds when it is full, and the deviation of reading it."""
 
-    full_well: PositiveFloat = 12_000.0
-    read_noise: NonNegativeFloat = 4.0
+    full_well: Annotated[float, Field(ge=1.0, le=1e9)] = 12_000.0
+    read_noise: Annotated[float, Field(ge=0.0, le=1e6)] = 4.0
 
 
 def _distortion(value: Any) -> Any:
@@ -94,13 +103,13 @@ class CameraSettings(SensorSettings):
     height: int = Field(default=600, ge=2, le=8192)
     fov: float = Field(default=100.0, gt=0.0, lt=180.0)
     distortion: Annotated[tuple[float, float, float, float, float], BeforeValidator(_distortion)] = (0.0,) * 5
-    near: PositiveFloat = 0.1
-    far: PositiveFloat = 500.0
+    near: Annotated[float, Field(ge=1e-3, le=MAX_RANGE)] = 0.1
+    far: Annotated[float, Field(ge=1e-3, le=MAX_RANGE)] = 500.0
     noise: Annotated[NoiseSettings | None, BeforeValidator(_noise)] = NoiseSettings()
-    f_number: PositiveFloat = 1.6
-    exposure_time: PositiveFloat | None = None
+    f_number: Annotated[float, Field(ge=0.1, le=1000.0)] = 1.6
+    exposure_time: Annotated[float, Field(ge=1e-9, le=100.0)] | None = None
     gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None
-    longest_exposure: PositiveFloat = 0.03
+    longest_exposure: Annotated[float, Field(ge=1e-9, le=100.0)] = 0.03
     highest_gain: float = Field(default=36.0, ge=0.0, le=80.0)
     lens_drops: bool = True
     supersampling: int = Field(default=1, ge=1, le=4)
@@ -109,6 +118,10 @@ class CameraSettings(SensorSettings):
     def _something_between(self) -> CameraSettings:
         if self.near >= self.far:
             raise ValueError(f"near {self.near:g} is not before far {self.far:g}")
+        if self.width * self.height * self.supersampling**2 > MAX_PIXELS:
+            raise ValueError(f"more than {MAX_PIXELS} pixels with supersampling: lower width, height or supersampling")
+        if any(abs(coefficient) > 1e3 for coefficient in self.distortion):
+            raise ValueError("a coefficient of the distortion is beyond 1000")
         return self
 
     @model_validator(mode="after")
@@ -152,17 +165,17 @@ class LidarSettings(SensorSettings):
     """
 
     kind: Literal["lidar"] = "lidar"
-    channels: PositiveInt = 32
-    range: PositiveFloat = 50.0
-    points_per_second: PositiveInt = 100_000
-    rotation: PositiveFloat = 20.0
+    channels: Annotated[int, Field(ge=1, le=4096)] = 32
+    range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] = 50.0
+    points_per_second: Annotated[int, Field(ge=1, le=100_000_000)] = 100_000
+    rotation: Annotated[float, Field(ge=0.1, le=1000.0)] = 20.0
     upper_fov: float = Field(default=10.0, ge=-90.0, le=90.0)
     lower_fov: float = Field(default=-30.0, ge=-90.0, le=90.0)
     field_of_view: float = Field(default=360.0, gt=0.0, le=360.0)
     elevations: tuple[Annotated[float, Field(ge=-90.0, le=90.0)], ...] | None = None
-    attenuation: NonNegativeFloat = 0.004
-    range_noise: NonNegativeFloat = 0.02
-    ten_percent_range: PositiveFloat = 150.0
+    attenuation: Annotated[float, Field(ge=0.0, le=100.0)] = 0.004
+    range_noise: Annotated[float, Field(ge=0.0, le=10.0)] = 0.02
+    ten_percent_range: Annotated[float, Field(ge=0.1, le=MAX_RANGE)] = 150.0
     dropoff: float = Field(default=0.0, ge=0.0, lt=1.0)
     dropoff_intensity: float = Field(default=0.0, ge=0.0, le=1.0)
     dropoff_dark: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -174,6 +187,9 @@ class LidarSettings(SensorSettings):
             raise ValueError(f"lower_fov {self.lower_fov:g} lies above upper_fov {self.upper_fov:g}")
         if self.elevations is not None and len(self.elevations) != self.channels:
             raise ValueError(f"{self.channels} channels need as many elevations, found {len(self.elevations)}")
+        rays = max(self.points_per_second / self.rotation, self.points_per_second / (self.rate or math.inf))
+        if rays > MAX_RAYS:
+            raise ValueError(f"{rays:.3g} rays in one reading are more than {MAX_RAYS}: lower points_per_second")
         columns = self.points_per_second / self.channels / self.rotation
         if columns < 1.0:
             raise ValueError(
@@ -193,11 +209,11 @@ class GnssSettings(SensorSettings):
     """
 
     kind: Literal["gnss"] = "gnss"
-    rate: PositiveFloat | None = 10.0
-    position_noise: NonNegativeFloat = 0.3
-    height_noise: NonNegativeFloat = 0.6
-    bias: NonNegativeFloat = 0.0
-    bias_walk: NonNegativeFloat = 0.0
+    rate: Rate | None = 10.0
+    position_noise: Annotated[float, Field(ge=0.0, le=1e4)] = 0.3
+    height_noise: Annotated[float, Field(ge=0.0, le=1e4)] = 0.6
+    bias: Annotated[float, Field(ge=0.0, le=1e4)] = 0.0
+    bias_walk: Annotated[float, Field(ge=0.0, le=1e4)] = 0.0
     oracle: bool = False
 
 
@@ -211,12 +227,12 @@ class ImuSettings(SensorSettings):
     """
 
     kind: Literal["imu"] = "imu"
-    accelerometer_noise: NonNegativeFloat = 0.02
-    gyroscope_noise: NonNegativeFloat = 0.002
-    accelerometer_bias: NonNegativeFloat = 0.0
-    gyroscope_bias: NonNegativeFloat = 0.005
-    accelerometer_walk: NonNegativeFloat = 0.0
-    gyroscope_walk: NonNegativeFloat = 1e-4
+    accelerometer_noise: Annotated[float, Field(ge=0.0, le=100.0)] = 0.02
+    gyroscope_noise: Annotated[float, Field(ge=0.0, le=10.0)] = 0.002
+    accelerometer_bias: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    gyroscope_bias: Annotated[float, Field(ge=0.0, le=10.0)] = 0.005
+    accelerometer_walk: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    gyroscope_walk: Annotated[float, Field(ge=0.0, le=10.0)] = 1e-4
     oracle: bool = False
 
 
