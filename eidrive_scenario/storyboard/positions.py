@@ -20,6 +20,12 @@ from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 
 FIXED = (model.WorldPosition, model.RoadPosition, model.LanePosition, model.GeoPosition)
 """Positions that mean the same place all the time."""
+NESTING = (model.RoutePosition, model.TrajectoryPosition)
+"""Positions along a route or trajectory, whose own points are positions."""
+MAX_DEPTH = 10
+"""Maximum number of such positions within each other."""
+MAX_POSITIONS = 2000
+"""Maximum number of such positions that one position leads through."""
 CARLA = "CARLA:"
 """How the description of a scenario in CARLA's axes begins."""
 
@@ -34,13 +40,28 @@ def resolve(position: model.Position, stage: Stage, actor: str | None = None) ->
     if held is not None and held[0] is position:
         return held[1]
     frame = position.chosen()
+    nesting = isinstance(frame, NESTING)
     try:
+        if nesting:
+            _enter(frame, stage)
         place = FRAMES[type(frame)](frame, stage, actor)
     except PositionError as error:
         raise _missing(frame, f"means no place: {error.problems[0].message}", error.problems[0].remedy) from error
+    finally:
+        if nesting:
+            stage.position_depth -= 1
     if _stands_still(frame, stage):
         stage.fixed_places[id(position)] = (position, place)
     return place
+
+
+def _enter(frame: model.Element, stage: Stage) -> None:
+    """Count a position along a curve whose own points are positions. Raise ScenarioError if they multiply."""
+    stage.positions_within = stage.positions_within + 1 if stage.position_depth else 0
+    stage.position_depth += 1
+    if stage.position_depth > MAX_DEPTH or stage.positions_within > MAX_POSITIONS:
+        what = f"lies on curves of positions on curves, more than {MAX_DEPTH} deep or {MAX_POSITIONS} in total"
+        raise _missing(frame, what, "name the places by roads and lanes")
 
 
 def references(position: model.Position) -> tuple[str, ...]:

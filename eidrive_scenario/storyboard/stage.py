@@ -127,6 +127,10 @@ class Stage:
         """Whose actions have started at this instant for somebody who is not in the world so far."""
         self.fixed_places: dict[int, tuple[model.Position, Place]] = {}
         """What positions mean that do not move, by `id` of the position."""
+        self.position_depth = 0
+        """Number of positions along curves that are being resolved within each other."""
+        self.positions_within = 0
+        """Number of those that the outermost of them has led through."""
         self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
 
     @property
