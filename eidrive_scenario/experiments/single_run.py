@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from eidrive_scenario.experiments.reproduction import command_of
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
+from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
 from eidrive_scenario.recording.output import exclusive, whole
 from eidrive_scenario.recording.run_files import (
@@ -43,7 +44,7 @@ __all__ = [
 
 
 def play(
-    source: Source | ConcreteRun,
+    source: Scenario | Source | ConcreteRun,
     *,
     seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
@@ -54,6 +55,7 @@ def play(
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
     wall_limit: float | None = None,
+    command: str = "",
 ) -> RunResult:
     """Run a scenario, given by path, library name or as all else that load_scenario takes, or one run out of a
     parameter value distribution.
@@ -63,6 +65,7 @@ def play(
     csv     file for one row per actor and tick
     log     file for one line per change of the storyboard, with what fired and why; `-` is standard output
     explanations  what shall be explained afterwards; they look on
+    command     command line that repeats the run, where the scenario has no file; else it is made of the settings
     wall_limit  of loading and run together, in wall time [s]; WallLimitError is raised when it is reached
 
     A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
@@ -72,7 +75,7 @@ def play(
     place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
     settings = settings or RunSettings()
-    command = _command(source, seed, settings)
+    command = _command(source, seed, settings) or command
     recording: Path | None = None
     try:
         with limit_wall_time(wall_limit) as limit, ExitStack() as stack:
@@ -110,16 +113,25 @@ def play(
         raise
 
 
-def _command(source: Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
+def _command(source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings) -> str:
     """The command line that repeats the run; empty for a scenario without a file."""
+    given: Mapping[str, str | Assignment] = {}
+    path: Any = source
     if isinstance(source, ConcreteRun):
-        settings = replace(settings, parameters={**source.assignments, **settings.parameters})
-        return command_of(source.scenario, seed, settings)
-    return command_of(resolve_scenario(source), seed, settings) if isinstance(source, str | Path) else ""
+        path, given = source.scenario, source.assignments
+    elif isinstance(source, Scenario):
+        path, given = source.path, source.assigned
+    if not isinstance(path, str | Path):
+        return ""
+    return command_of(resolve_scenario(path), seed, replace(settings, parameters={**given, **settings.parameters}))
 
 
 def _record(
-    simulation: Simulation, folder: RunFolder, source: Source | ConcreteRun, settings: RunSettings, command: str
+    simulation: Simulation,
+    folder: RunFolder,
+    source: Scenario | Source | ConcreteRun,
+    settings: RunSettings,
+    command: str,
 ) -> None:
     """Let a recorder and a writer of camera images look on."""
     pictures = CameraPictures(folder.pictures)
@@ -132,9 +144,11 @@ def _record(
     simulation.add_observer(Recorder(folder.recording, metadata=metadata, attachments=_attachments(text, scenario)))
 
 
-def _text(source: Source | ConcreteRun) -> bytes:
+def _text(source: Scenario | Source | ConcreteRun) -> bytes:
     if isinstance(source, ConcreteRun):
         return text_of(source.scenario)
+    if isinstance(source, Scenario):
+        return _text(source.source)
     return text_of(resolve_scenario(source) if isinstance(source, str | Path) else source)
 
 

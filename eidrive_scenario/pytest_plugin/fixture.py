@@ -12,7 +12,7 @@ import pytest
 from eidrive_scenario.errors import InputError, suggestion
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.options import Arm, arms
-from eidrive_scenario.pytest_plugin.outcome import play_arm, properties
+from eidrive_scenario.pytest_plugin.outcome import explain, play_arm, properties
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import Source
@@ -122,6 +122,8 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         result = replace(result, warnings=(*result.warnings, *arm.replaced))
         request.node.user_properties.extend(properties(result))
+        if not result.passed:
+            request.node.add_report_section("call", "eidrive", explain(result))
         return result
 
     return run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -53,11 +54,26 @@ def play_arm(item: pytest.Item, source: Source, arm: Arm, **overrides: Any) -> R
     Raises InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _play(item.config, file, source, arm, overrides)
+    return _play(item.config, file, source, arm, overrides, command=pytest_command(item))
+
+
+def pytest_command(item: pytest.Item) -> str:
+    """The command line that repeats a test; it also repeats runs of scenarios that the test has made in Python."""
+    words = ["pytest", "::".join([str(item.path), *item.nodeid.split("::")[1:]])]
+    for name in ("channel", "detector", "seeds"):
+        value = item.config.getoption(f"eidrive_{name}")
+        if value is not None:
+            words += [f"--eidrive-{name}", ",".join(value) if isinstance(value, list) else str(value)]
+    return shlex.join(words)
 
 
 def _play(
-    config: pytest.Config, file: Path, source: Source | ConcreteRun, arm: Arm, overrides: Mapping[str, Any]
+    config: pytest.Config,
+    file: Path,
+    source: Source | ConcreteRun,
+    arm: Arm,
+    overrides: Mapping[str, Any],
+    command: str = "",
 ) -> RunResult:
     # Imported with the first run: pytest loads this plugin in every project of its environment.
     from eidrive_scenario.experiments.single_run import play
@@ -72,7 +88,14 @@ def _play(
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
     below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None
-    return play(source, seed=arm.seed, settings=RunSettings(**settings), below=below, wall_limit=wall_limit)
+    return play(
+        source,
+        seed=arm.seed,
+        settings=RunSettings(**settings),
+        below=below,
+        wall_limit=wall_limit,
+        command=command,
+    )
 
 
 def _place(config: pytest.Config, source: Path) -> tuple[str, ...]:
@@ -129,9 +152,12 @@ def failure_text(error: BaseException) -> str | None:
     """The text of a failure that needs no traceback, or None for one that does."""
     if isinstance(error, ScenarioFailed | InputError):
         return str(error)
+    notes: list[str] = getattr(error, "__notes__", [])
+    if isinstance(error, OSError) and notes:
+        return "\n".join([f"broken off: {error}", *notes])
     if not isinstance(error, EidriveError):
         return None
-    lines = [str(error), *getattr(error, "__notes__", ())]
+    lines = [str(error), *notes]
     if isinstance(error, ExtensionError):
         from eidrive_scenario.attribution import traceback_from_extension
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -95,3 +98,54 @@ def test_the_trace_does_not_depend_on_the_order(project: pytest.Pytester) -> Non
     backwards = hashes("xosc/near.xosc", "xosc/far.xosc")
     assert forwards == backwards
     assert len(set(forwards.values())) == 2
+
+
+def test_failures_print_a_command_that_reproduces_them_and_the_recording(project: pytest.Pytester) -> None:
+    arguments = ("--eidrive-channel", "{delay: {kind: constant, seconds: 0.1}}", "--eidrive-out", "kept runs")
+    result = project.runpytest_subprocess("xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
+    result.assert_outcomes(failed=1)
+    (command,) = (line for line in result.outlines if line.startswith("reproduce: "))
+    (recording,) = (line.removeprefix("recording: ") for line in result.outlines if line.startswith("recording: "))
+    kept = json.loads(Path(recording).with_name("result.json").read_text(encoding="utf-8"))
+    words = shlex.split(command.removeprefix("reproduce: "))
+    assert words[0] == "eidrive"
+    again = subprocess.run(
+        [sys.executable, "-m", "eidrive_scenario", *words[1:], "--json"],
+        cwd="/",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    printed = json.loads(again.stdout)
+    assert (printed["trace_hash"], printed["settings"]) == (kept["trace_hash"], kept["settings"])
+
+
+def test_junit_properties_hold_all_settings(project: pytest.Pytester) -> None:
+    arguments = ("--eidrive-channel", "{loss: {kind: bernoulli, probability: 0.5}}", "--junitxml", "junit.xml")
+    project.runpytest_subprocess("xosc/far.xosc", *arguments, "--eidrive-out", "runs", "-p", "no:cacheprovider")
+    (case,) = ElementTree.parse(project.path / "junit.xml").iter("testcase")
+    properties = {str(entry.get("name")): str(entry.get("value")) for entry in case.iter("property")}
+    (path,) = project.path.glob("runs/**/result.json")
+    settings = json.loads(path.read_text(encoding="utf-8"))["settings"]
+    assert settings["channel_profile"]["loss"]["probability"] == 0.5
+    for key, value in settings.items():
+        text = properties[f"settings.{key}"]
+        assert (text if isinstance(value, str) else json.loads(text)) == value
+    assert len(properties["settings_sha256"]) == 64
+
+
+def test_a_failed_test_in_python_prints_the_command_of_its_run(project: pytest.Pytester) -> None:
+    project.makepyfile(
+        test_own="""
+        def test_file(run_scenario):
+            assert run_scenario("xosc/near.xosc", seed=4).passed
+
+        def test_object(run_scenario):
+            assert run_scenario(open("xosc/near.xosc", "rb").read()).passed
+        """
+    )
+    result = project.runpytest_subprocess("test_own.py", "-p", "no:cacheprovider")
+    result.assert_outcomes(failed=2)
+    near = project.path / "xosc" / "near.xosc"
+    result.stdout.fnmatch_lines([f"reproduce: eidrive run {near} --seed 4"])
+    result.stdout.fnmatch_lines([f"reproduce: pytest {project.path / 'test_own.py'}::test_object"])
