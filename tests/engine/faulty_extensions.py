@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 CODE = '''
+import ctypes
 import itertools
 import math
 import os
@@ -54,6 +55,17 @@ class HangsInC(Detector):
     def detect(self, readings):
         if readings.time >= AFTER:
             sum(itertools.repeat(0))
+        return Detections(readings.time)
+
+
+class Deadlocks(Detector):
+    """Waits in native code for a lock that it holds, without the lock of the interpreter; signals do not end that."""
+
+    def detect(self, readings):
+        if readings.time >= AFTER:
+            library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(64)
+            for _ in range(2):
+                library.pthread_mutex_lock(mutex)
         return Detections(readings.time)
 
 
@@ -312,6 +324,7 @@ POINTS = {
         "swallows": "Swallows",
         "sleeps": "Sleeps",
         "hangs_in_c": "HangsInC",
+        "deadlocks": "Deadlocks",
         "ends_process": "EndsProcess",
         "hangs_when_built": "HangsWhenBuilt",
         "exits": "Exits",

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from faulty_extensions import install, line_of, write_scenario
 
+from eidrive_scenario.recording import read_recording
+
 DISTRIBUTION = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
 <ParameterValueDistribution><ScenarioFile filepath="s.xosc"/><Deterministic>
@@ -98,6 +100,18 @@ def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
     place = f"{folder / 'faulty.py'}:{line_of('sum(itertools.repeat(0))')}: detector 'hangs_in_c' (faulty:HangsInC)"
     assert f"{place}: still running in detect after 6 s of wall time" in err
     assert json.loads(out)["error"]["name"] == "hangs_in_c"
+
+
+def test_run_that_waits_in_native_code_ends_with_3_and_a_closed_recording(folder: Path) -> None:
+    code, _, err = run(folder, "s.xosc", "--detector", "deadlocks", "--wall-limit", "6", "--out", "runs")
+    assert code == 3
+    line = line_of("library.pthread_mutex_lock(mutex)")
+    place = f"{folder / 'faulty.py'}:{line}: detector 'deadlocks' (faulty:Deadlocks) of station 'Ego' at t = 0.500 s"
+    assert f"{place}: still running in detect after 6 s of wall time" in err
+    (recording,) = folder.glob("runs/*/recording.partial.mcap")
+    assert len(list(read_recording(recording).frames())) == 10
+    assert "reproduce: eidrive run" in err
+    assert f"recording: {recording.relative_to(folder)}" in err
 
 
 def test_os_exit_of_extension_under_wall_limit_is_reported(folder: Path) -> None:
