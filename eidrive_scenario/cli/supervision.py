@@ -60,9 +60,10 @@ def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[
 
 
 def _wait(child: int) -> int:
-    """Wait for a child and pass signals on to it. Returns its status."""
-    for name in _FORWARDED:
-        signal.signal(getattr(signal, name), lambda number, frame: os.kill(child, number))
+    """Wait for a child and pass signals on to it, but for ignored ones. Returns its status."""
+    for number in [getattr(signal, name) for name in _FORWARDED]:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda received, frame: os.kill(child, received))
     return os.waitpid(child, 0)[1]
 
 

@@ -19,6 +19,7 @@ from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.wall_limit import current_limit, limit_wall_time
 
+pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0
 """A limit that no run here reaches [s]."""
 

@@ -15,6 +15,9 @@ from faulty_extensions import install, line_of, write_scenario
 
 from eidrive_scenario.recording import read_recording
 
+pytestmark = pytest.mark.timeout(600)
+"""Hung runs take their limit and the grace after it, and several processes load the engine."""
+
 DISTRIBUTION = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>
 <ParameterValueDistribution><ScenarioFile filepath="s.xosc"/><Deterministic>
@@ -36,7 +39,13 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     command = [sys.executable, "-m", "eidrive_scenario", "run", *arguments]
     return subprocess.Popen(
-        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
 
 

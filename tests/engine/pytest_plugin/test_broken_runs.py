@@ -10,6 +10,8 @@ import pytest
 from faulty_extensions import install, line_of, write_scenario
 
 pytest_plugins = ["pytester"]
+pytestmark = pytest.mark.timeout(600)
+"""Hung runs take their limit and the grace after it, and several processes load the engine."""
 
 LIMIT = 8
 """Wall limit of each run [s]: far more than a sound run takes."""
