@@ -91,6 +91,7 @@ def run(
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
     from eidrive_scenario.cli.batch import play_all
     from eidrive_scenario.cli.verdicts import show, show_warnings
+    from eidrive_scenario.experiments.reproduction import reproduction_lines
     from eidrive_scenario.experiments.single_run import as_json_text, play
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation
@@ -144,6 +145,8 @@ def run(
             if json:
                 typer.echo(as_json_text(result, ascii_only=not has_all_letters()))
                 show_warnings(result)
+                for line in reproduction_lines(result):
+                    typer.echo(line, err=True)
             else:
                 show(result, varied="" if isinstance(source, Path) else str(source))
             if result.folder is not None:

@@ -128,10 +128,12 @@ def report(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the report.")],
 ) -> None:
     """Write one page over many runs."""
-    from eidrive_scenario.recording.run_files import read_results
+    from eidrive_scenario.recording.run_files import read_results, unfinished_runs
     from eidrive_scenario.reporting.report import write_report
 
     results = read_results(runs)
+    for path in unfinished_runs(runs):
+        typer.secho(f"warning: {path}: the run did not end, it is not in the report", fg="yellow", err=True)
     if not results:
         places = ", ".join(map(str, runs))
         raise SettingError(Problem(f"no result.json in {places}", "give folders that eidrive run --out has written"))

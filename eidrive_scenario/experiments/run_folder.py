@@ -55,10 +55,12 @@ class RunFolder:
     def commit(self, result: bytes) -> None:
         """Replace the files of an earlier run with the same settings.
 
-        The result is removed first and written last, so a result always belongs to the recording beside it.
+        A page that `eidrive view` made of the former recording goes too. The result is removed first and written last,
+        so a result always belongs to the recording beside it.
         """
         (self.path / RESULT).unlink(missing_ok=True)
-        (self.path / RECORDING).unlink(missing_ok=True)
+        for outdated in (self.path / RECORDING, (self.path / RECORDING).with_suffix(".html")):
+            outdated.unlink(missing_ok=True)
         shutil.rmtree(self.path / PICTURES, ignore_errors=True)
         if self.recording.exists():
             self.recording.replace(self.path / RECORDING)

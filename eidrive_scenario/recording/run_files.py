@@ -81,6 +81,14 @@ def result_paths(places: Sequence[Path]) -> Iterator[Path]:
                 yield path
 
 
+def unfinished_runs(places: Sequence[Path]) -> Iterator[Path]:
+    """The partial recordings in these folders, and in folders below, that have no result beside them."""
+    for place in places:
+        for path in sorted(place.rglob(partial(Path(RECORDING)).name)) if os.path.isdir(place) else ():
+            if not path.with_name(RESULT).exists():
+                yield path
+
+
 def read_result(path: Path) -> dict[str, Any]:
     """A result, as JSON values. Raises InputError if the file is not one."""
     try:

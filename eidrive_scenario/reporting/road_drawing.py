@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
@@ -18,6 +19,12 @@ Array = NDArray[np.float64]
 
 SPACING = 1.0
 """Distance of the points at which edges are computed [m]; those that lie on a straight line are dropped again."""
+WIDEST_SPACING = 50.0
+"""Maximum of that distance on a large map [m]."""
+_MOST_POINTS = 1_500_000
+"""Maximum number of points that are computed."""
+_LARGEST_ROAD_FILE = 64 * 2**20
+"""Maximum size of a road in a recording that is drawn [bytes]."""
 TOLERANCE = 0.02
 """How far a drawn line may stray from the edge [m]."""
 ROAD_FILE = "road.xodr"
@@ -30,14 +37,17 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
     """The lanes and markings of these roads; of those that reach into `window` if one is given.
 
     Lanes on which cars drive come last, so that they cover the shoulders of roads that cross them in a junction.
+    Edges of a large map are computed at wider distances. Raises InputError if it is too large even so.
     """
+    roads = list(roads)
+    spacing = _spacing(roads)
     lanes: list[tuple[str, Array]] = []
     markings: list[tuple[str, str, Array]] = []
     for road in roads:
         for section in road.sections:
             if section.length <= 0.0:
                 continue
-            stations = np.linspace(section.s, section.end, max(2, math.ceil(section.length / SPACING) + 1)).tolist()
+            stations = _stations(section.s, section.end, spacing)
             for lane in section.lanes.values():
                 if lane.id != 0:
                     inner = _edge(road, section, lane, stations, outer=False)
@@ -45,7 +55,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
                     polygon = np.concatenate([thinned(inner), thinned(outer)[::-1]])
                     if _reaches(polygon, window):
                         lanes.append((lane.type, polygon))
-                markings.extend(mark for mark in _marks(road, section, lane) if _reaches(mark[2], window))
+                markings.extend(mark for mark in _marks(road, section, lane, spacing) if _reaches(mark[2], window))
     lanes.sort(key=lambda entry: _LOWEST.index(entry[0]) if entry[0] in _LOWEST else len(_LOWEST))
     return RoadDrawing(tuple(lanes), tuple(markings))
 
@@ -55,6 +65,8 @@ def recorded_roads(recording: Recording) -> RoadDrawing:
     text = recording.attachments.get(ROAD_FILE)
     if text is None:
         return RoadDrawing()
+    if len(text) > _LARGEST_ROAD_FILE:
+        raise _too_large(f"{recording.path}/{ROAD_FILE}")
     return road_drawing(parse_road_map(text, f"{recording.path}/{ROAD_FILE}").roads.values())
 
 
@@ -83,6 +95,29 @@ def thinned(points: Array, tolerance: float = TOLERANCE) -> Array:
     return points[keep]
 
 
+def _spacing(roads: Sequence[Road]) -> float:
+    """The distance between points [m] that keeps their number within bounds."""
+    length = sum(
+        section.length * sum(2 + len(lane.road_marks) for lane in section.lanes.values())
+        for road in roads
+        for section in road.sections
+    )
+    spacing = max(SPACING, length / _MOST_POINTS)
+    if not spacing <= WIDEST_SPACING:
+        raise _too_large("")
+    return spacing
+
+
+def _too_large(source: str) -> InputError:
+    return InputError(Problem("the road network is too large to be drawn", "", source))
+
+
+def _stations(start: float, end: float, spacing: float) -> list[float]:
+    """Points along a road, its ends included [m]."""
+    found: list[float] = np.linspace(start, end, max(2, math.ceil((end - start) / spacing) + 1)).tolist()
+    return found
+
+
 def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *, outer: bool) -> Array:
     """(N, 2) points of a lane's inner or outer edge; lane 0 has its centre line for both."""
     width = lane.outer if outer else lane.inner
@@ -96,14 +131,14 @@ def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *
     return np.array(points)
 
 
-def _marks(road: Road, section: LaneSection, lane: Lane) -> Iterator[tuple[str, str, Array]]:
+def _marks(road: Road, section: LaneSection, lane: Lane, spacing: float) -> Iterator[tuple[str, str, Array]]:
     """The painted stretches on the lane's outer edge."""
     for index, mark in enumerate(lane.road_marks):
         after = lane.road_marks[index + 1].s_offset if index + 1 < len(lane.road_marks) else section.length
         start, end = section.s + mark.s_offset, section.s + min(after, section.length)
         if mark.type in ("none", "curb", "grass") or end - start < 1e-6:
             continue
-        stations = np.linspace(start, end, max(2, math.ceil((end - start) / SPACING) + 1)).tolist()
+        stations = _stations(start, end, spacing)
         yield mark.type, mark.color, thinned(_edge(road, section, lane, stations, outer=True))
 
 

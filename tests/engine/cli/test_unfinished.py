@@ -52,7 +52,9 @@ def test_what_is_left_of_a_run_does_not_look_whole(
     assert shown.exit_code == 0
     assert shown.stdout.strip() == str(partial.with_suffix(".html"))
     assert "the run did not end" in shown.stderr
-    assert eidrive("report", tmp_path, "-o", tmp_path / "report").exit_code == 2, "it has no result"
+    report = eidrive("report", tmp_path, "-o", tmp_path / "report")
+    assert report.exit_code == 2, "it has no result"
+    assert f"warning: {partial}: the run did not end, it is not in the report" in report.stderr
 
     assert eidrive(*arguments).exit_code == 0
     assert names(tmp_path) == ["motion.csv", "recording.mcap", "recording.partial.html", "result.json"]

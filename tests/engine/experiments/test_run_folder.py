@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lxml import html
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.run_folder import folder_name, run_folder
 from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.recording.file_lock import FileLock
 from eidrive_scenario.resolved_settings import ResolvedSettings
@@ -194,6 +196,13 @@ def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path:
     assert set(delays) == {0.1, 0.2}
     assert not list(tmp_path.rglob("*.lock"))
     assert not list(tmp_path.rglob("*.partial*"))
+    report = subprocess.run(
+        [*MAIN, "report", str(tmp_path), "-o", str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    text = html.fromstring(Path(report.stdout.strip()).read_text(encoding="utf-8")).text_content()
+    for late in (0.1, 0.2):
+        assert f"delay: {{kind: constant, seconds: {late}}}" in text
+    assert f"{len(folders)} runs" in text
 
 
 @pytest.mark.parametrize(
@@ -263,3 +272,18 @@ def test_an_error_of_the_run_carries_its_command_and_recording(tmp_path: Path, m
     notes = raised.value.__notes__
     assert notes[0] == f"reproduce: eidrive run {PASSING_BY} --seed 1 --time-limit 0.3"
     assert os.path.exists(notes[1].removeprefix("recording: "))
+
+
+def test_a_page_of_a_replaced_recording_is_removed(tmp_path: Path) -> None:
+    folder = run(tmp_path).folder
+    assert folder is not None
+    (folder / "recording.html").touch()
+    run(tmp_path)
+    assert not (folder / "recording.html").exists()
+
+
+def test_a_loaded_scenario_leaves_the_same_run_as_its_file(tmp_path: Path) -> None:
+    loaded = load_scenario(PASSING_BY, {"OtherY": "6"})
+    first = run(tmp_path, loaded)
+    second = run(tmp_path, parameters={"OtherY": "6"})
+    assert (first.folder, first.trace_hash, first.command) == (second.folder, second.trace_hash, second.command)

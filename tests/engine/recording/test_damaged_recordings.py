@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import resource
 import time
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
@@ -25,7 +26,7 @@ from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings
 
-from .mutants import CHUNK, MUTATIONS, join, messages, mutant, pack, split, unpack
+from .mutants import ATTACHMENT, CHUNK, MUTATIONS, join, messages, mutant, pack, split, unpack
 
 COUNT = int(os.environ.get("EIDRIVE_MUTANTS", "32"))
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -246,3 +247,31 @@ def test_a_chunk_in_chunks_is_not_followed(originals: list[Path], tmp_path: Path
     assert code in (0, 2)
     assert "internal error" not in error
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MAX_BYTES
+
+
+def test_a_huge_road_in_a_recording_is_not_drawn(originals: list[Path], tmp_path: Path) -> None:
+    road = (
+        '<road id="{0}" length="1e6" junction="-1"><planView><geometry s="0" x="0" y="{0}" hdg="0" length="1e6"><line/>'
+        '</geometry></planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>'
+        '<lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right></laneSection></lanes>'
+        "</road>"
+    )
+    header = '<OpenDRIVE><header revMajor="1" revMinor="7"/>'
+    huge = (header + "".join(road.format(number) for number in range(200)) + "</OpenDRIVE>").encode()
+    path = tmp_path / "huge.mcap"
+    path.write_bytes(_with_road(originals[1].read_bytes(), huge))
+    started = time.perf_counter()
+    code, error, page = view(path)
+    assert time.perf_counter() - started < MAX_SECONDS
+    assert (code, bool(page)) == (0, True)
+    assert "the roads are not drawn: " in error
+
+
+def _with_road(data: bytes, road: bytes) -> bytes:
+    records = split(data)
+    for place, (opcode, body) in enumerate(records):
+        if opcode == ATTACHMENT and b"road.xodr" in body[:60]:
+            start = body.index(b"octet-stream") + len(b"octet-stream")
+            content = body[:start] + len(road).to_bytes(8, "little") + road
+            records[place] = (ATTACHMENT, content + zlib.crc32(content).to_bytes(4, "little"))
+    return join(records)
