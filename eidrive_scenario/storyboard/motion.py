@@ -6,6 +6,7 @@ Speeds are applied as in a semi-implicit step: the speed at the end of a step co
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
@@ -70,6 +71,7 @@ class Motion:
         self._steering: Steering | None = None
         self._next_pose: Pose | None = None
         self._landing = False
+        self._rail: Callable[[float], Pose] | None = None
         self._carried: float | None = None
         self._lift = 0.0
         self._crosses = False
@@ -110,18 +112,21 @@ class Motion:
         """Lateral motion of the step that begins now."""
         self._steering = steering
 
-    def go_to(self, pose: Pose, *, land: bool = False, jump: bool = False) -> None:
+    def go_to(
+        self, pose: Pose, *, land: bool = False, jump: bool = False, rail: Callable[[float], Pose] | None = None
+    ) -> None:
         """The pose at the end of the step that begins now, wherever it is (a trajectory).
 
         With `land` the actor looks for its lane there, to follow it from then on; where there are no roads at all it
-        has nothing left to follow, and stops. With `jump` it is put there: the way is none that it covers.
+        has nothing left to follow, and stops. With `jump` it is put there: the way is none that it covers. `rail`
+        returns the pose after another distance than that of its speed, for `carry`.
         """
-        self._next_pose = pose
+        self._next_pose, self._rail = pose, rail
         self._landing = land
         self.jumped = self.jumped or jump
 
     def carry(self, distance: float) -> None:
-        """Move by a distance along the lane in this step, whatever speed and heading say [m]."""
+        """Move by a distance along the lane or trajectory in this step, whatever speed and heading say [m]."""
         self._carried = distance
 
     def relate_to_lane(self, lane: int) -> LaneLocation | None:
@@ -141,11 +146,16 @@ class Motion:
         self.land()
 
     def land(self) -> None:
-        """Find the lane again after free motion; the actor follows it at the angle at which it arrived."""
+        """Find the lane again after free motion; the actor follows it at the angle at which it arrived.
+
+        One that is beside the road, and does not point along it, goes on in its heading.
+        """
         self._crosses = False
         hint = self.location
         place = self.roads.locate_at(self.pose.x, self.pose.y, hint) if self.roads is not None else None
         self._adopt(place)
+        if self.location is not None and self.roads is not None and abs(math.cos(self.heading)) < ACROSS:
+            self._crosses = not self.roads.on_road(self.location)
 
     @property
     def direction(self) -> int:
@@ -157,6 +167,8 @@ class Motion:
         steering, self._steering = self._steering, None
         target, self._next_pose = self._next_pose, None
         carried, self._carried = self._carried, None
+        if target is not None and carried is not None and self._rail is not None:
+            target = self._rail(carried)
         distance = self.speed * dt if carried is None else carried
         if self._teleport:
             self._teleport = False

@@ -228,3 +228,57 @@ def test_trajectory_position_counts_from_the_tangent_not_from_headings_of_the_ve
     for orientation, h in (("", 0.0), (turned, 0.3)):
         played = drive(run, teleport(place.format(orientation)), speed(0.0), end=0.1)
         assert row(played, 0.0) == pytest.approx((150.0, -10.0, h, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("trajectory_first", [True, False])
+def test_synchronize_that_starts_beside_the_trajectory_measures_along_it(run: Any, trajectory_first: bool) -> None:
+    """Seen along the road the walker is at its target already; along its trajectory it has 3.61 m to go."""
+    start = f'<Private entityRef="Walker">{teleport(world(150.0, -6.0, math.pi / 2))}{speed(0.0)}</Private>'
+    steps = [("Walker", follow(CROSSING)), ("Walker", together(world(150.0, -2.39), STEADY))]
+    played = run(
+        7.0,
+        *(steps if trajectory_first else steps[::-1]),
+        driven=False,
+        ego=(-1, 100.0, 8.333),
+        more=WALKER,
+        init=start,
+        settings=FINE,
+    )
+    arrived = next(f.view.time for f in played.frames if row(played, f.view.time, "Walker", 0.01)[1] >= -2.39)
+    assert arrived == pytest.approx(46.0 / 8.333, abs=0.03)
+
+
+def test_trajectory_that_ends_across_and_beside_the_road_is_left_straight_on(run: Any) -> None:
+    """The street is 12 m wide: at y = 20 nobody crabs along it at 90°."""
+    way = curve(world(150.0, -6.0), world(150.0, 20.0))
+    played = drive(run, speed(10.0), teleport(world(150.0, -6.0, math.pi / 2)), follow(way), end=4.0)
+    assert row(played, 4.0) == pytest.approx((150.0, 34.0, math.pi / 2, 10.0), abs=1e-6)
+
+
+def test_initial_offset_beyond_a_trajectory_means_its_end(run: Any) -> None:
+    action = follow(AHEAD.replace('x="900.0"', 'x="160.0"')).replace(
+        "<FollowTrajectoryAction>", '<FollowTrajectoryAction initialDistanceOffset="25">'
+    )
+    played = drive(run, speed(10.0), action, end=1.0)
+    assert row(played, 0.0)[0] == pytest.approx(160.0)
+    assert row(played, 1.0) == pytest.approx((170.0, -2.0, 0.0, 10.0), abs=1e-6)
+
+
+@pytest.mark.element("LongitudinalDistanceAction")
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("system", ["trajectory", "lane"])
+def test_distance_without_limits_holds_at_once_on_a_trajectory(run: Any, mode: str, system: str) -> None:
+    keep = f"""<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Other" distance="20"
+      freespace="false" continuous="true" coordinateSystem="{system}"/></LongitudinalAction></PrivateAction>"""
+    way = curve(world(100.0, -2.0), world(900.0, -2.0))
+    played = run(
+        2.0,
+        ("Ego", keep, after(0.45)),
+        driven=False,
+        ego=(-1, 100.0, 5.0),
+        others={"Other": (-1, 150.0, 10.0)},
+        init=f'<Private entityRef="Ego">{follow(way, mode)}</Private>',
+    )
+    for time in (0.6, 1.0, 2.0):
+        gap = row(played, time, "Other")[0] - row(played, time)[0]
+        assert (gap, row(played, time)[3]) == pytest.approx((20.0, 10.0), abs=1e-6)

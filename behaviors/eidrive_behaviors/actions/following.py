@@ -113,6 +113,10 @@ class Pursuit:
         self.pose = goal if self.on_path else Pose(x, y, goal.z, h, goal.p, goal.r)
         return self.pose
 
+    def put(self, s: float, pose: Pose) -> None:
+        """Put the vehicle on the trajectory."""
+        self.s, self.pose, self.on_path = s, pose, True
+
     def _goal(self, s: float, tail_first: bool) -> Pose:
         pose = self._layout.extended(s)
         if not tail_first:

@@ -56,6 +56,8 @@ class SynchronizeAction(ActionBehaviour):
         self._phase = Phase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
+        self._measured: tuple[Layout | None, ...] = ()
+        """The trajectories along which the ways of both were measured last."""
         self._same: dict[str, tuple[Layout, bool]] = {}
         """By entity, the trajectory that it follows, and whether its target is a TrajectoryPosition on that one."""
         self._sense = 1.0
@@ -75,11 +77,17 @@ class SynchronizeAction(ActionBehaviour):
         except Absent:
             return Status.RUNNING
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
-        passed = way > self._last[0] or master_way > self._last[1]
+        measured = tuple(
+            self.stage.actors[name].trajectory for name in (self.actor.name, self.action.master_entity_ref)
+        )
+        changed, self._measured = measured != self._measured, measured
+        passed = not changed and (way > self._last[0] or master_way > self._last[1])
         self._last = (way, master_way)
         speed = abs(master_speed)
         time = max(master_way - theirs, TINY) / speed if speed > TINY else math.inf
         if way < mine + TINY or master_way < theirs + TINY or passed or time < dt + TINY:
+            if changed:
+                return Status.RUNNING  # an action that starts beside this one may lay a trajectory
             if final is not None:
                 motion.speed = final
             return Status.SUCCESS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from py_trees.common import Status
@@ -97,7 +98,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
             raise Absent(self.actor.name)
         self._layout: Layout = lay_out(self._trajectory, self._resolved, motion.pose)
-        self._s = self.action.initial_distance_offset or 0.0
+        self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self.actor.progress = self._followed = self._progress
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
@@ -113,6 +114,11 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._begun = self._turned = self._jumps = False
         if self._timing is not None and not (self._drives and present):
             self._s = self._layout.at_time(self._clock(0.0), self._speeds)
+
+    def _offset(self) -> float:
+        """Where on the trajectory the action begins [m]."""
+        offset = self.action.initial_distance_offset or 0.0
+        return offset if self._layout.closed else min(offset, self._layout.length)
 
     def settle(self) -> None:
         """All actions of Init have started: the speed, and whoever is placed by another one, are known."""
@@ -140,7 +146,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         vehicle = self.actor.entity
         if self._drives and self._put is None and isinstance(vehicle, model.Vehicle):
             if self._timing is not None:
-                self._s = self.action.initial_distance_offset or 0.0
+                self._s = self._offset()
             self._pursuit = Pursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
             if self._timing is not None:
                 top, faster, slower = self.actor.limits()
@@ -196,15 +202,25 @@ class FollowTrajectoryAction(ActionBehaviour):
                 motion.speed = self._forwards(after) * (after - self._s) / dt
             if done:
                 after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
-        self._progress.move(self.stage.view.tick, self._s, after)
-        self._s = after
+        before, self._s = self._s, after
+        self._progress.move(self.stage.view.tick, before, after)
         pose = self._pose(after)
         if dt == 0.0 or not self.actor.present:
             self._enter(pose)
         else:
-            motion.go_to(pose, land=done, jump=self._jumps)
+            rail = None if self._timing is not None else partial(self._carried, before)
+            motion.go_to(pose, land=done, jump=self._jumps, rail=rail)
         self._jumps = False
         return Status.SUCCESS if done else Status.RUNNING
+
+    def _carried(self, before: float, distance: float) -> Pose:
+        """Return the pose after a step of another length than that of the speed: a distance action without limits."""
+        self._s = before + self._progress.way * distance
+        self._progress.move(self.stage.view.tick, before, self._s)
+        pose = self._pose(self._s)
+        if self._pursuit is not None:
+            self._pursuit.put(self._s, pose)
+        return pose
 
     def _forwards(self, s: float) -> float:
         """+1 where the actor looks along the curve, -1 where it goes on it tail first."""
@@ -232,7 +248,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._s = pursuit.s
         self._progress.move(self.stage.view.tick, before, pursuit.s)
         done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - TINY)
-        motion.go_to(pose, land=done)
+        motion.go_to(pose, land=done, rail=None if self._run is not None else partial(self._carried, before))
         return Status.SUCCESS if done else Status.RUNNING
 
     def _last_speed(self) -> float:
