@@ -26,6 +26,8 @@ from eidrive_scenario.wall_limit import LimitReached, current_limit
 from eidrive_scenario.world.actor import ActorSpec
 
 _ABSENT = object()
+_CONTROL_FLOW = ("_pytest", "asyncio")
+"""Packages whose exceptions end a test or task on purpose, wherever they are raised."""
 
 
 class _Call(NamedTuple):
@@ -70,7 +72,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
     if isinstance(error, InvalidResult):
         raise ExtensionError(_place_of_method(error, calls, time), str(error)) from error.__cause__
     place = extension_place(calls, time=time, observers=observers)
-    if place is None or (place.kind == "observer" and not isinstance(error, Exception | SystemExit)):
+    if place is None or type(error).__module__.partition(".")[0] in _CONTROL_FLOW:
         return
     raise ExtensionError(place, _problem(error, calls, place)) from error
 

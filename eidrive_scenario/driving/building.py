@@ -10,7 +10,7 @@ from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.speaker import Speaker
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Problem, RegistryError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, Installation
@@ -21,20 +21,39 @@ from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
-from eidrive_scenario.settings import parse_settings
+from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
+
+_SEEING = frozenset({"truth", "camera", "lidar"})
+"""The kinds of sensors that a detector may need."""
 
 
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
-    kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
+    kind: type[Detector] = _detector_class(settings.detector)
     return Rig(spec, settings.rig_sensors(kind.needs, kind.usual_sensors), seed=seed)
+
+
+def _detector_class(name: str) -> type[Detector]:
+    """The class of a detector. Raises RegistryError if what it declares cannot be used."""
+    kind: type[Detector] = registry("detectors").load(name, Detector)
+    if not isinstance(kind.needs, frozenset | set) or not kind.needs <= _SEEING:
+        described = f"detectors {name!r} ({registry('detectors').value(name)})"
+        raise RegistryError(f"{described}: needs is {kind.needs!r} (expected a frozenset out of {sorted(_SEEING)})")
+    _check_settings_type("detectors", name, kind.settings_type)
+    return kind
+
+
+def _check_settings_type(kind: str, name: str, settings_type: object) -> None:
+    if settings_type is not None and not (isinstance(settings_type, type) and issubclass(settings_type, Settings)):
+        described = f"{kind} {name!r} ({registry(kind).value(name)})"
+        raise RegistryError(f"{described}: settings_type is {settings_type!r} (expected a class derived from Settings)")
 
 
 def build_detector(settings: AgentSettings, *, source: str = "", line: int | None = None) -> Detector:
     """The detector that the settings name. Raises SettingError, with this place, if its own settings are wrong."""
-    kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
+    kind: type[Detector] = _detector_class(settings.detector)
     given = settings.detector_settings
     if kind.settings_type is not None:
         own = parse_settings(kind.settings_type, given, source=source, line=line)
@@ -51,6 +70,7 @@ def build_fusion(
     """The fusion method that the settings name. Raises SettingError, with this place, if its own settings are wrong,
     or if it joins points and the detector looks at none."""
     kind: type[FusionMethod] = registry("fusion").load(settings.fusion, FusionMethod)
+    _check_settings_type("fusion", settings.fusion, kind.settings_type)
     given = settings.fusion_settings
     if given and kind.settings_type is None:
         message = f"fusion {settings.fusion!r} has no settings of its own"

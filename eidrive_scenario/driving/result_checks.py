@@ -29,7 +29,7 @@ def check_plan(planner: Planner, plan: object) -> None:
     try:
         if is_finite_plan(plan):
             return
-    except TypeError:
+    except (TypeError, ValueError, AttributeError):
         pass
     raise_not_finite(
         planner,

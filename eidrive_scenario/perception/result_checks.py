@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 
-from eidrive_scenario.detections import Detections
+from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.registry import is_built_in
 
 _FINITE_BY_CONSTRUCTION = ("perception.oracle", "fusion.average")
 """Modules whose classes copy or average finite numbers; a check of theirs in each tick would cost 1 % of a run."""
+
+_REAL = "fiu"
+"""Kinds of numpy arrays of real numbers."""
+_CLASSES = frozenset(CLASSES)
 
 
 def is_checked(extension: object) -> bool:
@@ -25,6 +29,7 @@ def check_detections(extension: object, method: str, found: object) -> None:
     if not isinstance(found, Detections):
         raise InvalidResult(extension, method, f"returned {describe(found)} (expected Detections)")
     boxes, scores = found.boxes, found.scores
+    _check_rows(extension, method, found)
     try:
         # One product per array is a third of the time of np.isfinite; a sum that overflows is looked at closely.
         quick = found.time + np.vdot(boxes, boxes) + np.vdot(scores, scores)
@@ -32,7 +37,7 @@ def check_detections(extension: object, method: str, found: object) -> None:
             quick += np.vdot(found.existence, found.existence)
         if math.isfinite(quick) and not (np.isinf(found.velocity).any() or np.isinf(found.covariance).any()):
             return
-    except TypeError:
+    except (TypeError, ValueError, AttributeError):
         pass
     raise_not_finite(
         extension,
@@ -60,9 +65,12 @@ def raise_not_finite(extension: object, method: str, fields: dict[str, object]) 
     """Raise InvalidResult that names the first field that is no number or not finite; return if all are."""
     for name, value in fields.items():
         try:
-            array = np.asarray(value, dtype=float)
+            found = np.asarray(value)
+            array = found.astype(float) if found.dtype.kind in _REAL else None
         except (TypeError, ValueError):
-            raise InvalidResult(extension, method, f"returned {name} {describe(value)} (expected numbers)") from None
+            array = None
+        if array is None:
+            raise InvalidResult(extension, method, f"returned {name} as {describe(value)} (expected numbers)")
         wrong = array[~np.isfinite(array)] if array.ndim else array[None][~np.isfinite(array[None])]
         if wrong.size:
             raise InvalidResult(
@@ -72,7 +80,24 @@ def raise_not_finite(extension: object, method: str, fields: dict[str, object]) 
 
 def describe(value: object) -> str:
     """Return what was returned in a few words: None, or the type of the object."""
+    if isinstance(value, np.ndarray):
+        return f"an array of type {value.dtype}"
     return "None" if value is None else f"an object of type {type(value).__name__}"
+
+
+def _check_rows(extension: object, method: str, found: Detections) -> None:
+    """Raise InvalidResult unless arrays are of real numbers, classes known, and tracks whole numbers."""
+    for name in ("boxes", "scores", "velocity", "covariance", "existence"):
+        array = getattr(found, name)
+        if array.dtype.kind not in _REAL:
+            raise InvalidResult(extension, method, f"returned {name} as {describe(array)} (expected numbers)")
+    for kind in found.classes:
+        if not isinstance(kind, str) or kind not in _CLASSES:
+            known = ", ".join(CLASSES)
+            raise InvalidResult(extension, method, f"returned the class {kind!r} (expected one of {known})")
+    for track in found.tracks:
+        if not isinstance(track, int | np.integer):
+            raise InvalidResult(extension, method, f"returned the track {track!r} (expected a whole number)")
 
 
 def _without_nan(value: object) -> object:

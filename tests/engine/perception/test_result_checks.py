@@ -1,0 +1,106 @@
+"""Checks of what detectors and fusion methods return, and of what their classes declare."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.building import build_detector
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.errors import InvalidResult, RegistryError
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.perception.oracle import OracleDetector
+from eidrive_scenario.perception.result_checks import check_detections, is_checked
+from eidrive_scenario.sensing.readings import Readings
+
+BOX = np.array([[30.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]])
+
+
+class Given(Detector):
+    """Returns what it is given."""
+
+    def detect(self, readings: Readings) -> Detections:
+        return Detections(readings.time)
+
+
+def detections(time: Any = 1.0, **fields: Any) -> Detections:
+    usual: dict[str, Any] = {
+        "boxes": BOX,
+        "scores": np.ones(1),
+        "classes": ("car",),
+        "velocity": np.zeros((1, 2)),
+        "covariance": np.zeros((1, 2, 2)),
+    }
+    return Detections(time, **{**usual, **fields})
+
+
+@pytest.mark.parametrize(
+    "found",
+    [
+        Detections(0.0),
+        detections(),
+        detections(velocity=np.full((1, 2), math.nan), covariance=np.full((1, 2, 2), math.nan)),
+        detections(boxes=BOX.astype(np.float32), scores=np.ones(1, int), tracks=(np.int64(3),)),
+        detections(boxes=(BOX * 1e30).astype(np.float32)),
+        detections(boxes=BOX * 1e200),
+    ],
+    ids=["empty", "usual", "unknown velocity", "other types", "squares beyond float32", "squares beyond float64"],
+)
+def test_detections_of_finite_numbers_are_accepted(found: Detections) -> None:
+    check_detections(Given(), "detect", found)
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: detections(boxes=BOX * math.nan), "returned boxes with the value nan"),
+        (lambda: detections(boxes=np.full((1, 7), -math.inf, np.float32)), "returned boxes with the value -inf"),
+        (lambda: detections(boxes=BOX.astype(object)), "returned boxes as an array of type object"),
+        (lambda: detections(boxes=BOX.astype(complex)), "returned boxes as an array of type complex128"),
+        (lambda: detections(boxes=BOX.astype(str)), "returned boxes as an array of type <U32"),
+        (lambda: detections(scores=np.array([-math.inf])), "returned scores with the value -inf"),
+        (lambda: detections(velocity=np.full((1, 2), math.inf)), "returned velocity with the value inf"),
+        (lambda: detections(covariance=np.full((1, 2, 2), math.inf)), "returned covariance with the value inf"),
+        (lambda: detections(time=None), "returned time as None"),
+        (lambda: detections(time=math.nan), "returned time with the value nan"),
+        (lambda: detections(time="1"), "returned time as an object of type str"),
+        (lambda: detections(classes=("dragon",)), "returned the class 'dragon'"),
+        (lambda: detections(classes=([],)), "returned the class []"),
+        (lambda: detections(tracks=("a",)), "returned the track 'a'"),
+        (lambda: None, "returned None"),
+        (lambda: (), "returned an object of type tuple"),
+    ],
+)
+def test_detections_of_anything_else_are_refused(make: Callable[[], Any], problem: str) -> None:
+    with pytest.raises(InvalidResult) as caught:
+        check_detections(Given(), "detect", make())
+    assert str(caught.value).startswith(f"detect {problem}")
+
+
+def test_results_of_derived_classes_of_others_are_checked() -> None:
+    class Derived(OracleDetector):
+        pass
+
+    assert not is_checked(OracleDetector())
+    assert is_checked(Derived())
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "problem"),
+    [
+        ("needs", "camera", "needs is 'camera'"),
+        ("needs", frozenset({"sonar"}), r"needs is frozenset\({'sonar'}\)"),
+        ("settings_type", dict, "settings_type is <class 'dict'>"),
+    ],
+)
+def test_detector_class_that_declares_nonsense_is_named(
+    name: str, value: object, problem: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(OracleDetector, name, value)
+    with pytest.raises(RegistryError, match=rf"detectors 'oracle' \(.*:OracleDetector\): {problem}"):
+        build_detector(AgentSettings(detector="oracle"))
