@@ -9,9 +9,11 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, cast
 
 MIB = 2**20
 _CHUNK = MIB
@@ -70,6 +72,13 @@ def read_regular_file(path: str | os.PathLike[str], limit: int) -> bytes:
 def reason_of(error: Exception) -> str:
     """The reason why a file cannot be read, without its path; only for errors whose texts quote no content."""
     return getattr(error, "strerror", None) or str(error)
+
+
+def file_in_memory() -> BinaryIO:
+    """A file with a descriptor and without a name; on systems without such files, a temporary one."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("eidrive"), "w+b")
+    return cast(BinaryIO, tempfile.TemporaryFile())
 
 
 @contextmanager

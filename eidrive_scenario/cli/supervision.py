@@ -8,7 +8,6 @@ import ctypes
 import os
 import signal
 import sys
-import tempfile
 from collections.abc import Callable
 from types import FrameType
 from typing import BinaryIO
@@ -16,6 +15,7 @@ from typing import BinaryIO
 import typer
 
 from eidrive_scenario.cli.failures import BROKEN
+from eidrive_scenario.files import file_in_memory
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
@@ -41,7 +41,7 @@ def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[
     """
     if not _allowed or not hasattr(os, "fork"):
         return
-    dump = tempfile.TemporaryFile()  # noqa: SIM115 - stays open as long as the process
+    dump = file_in_memory()  # stays open as long as the process
     finished, finish = os.pipe()
     sys.stdout.flush()
     sys.stderr.flush()

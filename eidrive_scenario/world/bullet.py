@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from typing import Any
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.files import file_in_memory
 
 _NOTICE = b"pybullet build time:"
 
 
 def _import_silently() -> Any:
-    """Import pybullet while the file descriptor 2 points to a file; what else came there is passed on.
+    """Import pybullet while the file descriptor 2 points to a file in memory; what else came there is passed on.
 
     The notice is printed by C code, so that `contextlib.redirect_stderr` does not reach it.
     """
@@ -25,7 +25,7 @@ def _import_silently() -> Any:
         import pybullet
 
         return pybullet
-    with tempfile.TemporaryFile() as caught:
+    with file_in_memory() as caught:
         os.dup2(caught.fileno(), 2)
         try:
             import pybullet

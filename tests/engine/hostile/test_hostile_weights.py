@@ -1,0 +1,163 @@
+"""TorchScript weights in a scenario: what check and run do with them, watched by an audit hook in a new process."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from eidrive_scenario.cli import app
+from eidrive_scenario.library import library_path
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.simulation import RunSettings, Simulation
+
+Write = Callable[..., Path]
+
+WATCHED = """
+import json, os, sys
+allowed, report = sys.argv[1], sys.argv[2]
+events = []
+
+def note(event, arguments):
+    if event == "open":
+        path, mode, flags = arguments
+        writes = isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC)
+        if (writes or (isinstance(mode, str) and set(mode) & set("wax+"))) and path != os.devnull and not isinstance(path, int):
+            events.append(["writes", str(path)])
+    elif event.split(".")[0] in ("subprocess", "socket") or event in (
+        "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "pty.spawn",
+    ):
+        events.append([event, ""])
+    elif event in ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.chmod", "os.truncate",
+                   "shutil.rmtree", "shutil.move"):
+        events.append(["changes", str(arguments[0])])
+
+sys.addaudithook(note)
+sys.argv = ["eidrive", *sys.argv[3:]]
+code = 0
+try:
+    from eidrive_scenario.cli import main
+    main()
+except SystemExit as end:
+    code = end.code
+result = {"code": code, "events": list(events), "torch": "torch" in sys.modules}
+with open(report, "w") as stream:
+    json.dump(result, stream)
+"""
+"""Runs `eidrive` with the arguments from the third on, and writes what an audit hook noticed to the second."""
+
+
+@pytest.fixture
+def torchscript(tmp_path: Path) -> Path:
+    """A module whose code writes a file when it is run; it does not have to be one for a run that refuses it."""
+    path = tmp_path / "weights.pt"
+    path.write_bytes(b"PK\x03\x04 code that nobody shall run")
+    return path
+
+
+def with_weights(write: Write, weights: Path) -> Path:
+    """A scenario whose ego looks with these weights."""
+    settings = f"{{weights: {weights}, classes: [car, truck], input_size: [96, 64]}}"
+    return write({"detector": "yolov5", "detector_settings": settings})
+
+
+def watched(folder: Path, *arguments: str, **environment: str) -> dict[str, object]:
+    """What `eidrive` with these arguments did, as an audit hook saw it."""
+    report = folder / "report.json"
+    inherited = {name: value for name, value in os.environ.items() if name != "EIDRIVE_ALLOW_TORCHSCRIPT"}
+    command = [sys.executable, "-B", "-c", WATCHED, str(folder), str(report), *arguments]
+    done = subprocess.run(command, env=inherited | environment, capture_output=True, text=True, check=False, cwd=folder)
+    assert report.exists(), done.stderr
+    found: dict[str, object] = json.loads(report.read_text())
+    found["output"] = done.stdout + done.stderr
+    return found
+
+
+def outside(found: dict[str, object], folder: Path | None) -> list[list[str]]:
+    """The events that are no writing below a folder."""
+    events: list[list[str]] = found["events"]  # type: ignore[assignment]
+    return [
+        [kind, path]
+        for kind, path in events
+        if kind not in ("writes", "changes")
+        or folder is None
+        or not os.path.abspath(os.path.join(folder.parent, path)).startswith(str(folder))
+    ]
+
+
+def test_check_with_torchscript_writes_nothing_starts_nothing_and_imports_no_torch(
+    write: Write, torchscript: Path, tmp_path: Path
+) -> None:
+    path = with_weights(write, torchscript)
+    for allowed in ("", "1"):
+        found = watched(tmp_path, "check", str(path), EIDRIVE_ALLOW_TORCHSCRIPT=allowed)
+        assert found["code"] == 0
+        assert outside(found, None) == []
+        assert found["torch"] is False
+        assert "the run is refused: its TorchScript weights can execute any code" in str(found["output"])
+
+
+def test_run_with_torchscript_is_refused_and_writes_only_to_its_output_folder(
+    write: Write, torchscript: Path, tmp_path: Path
+) -> None:
+    path = with_weights(write, torchscript)
+    out = tmp_path / "out"
+    found = watched(tmp_path, "run", str(path), "--out", str(out), "--time-limit", "0.2")
+    assert found["code"] == 2
+    assert f"{path}:" in str(found["output"])
+    assert "which can execute any code with your rights" in str(found["output"])
+    assert outside(found, out) == []
+    assert found["torch"] is False
+
+
+def test_run_without_weights_writes_only_to_its_output_folder(write: Write, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    found = watched(tmp_path, "run", str(write()), "--out", str(out), "--time-limit", "0.2")
+    assert found["code"] == 3  # out of time
+    assert outside(found, out) == []
+    assert [event for event in found["events"] if event[0] == "writes"]  # type: ignore[attr-defined]
+
+
+def test_check_of_shipped_and_onnx_weights_loads_none(write: Write, tmp_path: Path) -> None:
+    """A file that is no model at all passes `check`, which does not read it; `run` refuses it."""
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"no model")
+    found = watched(tmp_path, "check", str(with_weights(write, broken)))
+    assert (found["code"], found["torch"], outside(found, None)) == (0, False, [])
+    found = watched(tmp_path, "check", str(write({"detector": "ssd"})))
+    assert (found["code"], found["torch"], outside(found, None)) == (0, False, [])
+    result = CliRunner().invoke(app, ["run", str(with_weights(write, broken)), "--no-record"])
+    assert result.exit_code == 2
+    assert "are not an ONNX model that can be read" in result.output
+
+
+def test_run_with_permission_loads_torchscript(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the option, by the environment variable, and by RunSettings."""
+    torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+
+    class Empty(torch.nn.Module):  # type: ignore[name-defined,misc]
+        def forward(self, pixels: torch.Tensor) -> torch.Tensor:  # type: ignore[name-defined]
+            return pixels.new_zeros((1, 3, 7))
+
+    path = tmp_path / "empty.pt"
+    with pytest.warns(DeprecationWarning, match="script"):
+        torch.jit.script(Empty()).save(str(path))
+    scenario = with_weights(write, path)
+    command = ["run", str(scenario), "--no-record", "--time-limit", "0.2"]
+    assert CliRunner().invoke(app, command).exit_code == 2
+    assert CliRunner().invoke(app, [*command, "--allow-torchscript"]).exit_code == 3
+    assert CliRunner().invoke(app, command, env={"EIDRIVE_ALLOW_TORCHSCRIPT": "1"}).exit_code == 3
+    settings = RunSettings(time_limit=0.2, allow_torchscript=True)
+    assert Simulation(load_scenario(scenario), settings=settings).run().end == "time limit"
+
+
+def test_library_scenarios_are_checked_without_torch(tmp_path: Path) -> None:
+    found = watched(tmp_path, "check", str(library_path() / "coop"))
+    assert found["torch"] is False
+    assert outside(found, None) == []
