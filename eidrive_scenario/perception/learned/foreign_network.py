@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from eidrive_scenario.errors import Problem, SettingError, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights, refused_torchscript
 
+_LAYER = re.compile(r"Node \[([\w.]{1,60})@")
 _LOG = logging.getLogger(__name__)
 
 Floats = NDArray[np.float32]

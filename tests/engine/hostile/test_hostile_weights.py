@@ -28,7 +28,8 @@ def note(event, arguments):
     if event == "open":
         path, mode, flags = arguments
         writes = isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC)
-        if (writes or (isinstance(mode, str) and set(mode) & set("wax+"))) and path != os.devnull and not isinstance(path, int):
+        writes = writes or (isinstance(mode, str) and set(mode) & set("wax+"))
+        if writes and path != os.devnull and not isinstance(path, int):
             events.append(["writes", str(path)])
     elif event.split(".")[0] in ("subprocess", "socket") or event in (
         "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn", "os.spawn", "pty.spawn",
