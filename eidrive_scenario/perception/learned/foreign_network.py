@@ -201,8 +201,9 @@ def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
 
 
 def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
-    """The error for a file that is not read. Its reason, which may quote the file, is logged for debugging only."""
+    """The error for a file that is not read. Of its reason, which may quote the file, only the layer is named."""
     _LOG.debug("%s: %s", path, error)
-    return SettingError(
-        Problem(f"weights {quoted(str(path))} are not {kind} that can be read", "export the model again")
-    )
+    layer = _LAYER.search(str(error))
+    message = f"weights {quoted(str(path))} are not {kind} that can be read"
+    message += f": OpenCV has no such layer as {layer[1]}" if layer else ""
+    return SettingError(Problem(message, "export the model again"))
