@@ -16,7 +16,7 @@ PATIENCE = 2.0
 
 
 class MotionlessStations:
-    """Watches stations until they are `LEAST` metres from where they were first seen.
+    """Watches stations until they are `LEAST` [m] away from where they were first seen.
 
     `watching` is False as soon as there is none left, so that a tick costs nothing.
     """

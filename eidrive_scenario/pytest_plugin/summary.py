@@ -1,4 +1,4 @@
-"""What the plugin adds to the end of a test session."""
+"""Sections of the plugin at the end of a test session."""
 
 from __future__ import annotations
 

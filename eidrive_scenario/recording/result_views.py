@@ -19,7 +19,7 @@ _WHOLE = re.compile(r"[+-]?(0|[1-9]\d{0,17})", re.ASCII)
 
 
 class Result(Protocol):
-    """What the views read of a RunResult."""
+    """The fields of a RunResult that the views read."""
 
     @property
     def scenario(self) -> str: ...

@@ -85,7 +85,7 @@ def test_distribution_varies_delay_and_results_tell_runs_apart(make: Make, tmp_p
     runs = [json.loads(line) for line in printed.splitlines()]
     assert [float(run["parameters"]["Latency"]) for run in runs] == pytest.approx([0.0, 0.2, 0.4])
     links = [next(link for link in run["links"] if (link["sender"], link["receiver"]) == LINK) for run in runs]
-    # Nothing arrives in the tick in which it was sent, but the books state the delay of the channel itself.
+    # Nothing arrives in the tick in which it was sent, but the statistics state the delay of the channel itself.
     assert [link["mean_delay"] for link in links] == pytest.approx([0.0, 0.2, 0.4])
 
 
