@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from typing import Any
 
 import typer
@@ -36,9 +37,9 @@ class Guarded(TyperGroup):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(_NOBODY_READS) from error
         except (Exception, SystemExit) as error:
-            if ctx.params.get("traceback") or _from_typer(error):
+            if _from_typer(error):
                 raise
-            tell(error)
+            (show_traceback if ctx.params.get("traceback") else tell)(error)
             raise typer.Exit(BROKEN) from error
 
 
@@ -61,6 +62,11 @@ def tell(error: BaseException, file: object = None) -> None:
     typer.echo(f"{place}internal error: {type(error).__name__}: {error}", err=True)
     typer.echo("eidrive --traceback … (or EIDRIVE_TRACEBACK=1) shows where; please report it", err=True)
     tell_notes(error)
+
+
+def show_traceback(error: BaseException) -> None:
+    """Print on stderr where an error arose."""
+    typer.echo("".join(traceback.format_exception(error)).rstrip(), err=True)
 
 
 def tell_notes(error: BaseException) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from eidrive_scenario.cli.failures import BROKEN, tell
+from eidrive_scenario.cli.failures import BROKEN, show_traceback, tell
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.errors import EidriveError, SimulationError
 
@@ -22,7 +22,7 @@ class RunFailures:
     """Reports of the runs of one command.
 
     scenario   as it was given
-    traceback  whether errors are raised on instead
+    traceback  whether errors are shown with their traceback
     """
 
     def __init__(self, scenario: str, *, json: bool, traceback: bool) -> None:
@@ -37,11 +37,9 @@ class RunFailures:
         self._seed, self._run = seed, run
 
     def report(self, error: EidriveError) -> None:
-        """Report the error of the present run; raise it where tracebacks are wanted."""
-        if self._traceback:
-            raise error
+        """Report the error of the present run, with its traceback where that is wanted."""
         self._print_json(error)
-        tell(error)
+        (show_traceback if self._traceback else tell)(error)
 
     def end_hung_run(self, limit: Limit, frame: FrameType | None) -> None:
         """Report a run that executes this frame and cannot be interrupted, and end the process."""

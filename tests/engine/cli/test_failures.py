@@ -34,9 +34,12 @@ def test_a_broken_run_says_so(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch)
 
 def test_on_demand_it_shows_where(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
     break_with(monkeypatch, ZeroDivisionError("division by zero"))
-    assert isinstance(eidrive("--traceback", "list").exception, ZeroDivisionError)
+    asked = eidrive("--traceback", "list")
+    assert asked.exit_code == 3
+    assert "Traceback (most recent call last)" in asked.stderr
+    assert asked.stderr.rstrip().endswith("ZeroDivisionError: division by zero")
     monkeypatch.setenv("EIDRIVE_TRACEBACK", "1")
-    assert isinstance(eidrive("list").exception, ZeroDivisionError)
+    assert "Traceback (most recent call last)" in eidrive("list").stderr
 
 
 def test_an_interrupt_is_no_verdict(eidrive: Eidrive, monkeypatch: pytest.MonkeyPatch) -> None:
