@@ -46,6 +46,14 @@ class Registry:
         """The module and object behind a name, as `package.module:Object`."""
         return self._points[name].value
 
+    def distribution(self, name: str) -> str | None:
+        """Package, version and entry point of an extension; None for a built-in one, or where there is none."""
+        point = self._points.get(name)
+        if point is None or point.value.split(".")[0].split(":")[0] in _BUILT_IN:
+            return None
+        package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "unknown package"
+        return f"{package} ({point.value})"
+
     def load(self, name: str, base: type | None = None) -> Any:
         """The extension of that name, a class derived from `base`.
 

@@ -42,6 +42,7 @@ class ResolvedSettings:
     dt, time_limit   [s]
     files            SHA-256 of each file that enters: (role, name, digest); the scenario is the first
     versions         of the packages that decide the result
+    extensions       of third parties that are used, by kind and name: package, version and entry point
     """
 
     scenario: str = ""
@@ -64,6 +65,7 @@ class ResolvedSettings:
     time_limit: float = 120.0
     files: tuple[tuple[str, str, str], ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
+    extensions: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """The settings as JSON values, in the order of the fields."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from pydantic import BaseModel
 from eidrive_scenario.commands import CHANNEL
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.files import is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.library import library_path, name_of
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import CustomCommandAction
@@ -28,6 +28,9 @@ from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run import RunSettings
 from eidrive_scenario.v2x.profile import ChannelProfile, load_profile
 from eidrive_scenario.world.weather import Weather
+
+_LARGEST = 1024 * 2**20
+"""Maximum size of a file that a setting names and whose digest is taken [bytes]."""
 
 
 def resolve_settings(
@@ -57,6 +60,7 @@ def resolve_settings(
         time_limit=float(settings.time_limit),
         files=tuple(dict.fromkeys(files)),
         versions=dict(package_versions()),
+        extensions=_extensions(stations, settings),
     )
 
 
@@ -75,6 +79,17 @@ def _station(settings: AgentSettings) -> dict[str, Any]:
         if isinstance(model, type) and issubclass(model, BaseModel):
             found[f"{name}_settings"] = model.model_validate(found[f"{name}_settings"]).model_dump(mode="json")
     return found
+
+
+def _extensions(stations: Stations, settings: RunSettings) -> dict[str, str]:
+    """The detectors, fusion methods, planners, channel and controller models of third parties that are used."""
+    profile = stations.channel_profile
+    used = {("channels", profile.model)} if profile is not None else set()
+    used |= {("controllers", name) for name in settings.controllers.values()}
+    for station in stations.settings.values():
+        used |= {("detectors", station.detector), ("fusion", station.fusion), ("planners", station.planner or "")}
+    found = {f"{kind}.{name}": registry(kind).distribution(name) for kind, name in sorted(used)}
+    return {name: distribution for name, distribution in found.items() if distribution is not None}
 
 
 def _dump(model: BaseModel | None) -> dict[str, Any] | None:
@@ -110,7 +125,13 @@ def _setting_files(values: tuple[Mapping[str, Any] | None, ...], scenario: Scena
     folder = scenario.path.parent if scenario.path is not None else Path()
     for value in values:
         for name in named_files(value):
-            place = next((path for path in (folder / name, Path(name)) if path.is_file()), None)
+            place = next((path for path in (folder / name, Path(name)) if is_regular_file(path)), None)
             if place is not None:
-                with place.open("rb") as stream:
-                    yield "setting", place.name, hashlib.file_digest(stream, "sha256").hexdigest()
+                yield "setting", place.name, _digest(place)
+
+
+def _digest(path: Path) -> str:
+    try:
+        return sha256_of(read_regular_file(path, _LARGEST))
+    except OSError as error:
+        return f"unknown: {reason_of(error)}"

@@ -19,7 +19,9 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     if values > max_values:
         raise ValueError(f"it has more than {max_values} values")
     try:
-        document = json.loads(data)
+        document = json.loads(data.decode())
+    except UnicodeDecodeError as error:
+        raise ValueError(f"it is not UTF-8 (byte {error.start})") from None
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     if max_depth is not None and _is_deeper(document, max_depth):

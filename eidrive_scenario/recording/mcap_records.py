@@ -16,6 +16,7 @@ from typing import NamedTuple, Self
 import zstandard
 
 from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.files import is_regular_file
 from eidrive_scenario.recording.damage import DamageReport
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -27,6 +28,10 @@ LARGEST_CHUNK = 128 * 2**20
 LARGEST_CONTENT = 8 * 2**30
 """Maximum size of all chunks of a file without compression [bytes]."""
 MOST_RECORDS = 2_000_000
+_SMALL_CHUNK = 4 * 2**20
+"""Size up to which a chunk may be compressed to any degree [bytes]."""
+_MOST_COMPRESSED = 300
+"""Maximum compression of a larger chunk, which holds a single frame; those of scenario 1 are compressed 27-fold."""
 _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
@@ -61,6 +66,8 @@ class McapFile:
 
     def __init__(self, path: Path, damage: DamageReport) -> None:
         self._damage = damage
+        if os.path.exists(path) and not is_regular_file(path):
+            raise InputError(Problem("cannot read: not a regular file", "give an MCAP recording", str(path)))
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
             status = os.fstat(self._descriptor)
@@ -201,8 +208,11 @@ def chunk_messages(record: Record, damage: DamageReport) -> list[Message]:
         damage.add("a chunk cannot be read", place)
         return []
     packed = record.body[start + 8 : start + 8 + length]
-    if len(packed) != length or size > LARGEST_CHUNK or compression not in ("", "zstd"):
-        damage.add("a chunk is too large" if size > LARGEST_CHUNK else "a chunk cannot be read", place)
+    if size > LARGEST_CHUNK or size > max(_SMALL_CHUNK, _MOST_COMPRESSED * len(packed)):
+        damage.add("a chunk is too large, or compressed more than frames are", place)
+        return []
+    if len(packed) != length or compression not in ("", "zstd"):
+        damage.add("a chunk cannot be read", place)
         return []
     try:
         data = packed if compression == "" else _unpacked(packed, size)

@@ -258,5 +258,5 @@ def _decoded(data: bytes, decode: Callable[[object], Frame]) -> Frame:
         frame = decode(load_json(data, _MOST_VALUES))
         check_frame(frame)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        raise ValueError(repr(error)[:200]) from error
+        raise ValueError(f"{type(error).__name__}: {error}"[:200]) from None
     return frame

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.files import read_regular_file
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.output import PARTIAL, partial
 
@@ -92,12 +92,7 @@ def unfinished_runs(places: Sequence[Path]) -> Iterator[Path]:
 def read_result(path: Path) -> dict[str, Any]:
     """A result, as JSON values. Raises InputError if the file is not one."""
     try:
-        with open(os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
-            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                raise InputError(Problem("not a regular file", f"give a {RESULT}", str(path)))
-            data = stream.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise InputError(Problem(f"larger than {_LARGEST // 2**20} MiB", f"give a {RESULT}", str(path)))
+        data = read_regular_file(path, _LARGEST)
         result = load_json(data, max_depth=_DEEPEST)
     except OSError as error:
         raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error

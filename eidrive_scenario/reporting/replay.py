@@ -104,7 +104,7 @@ def _drawable(recording: Recording, report: DamageReport, trace: TraceHash) -> I
         try:
             trace.observe(frame)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            report.add("frames do not fit together", f"tick {frame.view.tick}: {shortened(repr(error), 200)}")
+            report.add("frames do not fit together", f"tick {frame.view.tick}: {_described(error)}")
         yield frame
 
 
@@ -112,8 +112,14 @@ def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
     try:
         return recorded_roads(recording)
     except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
-        report.add("the roads are not drawn", shortened(str(error).splitlines()[0] if str(error) else repr(error), 300))
+        report.add("the roads are not drawn", _described(error))
         return RoadDrawing()
+
+
+def _described(error: Exception) -> str:
+    """An error in a line; of an input error its first diagnostic."""
+    text = str(error.problems[0]) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+    return shortened(text, 300)
 
 
 def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
@@ -177,7 +183,7 @@ def replay_data(
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if report is None:
                 raise
-            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {shortened(repr(error), 200)}")
+            report.add("frames cannot be drawn", f"tick {frame.view.tick}: {_described(error)}")
             continue
         if not budget.take(_size(part), frame.view.time):
             break

@@ -75,8 +75,9 @@ def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:
             facts[f"{key.removesuffix('s').replace('_', ' ')} {name}"] = shortened(flow_text(value))
     for name, value in _entries(settings.get("parameters")):
         facts[f"${name}"] = shortened(short_number(str(value)))
-    for name, value in _entries(settings.get("versions")):
-        facts[str(name)] = flow_text(value)
+    for key in ("versions", "extensions"):
+        for name, value in _entries(settings.get(key)):
+            facts[str(name)] = shortened(flow_text(value))
     return facts
 
 

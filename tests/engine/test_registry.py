@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 
@@ -45,3 +46,15 @@ def test_two_of_one_name_are_an_error_that_names_both() -> None:
 def test_an_unknown_name_gets_the_nearest() -> None:
     with pytest.raises(SettingError, match="did you mean 'collision'"):
         registry_of(collision="eidrive_criteria.collision:Collision").load("colision")
+
+
+def test_distribution_names_the_package_of_third_parties_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    metadata = tmp_path / "radar_kit-1.4.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: radar-kit\nVersion: 1.4\n")
+    (metadata / "entry_points.txt").write_text("[eidrive_scenario.detectors]\nradar = radar_kit:Radar\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    detectors = Registry("detectors")
+    assert detectors.distribution("radar") == "radar-kit 1.4 (radar_kit:Radar)"
+    assert detectors.distribution("oracle") is None
+    assert detectors.distribution("no such") is None
