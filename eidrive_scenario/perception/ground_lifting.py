@@ -50,6 +50,12 @@ def _hull(*quarter: tuple[float, float, float]) -> Array:
     return np.array([(a * x, b * y, z) for x, y, z in quarter for a, b in signs])
 
 
+def _sliced(hull: Array) -> Array:
+    """The points of a hull and those between its two ends: what is cut off has its own outline."""
+    rear = hull * (-1.0, 1.0, 1.0)
+    return np.concatenate([hull + share * (rear - hull) for share in (0.0, 0.125, 0.25, 0.375, 0.5)])
+
+
 _BOX = _hull((0.5, 0.5, 0.0), (0.5, 0.5, 1.0))
 _CAR = _hull(
     (0.31, 0.45, 0.0), (0.5, 0.42, 0.15), (0.5, 0.42, 0.55), (0.4, 0.49, 0.2), (0.4, 0.49, 0.6), (0.22, 0.32, 1.0)
@@ -115,6 +121,8 @@ class _View:
         self._sizes = np.array([prior.mean for prior in priors])
         self._deviations = np.array([prior.deviation for prior in priors])
         hulls = [_HULLS.get(name, _BOX) for name in classes]
+        if not np.all((boxes[:, 0] > AT_BORDER) & (boxes[:, 2] < camera.rgb.shape[1] - AT_BORDER)):
+            hulls = [_sliced(hull) for hull in hulls]
         most = max(map(len, hulls))
         self._hulls = np.array([np.resize(hull, (most, 3)) for hull in hulls])
         focal = float(camera.intrinsics[0, 0])
@@ -131,8 +139,13 @@ class _View:
             axis=1,
         )
 
+        self._cut = ~(self._known[:, 0] & self._known[:, 2])
+        """Whether the picture's left or right border cuts the object off."""
+        self._borders = np.where(self._cut[:, None], self._edges[:, [0, 2]], (-np.inf, np.inf))
+        self._borders[self._known[:, 0], 0] = -np.inf
+        self._borders[self._known[:, 2], 1] = np.inf
         self._known &= ~_behind_others(boxes)
-        self._lowest = np.where(self._known[:, 0] & self._known[:, 2], 0.0, CUT_DEVIATION)
+        self._lowest = np.where(self._cut, CUT_DEVIATION, 0.0)
 
     def place(self, ground: Array, surroundings: Surroundings) -> ByGround:
         """What the boxes are, for heights (N,) of the ground."""
@@ -231,7 +244,14 @@ class _View:
         down = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
         ahead = np.maximum(turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z, NEAREST)
         u, v = across / ahead, down / ahead
-        edges = np.stack([u.min(axis=-1), v.min(axis=-1), u.max(axis=-1), v.max(axis=-1)], axis=-1)
+        top, bottom = v.min(axis=-1), v.max(axis=-1)
+        if self._cut.any():
+            # What the border cuts off shows neither top nor bottom: only points within the picture count.
+            shown = (u >= self._borders[:, None, None, 0]) & (u <= self._borders[:, None, None, 1])
+            some = shown.any(axis=-1)
+            top = np.where(some, np.where(shown, v, np.inf).min(axis=-1), top)
+            bottom = np.where(some, np.where(shown, v, -np.inf).max(axis=-1), bottom)
+        edges = np.stack([u.min(axis=-1), top, u.max(axis=-1), bottom], axis=-1)
         return edges, ahead.mean(axis=-1)
 
     def _weights(self, depth: Array) -> Array:
