@@ -4,7 +4,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
-.PHONY: help install demo test lint reproduce-trends docs bench eval weather-sheet clean
+.PHONY: help install demo test lint reproduce-trends docs bench eval closed-loop weather-sheet clean
 
 help:           ## this list
 	@grep -E '^[a-z-]+: .*##|^[a-z-]+:  +##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -45,6 +45,9 @@ bench: install  ## simulated seconds per wall second, and where the time goes
 
 eval: install   ## what the learned detectors see: held-out pictures, library scenes, reports/detection.md
 	$(BIN)/python -m training.evaluate
+
+closed-loop: install  ## learned detectors in the paper's scenarios, 20 seeds each: reports/closed_loop.md
+	$(BIN)/python -m eidrive_scenario.experiments.closed_loop --out reports
 
 weather-sheet: install  ## one street in all weathers of the library: reports/weather.png
 	$(BIN)/python -m eidrive_scenario.reporting.weather_sheet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,8 +68,16 @@ def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRA
                     tick += 1
 
 
-def random_scenes(seed: int, split: str, worlds: int, weather: Weather, each: int = 2) -> Iterator[Seen]:
-    """What a car with the usual sensors sees in random traffic on random places."""
+def random_scenes(
+    seed: int,
+    split: str,
+    worlds: int,
+    weather: Weather,
+    each: int = 2,
+    sensors: Mapping[str, AnySensorSettings] | None = None,
+) -> Iterator[Seen]:
+    """What a car with the usual sensors, or other ones named `camera` and `lidar`, sees in random traffic."""
+    sensors = sensors or usual_sensors()
     for number in range(worlds):
         rng = generator(seed, "training data", split, number)
         with tempfile.TemporaryDirectory() as folder:
@@ -87,8 +95,8 @@ def random_scenes(seed: int, split: str, worlds: int, weather: Weather, each: in
                 for other, there in random_traffic(rng, spots, View(CameraSettings(), pose, (spec, placement))):
                     world.add(other, there)
                 specs = {actor: world.spec(actor) for actor in world.names}
-                rig = Rig(spec, usual_sensors(), seed=seed)
-                yield from _read(world, {spec.name: rig}, specs, place.roads, weather.name)
+                rig = Rig(spec, dict(sensors), seed=seed)
+                yield from _read(world, {spec.name: rig}, specs, place.roads, weather.name, sensors)
 
 
 def _carrier(rng: np.random.Generator, spots: Spots) -> tuple[ActorSpec, Placement]:
@@ -98,10 +106,15 @@ def _carrier(rng: np.random.Generator, spots: Spots) -> tuple[ActorSpec, Placeme
 
 
 def _read(
-    world: World, rigs: dict[str, Rig], specs: dict[str, ActorSpec], roads: RoadNetwork | None, weather: str
+    world: World,
+    rigs: dict[str, Rig],
+    specs: dict[str, ActorSpec],
+    roads: RoadNetwork | None,
+    weather: str,
+    sensors: Mapping[str, AnySensorSettings] | None = None,
 ) -> Iterator[Seen]:
     view = world.view()
     for name, readings in read_all(list(rigs.values()), world, view).items():
         labels = actor_labels(readings.cameras["camera"], view, specs, (name,))
-        installation = Installation(specs[name], usual_sensors(), roads, 1)
+        installation = Installation(specs[name], dict(sensors or usual_sensors()), roads, 1)
         yield Seen(readings, labels, weather, installation)

@@ -169,7 +169,8 @@ def replay_data(
     """What the page's script draws, as plain lists; lengths in metres to a centimetre, angles to a milliradian.
 
     actors   by name: category and size; poses[frame][name] = x, y, yaw of the box centre, speed
-    stations by name, for each frame: own and heard boxes [x, y, l, w, yaw], links [sender, delivered], plan's reason
+    stations by name, for each frame: own and heard boxes [x, y, l, w, yaw] or, where it is estimated, with the
+             probability of existence as sixth; links [sender, delivered], plan's reason
     changes  [time, path, after, why] of the storyboard's transitions
 
     With a `report`, a frame that cannot be drawn is reported there and left out.
@@ -254,11 +255,16 @@ def _station(snapshot: Snapshot) -> dict[str, Any]:
 
 
 def _boxes(detections: Detections) -> list[list[float]]:
+    existence = detections.existence.tolist() or [None] * len(detections)
     return [
-        [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3)]
-        for x, y, _, length, width, _, yaw in detections.boxes.tolist()
+        [round(x, 2), round(y, 2), round(length, 2), round(width, 2), round(yaw, 3), *_share(exists)]
+        for (x, y, _, length, width, _, yaw), exists in zip(detections.boxes.tolist(), existence, strict=True)
         if math.isfinite(x + y + yaw + length + width)
     ]
+
+
+def _share(existence: float | None) -> list[float]:
+    return [] if existence is None or not math.isfinite(existence) else [round(existence, 2)]
 
 
 def _roads(roads: RoadDrawing) -> dict[str, Any]:

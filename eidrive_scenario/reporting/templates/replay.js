@@ -22,7 +22,7 @@ for (const [time, path, after, why] of data.changes) {
   item.title = path + (why ? ": " + why : "");
   item.onclick = () => { pause(); show(data.times.findIndex((t) => t >= time - 1e-6)); };
 }
-for (const [colour, text] of [[C.own, "seen by the station itself"], [C.received, "received from others"], [C.link, "message arrives"], [C.lost, "message lost"]]) {
+for (const [colour, text] of [[C.own, "seen by the station itself (%: probability of existence)"], [C.received, "received from others"], [C.link, "message arrives"], [C.lost, "message lost"]]) {
   const entry = make("span", "", element("legend"));
   const patch = make("i", "", entry);
   patch.className = "swatch";
@@ -61,6 +61,19 @@ function box([x, y, length, width, yaw], fill, stroke, line, opacity) {
   pen.strokeStyle = stroke;
   pen.strokeRect(-length / 2, -width / 2, length, width);
   pen.restore();
+}
+
+/* A box that somebody knows of; the less likely its object is to exist, the paler and thinner. */
+function perceived(at, colour, line) {
+  const existence = at.length > 5 ? at[5] : 1;
+  box(at, colour, colour, line * (0.3 + 0.7 * existence), 0.28 * existence);
+  if (existence < 0.995) {
+    pen.save();
+    pen.translate(at[0], at[1]); pen.scale(1, -1);
+    pen.font = "1.4px sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillStyle = colour;
+    pen.fillText(`${Math.round(100 * existence)} %`, 0, 0);
+    pen.restore();
+  }
 }
 
 function outline(name, [x, y, yaw], at) {
@@ -103,8 +116,8 @@ function draw() {
     trace([poses[sender], poses[self]]); pen.stroke();
   }
   pen.setLineDash([]);
-  if (station) for (const heard of station.heard) box(heard, C.received, C.received, 0.5, 0.28);
-  if (station) for (const own of station.own) box(own, C.own, C.own, 0.25, 0.28);
+  if (station) for (const heard of station.heard) perceived(heard, C.received, 0.5);
+  if (station) for (const own of station.own) perceived(own, C.own, 0.25);
   for (const [name, [x, y, yaw]] of Object.entries(poses)) {
     const [length, width] = data.actors[name].size, filled = name === self;
     if (Math.max(length, width) < 1) {

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lxml import html
 
@@ -43,6 +45,14 @@ def test_data_tells_own_boxes_from_heard_ones(street: Play) -> None:
     assert sorted(box[:2] for box in ego["heard"]) == [[25.4, 5.6], [29.5, 15.7]]
     assert ego["links"] == [["RSU", True]]
     assert ego["plan"] == "conflict area"
+
+
+def test_data_states_existence_where_it_is_estimated(street: Play) -> None:
+    frame = street(6)[40]
+    step = frame.steps["Ego"]
+    seen = replace(step.detections, existence=np.full(len(step.detections), 0.876))
+    ego = replay_data([Frame(frame.view, {"Ego": replace(step, detections=seen)})])["stations"]["Ego"][0]
+    assert ego["own"] == [[25.4, 5.6, 8.47, 2.89, -1.571, 0.88]]
 
 
 def test_a_station_that_comes_later_has_no_knowledge_before(street: Play) -> None:

@@ -1,0 +1,120 @@
+"""The paper's scenarios driven by learned detectors: collisions, false tracks and brakings without a cause.
+
+python -m eidrive_scenario.experiments.closed_loop --out reports
+
+Writes closed_loop.jsonl, a line per run as soon as its seed is done, and the table closed_loop.md. Runs that the first
+file holds already are not repeated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from eidrive_scenario.experiments.paper import EGO, HIDDEN, SCENARIOS
+from eidrive_scenario.experiments.repetitions import Job, repeat
+from eidrive_scenario.experiments.statistics import wilson
+from eidrive_scenario.library import resolve_scenario
+from eidrive_scenario.simulation import RunSettings, run_file
+
+DETECTORS = ("yolov5", "ssd")
+CHANNELS = ("none", "ideal")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run. Distance [m] between the bodies, 0 where they touched; false tracks per simulated minute."""
+
+    scenario: str
+    detector: str
+    channel: str
+    seed: int
+    collisions: int
+    distance: float
+    false_tracks: float
+    brakings: int
+    without_cause: int
+
+
+def jobs(detectors: Sequence[str], channels: Sequence[str], seed: int) -> list[Job]:
+    """Return all runs of one seed; the arm is `detector channel`."""
+    return [
+        Job(scenario, f"{detector} {channel}", seed, RunSettings(channel=channel, detector=detector))
+        for scenario in SCENARIOS
+        for detector in detectors
+        for channel in channels
+    ]
+
+
+def row_of(job: Job) -> Row:
+    """Run a job and return what the table needs of it."""
+    result = run_file(resolve_scenario(job.scenario), seed=job.seed, settings=job.settings)
+    detector, channel = job.arm.split(" ", 1)
+    metrics = result.metrics
+    return Row(
+        job.scenario,
+        detector,
+        channel,
+        job.seed,
+        int(metrics["collision.count"]),
+        float(metrics[f"min_distance.{EGO}.{HIDDEN}.box"]),
+        float(metrics[f"false_tracks.{EGO}.per_minute"]),
+        int(metrics[f"false_tracks.{EGO}.brakings"]),
+        int(metrics[f"false_tracks.{EGO}.brakings_without_cause"]),
+    )
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as a Markdown table, one line per detector, scenario and channel in their order of appearance."""
+    lines = [
+        "| detector | scenario | channel | collision-free | 95 % interval | false tracks per minute | "
+        "brakings without cause |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for detector, scenario, channel in dict.fromkeys((row.detector, row.scenario, row.channel) for row in rows):
+        mine = [row for row in rows if (row.detector, row.scenario, row.channel) == (detector, scenario, channel)]
+        free = wilson(sum(row.collisions == 0 for row in mine), len(mine))
+        false = sum(row.false_tracks for row in mine) / len(mine)
+        causeless, brakings = sum(row.without_cause for row in mine), sum(row.brakings for row in mine)
+        lines.append(
+            f"| `{detector}` | {scenario.removeprefix('coop/')} | `{channel}` | {free.successes} of {len(mine)} | "
+            f"{free.low:.2f} to {free.high:.2f} | {false:.1f} | {causeless} of {brakings} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("reports"))
+    parser.add_argument("--seeds", type=int, default=20, help="from 1 on")
+    parser.add_argument("--detectors", default=",".join(DETECTORS))
+    parser.add_argument("--channels", default=",".join(CHANNELS))
+    parser.add_argument("--workers", type=int, default=None, help="processes; all cores by default")
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    record = options.out / "closed_loop.jsonl"
+    text = record.read_text(encoding="utf-8") if record.is_file() else ""
+    rows = [Row(**json.loads(line)) for line in text.splitlines()]
+    console = Console(stderr=True)
+    for seed in range(1, options.seeds + 1):
+        done = {(row.scenario, f"{row.detector} {row.channel}", row.seed) for row in rows}
+        wanted = jobs(options.detectors.split(","), options.channels.split(","), seed)
+        left = [job for job in wanted if (job.scenario, job.arm, job.seed) not in done]
+        found = repeat(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
+        with record.open("a", encoding="utf-8") as lines:
+            lines.writelines(json.dumps(asdict(row)) + "\n" for row in found)
+        rows += found
+    rows.sort(key=lambda row: (row.detector, row.scenario, row.channel, row.seed))
+    result = table(rows)
+    (options.out / "closed_loop.md").write_text(result, encoding="utf-8")
+    sys.stdout.write(result)
+
+
+if __name__ == "__main__":
+    main()
