@@ -69,14 +69,14 @@ def _points(boxes: Array) -> Array:
     return np.asarray(turned + boxes[:, None, :3])
 
 
-def _hidden(eye: Array, points: Array, boxes: Array, others: Array) -> Booleans:
-    """(N, P) whether one of `others` (M, 7) is between `eye` (3,) and points (N, P, 3) of boxes (N, 7): slab method."""
+def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Booleans:
+    """(N, P) whether one of `others` (M, 7) is between `origin` (3,) and points (N, P, 3) of boxes (N, 7)."""
     hidden = np.zeros(points.shape[:2], dtype=bool)
     for x, y, z, length, width, height, yaw in others.tolist():
         cos, sin = math.cos(yaw), math.sin(yaw)
         turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
         half = np.array([length, width, height]) / 2.0
-        start = turn @ (eye - (x, y, z))
+        start = turn @ (origin - (x, y, z))
         if np.all(np.abs(start) <= half):
             continue
         way = (points - (x, y, z)) @ turn.T - start

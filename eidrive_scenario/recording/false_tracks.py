@@ -21,7 +21,7 @@ SAME = 4.0
 
 @dataclass
 class _Station:
-    """What was counted of one station so far."""
+    """Counts of one station so far."""
 
     least: float
     false: list[Point] = field(default_factory=list)

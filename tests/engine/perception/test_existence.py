@@ -1,4 +1,4 @@
-"""Probability of existence: closed forms, and whether it is as often right as it says."""
+"""Probability of existence: closed forms, and calibration by simulated tracks."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_existence_of_simulated_tracks_is_calibrated() -> None:
     """Standing objects and false detections, drawn by the model that the tracker assumes, in cells of 4 m x 4 m.
 
     Of all tracks with an existence in a bin, the share with a true object lies within 0.1 of the mean existence. Births
-    have density b, false detections c = b p (1 - s) / s, objects live 2 s on average, as the tracker is told.
+    have density b, false detections c = b p (1 - s) / s, objects live 2 s on average, as the settings state.
     """
     rng = np.random.default_rng(3)
     detection, score, scans, birth, lifetime, step = 0.6, 0.3, 400, 2e-4, 2.0, 0.1

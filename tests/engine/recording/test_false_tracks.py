@@ -61,7 +61,7 @@ def frame(tick: int, places: Sequence[Place], existence: float = 0.9, brakes_for
 
 
 def counted(*frames: Frame) -> dict[str, float]:
-    """What the metrics say, without the station's name."""
+    """Metrics without the name of the station."""
     fold = FalseTracks()
     for one in frames:
         fold.observe(one, LEAST)
@@ -82,7 +82,7 @@ def test_one_false_object_for_some_ticks_is_one_false_track(place: Place) -> Non
     assert found["per_minute"] == pytest.approx(100.0)
 
 
-def test_false_track_that_moves_on_is_one_and_one_that_comes_back_is_two() -> None:
+def test_false_track_that_moves_is_one_and_reappearing_ones_are_two() -> None:
     moving = counted(*(frame(tick, [(40.0 + 2.0 * tick, 0.0)]) for tick in range(7)))
     again = counted(*(frame(tick, [(40.0, 0.0)] if tick % 4 == 0 else []) for tick in range(7)))
     two = counted(*(frame(tick, [(40.0, 0.0), (60.0, 0.0)]) for tick in range(7)))
