@@ -84,10 +84,10 @@ def test_clearance_across_head_to_head_roads_goes_by_driving_direction(
 
 
 @pytest.mark.parametrize(("rule", "same", "against"), [("", -1, 1), (LEFT_HAND, 1, -1)])
-def test_clearance_of_who_drives_against_its_lane_counts_lanes_that_lead_its_way(
+def test_clearance_against_the_lane_counts_lanes_of_the_own_direction(
     run: Any, rule: str, same: int, against: int
 ) -> None:
-    """Who overtakes in the oncoming lane may ask for room in the lane to which it comes back."""
+    """Room in the lane to which a car comes back that overtakes in the oncoming lane."""
     for lane, wanted in ((same, []), (against, [0.0])):
         init = put("Ego", 1, against, 150.0, turned=True) + put("Other", 1, lane, 130.0)
         init += set_speed("Ego", 0.0) + set_speed("Other", 0.0)

@@ -54,7 +54,7 @@ def speed(value: float, dimension: str = "time", extent: float = 0.0) -> str:
 
 
 def largest_slip(played: Any, dt: float) -> float:
-    """Largest speed across the mean heading of a step [m/s]; nobody drives sideways."""
+    """Largest speed across the mean heading of a step [m/s]; 0 for a car that never slides."""
     worst = 0.0
     for before, now in pairwise(row["Ego"] for row in played.rows):
         heading = before.yaw + 0.5 * math.remainder(now.yaw - before.yaw, math.tau)
@@ -69,7 +69,7 @@ def largest_slip(played: Any, dt: float) -> float:
     "action",
     [change("cubic", "time", 4.0), change("cubic", "distance", 40.0), offset(1.0), offset(1.0, 1.0, "true"), beside()],
 )
-def test_lateral_motion_leads_where_the_actor_looks_or_straight_back(scene: Any, action: str, value: float) -> None:
+def test_lateral_motion_follows_the_heading_forwards_and_backwards(scene: Any, action: str, value: float) -> None:
     """Steps of 0.02 s; what is left are the steps in which a motion that is cut begins or ends, at half its angle."""
     dt = 0.02
     played = scene(6, ("Ego", action), ego=(-1, 300.0, value), other=(-1, 330.0, value), dt=dt)
@@ -79,13 +79,13 @@ def test_lateral_motion_leads_where_the_actor_looks_or_straight_back(scene: Any,
 
 @pytest.mark.element("LaneOffsetAction", "LateralDistanceAction", "LaneChangeAction")
 @pytest.mark.parametrize("action", [offset(1.0), beside(), change("cubic", "time", 4.0)])
-def test_lateral_motion_of_who_stands_waits_until_it_drives(scene: Any, action: str) -> None:
+def test_lateral_motion_at_standstill_waits_for_speed(scene: Any, action: str) -> None:
     played = scene(8, ("Ego", action), ("Ego", speed(5.0), after(1.95)), ego=(-1, 300.0, 0.0), other=(-1, 330.0, 0.0))
     assert {played.at(0.1 * n).y for n in range(21)} == {-2.0}
     assert abs(played.at(8.0).y + 2.0) > 0.9
 
 
-def test_lane_offset_of_who_crawls_goes_sideways_as_fast_as_forwards(scene: Any) -> None:
+def test_lane_offset_at_low_speed_goes_sideways_as_fast_as_forwards(scene: Any) -> None:
     """At 0.5 m/s, 0.354 m/s each way: for the 1 m that 1 m/s² would allow within 2.4 s it takes about 2.9 s."""
     played = scene(6, ("Ego", offset(1.0)), ego=(-1, 100.0, 0.5))
     end = played.when("action 0", "completeState")
@@ -105,7 +105,7 @@ def test_lane_offset_of_who_crawls_goes_sideways_as_fast_as_forwards(scene: Any)
         ("leadingReferencedEntity", 1, 20.0),
     ],
 )
-def test_distance_to_who_faces_the_other_way_is_kept_on_the_side_that_it_calls_its_front(
+def test_distance_leading_and_trailing_count_from_the_other_front(
     scene: Any, limits: str, displacement: str, lane: int, ahead: float
 ) -> None:
     """Other drives towards +x in each case: forwards in lane -1, backwards in lane 1. Ego ends at its speed."""
@@ -126,7 +126,7 @@ def test_distance_to_who_faces_the_other_way_is_kept_on_the_side_that_it_calls_i
         ("rightToReferencedEntity", 1, 3.0),
     ],
 )
-def test_lateral_distance_is_kept_on_the_side_that_the_other_calls_left(
+def test_lateral_distance_left_and_right_count_from_the_other_heading(
     scene: Any, displacement: str, lane: int, y: float
 ) -> None:
     other = (lane, 400.0, 10.0 if lane < 0 else -10.0)
@@ -151,7 +151,7 @@ def test_braking_from_a_negative_speed_is_bounded_by_the_deceleration(scene: Any
 
 
 @pytest.mark.element("EndOfRoadCondition")
-def test_end_of_road_is_over_for_who_backs_away_from_it(run: Any) -> None:
+def test_end_of_road_is_over_after_backing_away(run: Any) -> None:
     """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s on it goes back."""
     played = run(4.0, ("Ego", speed(-5.0), after(1.995)), driven=False, ego=(-1, 980.0, 20.0), during=_note_end)
     assert played.x("Ego")[round(1.5 / 0.05)] == pytest.approx(1000.0)

@@ -95,7 +95,7 @@ def test_car_that_looks_against_its_trajectory_reverses_along_it(run: Any, mode:
         assert row(played, time) == pytest.approx((500.0 - 5.0 * time, 0.0, 0.0, -5.0), abs=1e-6)
 
 
-def test_car_that_appears_on_a_trajectory_looks_as_its_lane_when_it_reverses(run: Any) -> None:
+def test_reversing_car_without_a_place_looks_along_its_lane(run: Any) -> None:
     lane = '<LanePosition roadId="1" laneId="-1" s="{}"/>'
     back = curve(lane.format(500), lane.format(50))
     walker = WALKER
@@ -124,7 +124,7 @@ def test_change_of_direction_on_a_trajectory_drives_the_same_curve_back(run: Any
     assert (x, y, h, v) == (pytest.approx(100.0, abs=0.3), pytest.approx(-2.0), pytest.approx(0.0), -10.0)
 
 
-def test_reversing_car_in_mode_follow_turns_its_wheels_no_further_than_they_go(run: Any) -> None:
+def test_reversing_car_in_mode_follow_keeps_to_its_largest_steering_angle(run: Any) -> None:
     """tan 0.5 / 3 m is the largest curvature; the corner lies behind the car, at (80, -2)."""
     way = curve(world(100.0, -2.0), world(80.0, -2.0), world(80.0, -42.0))
     played = drive(run, teleport(world(100.0, -2.0, 0.0)), speed(-5.0), follow(way, "follow"), end=11.0)
@@ -205,7 +205,7 @@ def test_synchronize_with_a_master_that_reverses_along_its_trajectory(run: Any) 
     assert row(played, 4.0, "Walker", 0.01)[1] == pytest.approx(-6.0 + 3.61, abs=0.03)
 
 
-def test_distance_on_a_trajectory_that_crosses_itself_counts_from_the_actor_s_own_pass(scene: Any) -> None:
+def test_distance_on_self_crossing_trajectory_counts_from_the_own_pass(scene: Any) -> None:
     """A loop that comes by (200, -2) after 100 m and, from the side, after 100 + 4 · 60 m less the crossing."""
     corners = [(100.0, -2.0), (260.0, -2.0), (260.0, 58.0), (200.0, 58.0), (200.0, -100.0)]
     way = curve(*(world(x, y) for x, y in corners))
@@ -249,7 +249,7 @@ def test_synchronize_that_starts_beside_the_trajectory_measures_along_it(run: An
 
 
 def test_trajectory_that_ends_across_and_beside_the_road_is_left_straight_on(run: Any) -> None:
-    """The street is 12 m wide: at y = 20 nobody crabs along it at 90°."""
+    """The street is 12 m wide: at y = 20 the car does not move along it at 90°."""
     way = curve(world(150.0, -6.0), world(150.0, 20.0))
     played = drive(run, speed(10.0), teleport(world(150.0, -6.0, math.pi / 2)), follow(way), end=4.0)
     assert row(played, 4.0) == pytest.approx((150.0, 34.0, math.pi / 2, 10.0), abs=1e-6)
