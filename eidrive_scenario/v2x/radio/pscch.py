@@ -54,15 +54,19 @@ class ControlChannel:
         draws = uniforms(keys[rows], numbers)
         signal = BOOST * per_block
         codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
-        with np.errstate(divide="ignore"):
-            ratio = 10.0 * np.log10(signal / self.block_noise)
-            meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
-            np.fill_diagonal(meets, False)
-            for place in np.flatnonzero(meets.any(axis=1)).tolist():
-                others = np.flatnonzero(meets[place])
-                boosted = np.where(first[others] == first[place], BOOST, 1.0)
-                interference = (per_block[others] * boosted[:, None]).sum(axis=0)
-                disturbed = 10.0 * np.log10(signal[place] / (self.block_noise + interference))
-                codes[place, draws[place] < self.curve.at(disturbed, 1)] = COLLISION
+        meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
+        np.fill_diagonal(meets, False)
+        for place in np.flatnonzero(meets.any(axis=1)).tolist():
+            others = np.flatnonzero(meets[place])
+            boosted = np.where(first[others] == first[place], BOOST, 1.0)
+            interference = (per_block[others] * boosted[:, None]).sum(axis=0)
+            disturbed = _decibels(signal[place] / (self.block_noise + interference))
+            codes[place, draws[place] < self.curve.at(disturbed, 1)] = COLLISION
+        ratio = _decibels(signal / self.block_noise)
         codes[draws < self.curve.at(ratio, 1)] = PROPAGATION
         return codes
+
+
+def _decibels(ratio: Array) -> Array:
+    level: Array = 10.0 * np.log10(np.maximum(ratio, 1e-30))
+    return level

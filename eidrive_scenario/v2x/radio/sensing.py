@@ -116,13 +116,15 @@ class SensingHistory:
             self.rssi[pdu.subframe % WINDOW, first : first + pdu.transmission.bands] += power.astype(np.float32)
         self.rssi[subframes % WINDOW, :, own] = 0.0
         self.monitored[subframes % WINDOW, own] = False
-        return np.unique(subframes)
+        return np.array(sorted({pdu.subframe for pdu in pdus}), dtype=np.int64)
 
-    def busy(self, subframes: Rows, threshold: float) -> Array:
-        """(U, N) share of the subchannels whose S-RSSI exceeds the threshold [mW], NaN where not monitored."""
+    def busy(self, subframes: Rows, threshold: float) -> tuple[Array, Rows]:
+        """Over these subframes: (N,) the sum of the shares of the subchannels whose S-RSSI exceeds the threshold [mW],
+        and (N,) in how many subframes a station transmitted itself and could not measure."""
         rows = subframes % WINDOW
-        share = np.mean(self.rssi[rows] > threshold, axis=1)
-        return np.where(self.monitored[rows], share, np.nan)
+        monitored = self.monitored[rows]
+        counts = ((self.rssi[rows] > threshold) & monitored[:, None]).sum(axis=(0, 1))
+        return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
     def reserve(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
         """Note the decoded control information of PDUs that announce another use."""

@@ -258,7 +258,9 @@ class Sidelink(Access):
                 power[place] += pdu.transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
         self._history.proceed(due[-1].subframe + 1)
-        self._count_busy(self._history.receive(due, milliwatts / widths[:, None]))
+        busy, deaf = self._history.busy(self._history.receive(due, milliwatts / widths[:, None]), self._busy_above)
+        self._period_busy += SUBFRAME * busy
+        self._period_deaf += SUBFRAME * deaf
         codes = self._control.decode(due, milliwatts / blocks, self._keys)
         for pdu, code in zip(due, codes, strict=True):
             before = pdu.transmission.control
@@ -270,12 +272,6 @@ class Sidelink(Access):
         reserving = [place for place, pdu in enumerate(pdus) if pdu.transmission.reserves]
         if reserving:
             self._history.reserve([pdus[place] for place in reserving], codes[reserving], rsrp[reserving])
-
-    def _count_busy(self, subframes: NDArray[np.int64]) -> None:
-        busy = self._history.busy(subframes, self._busy_above)
-        deaf = np.isnan(busy)
-        self._period_deaf += SUBFRAME * deaf.sum(axis=0)
-        self._period_busy += SUBFRAME * np.where(deaf, 0.0, busy).sum(axis=0)
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period

@@ -167,6 +167,20 @@ def test_a_turned_and_a_mirrored_scene_have_the_same_fates(profile: dict[str, ob
     assert fates(lambda x, y, z: (x, -y, z)) == straight
 
 
+@pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
+def test_a_turned_lattice_of_equal_distances_has_the_same_fates(technology: str) -> None:
+    """Equal powers stay equal, though the distances of the turned places differ in their last digits."""
+
+    def fates(angle: float) -> list[tuple[object, ...]]:
+        cos, sin = math.cos(angle), math.sin(angle)
+        lattice = {f"{x}{y}": (400.0 * x, 400.0 * y) for x in range(4) for y in range(4)}
+        places = {name: (cos * x - sin * y, sin * x + cos * y, 1.5) for name, (x, y) in lattice.items()}
+        events = talk(radio(2, **QUIET, technology=technology, sensing_dbm=-95.0), places, 40, sizes=(190,), dt=0.1)[0]
+        return sorted((e.sender, e.receiver, e.number, e.outcome, e.reason, e.arrives or 0.0) for e in events)
+
+    assert fates(0.7) == fates(0.0)
+
+
 def behind(state: int, top: float = 3.3) -> Any:
     def sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
         names = {ray: ("Firetruck",) for ray in range(len(pairs))} if state == NLOSV else {}
