@@ -56,12 +56,15 @@ class ControlChannel:
         codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
         meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
         np.fill_diagonal(meets, False)
-        for place in np.flatnonzero(meets.any(axis=1)).tolist():
+        met = np.flatnonzero(meets.any(axis=1))
+        interference = np.zeros((len(met), per_block.shape[1]))
+        for index, place in enumerate(met.tolist()):
             others = np.flatnonzero(meets[place])
             boosted = np.where(first[others] == first[place], BOOST, 1.0)
-            interference = (per_block[others] * boosted[:, None]).sum(axis=0)
-            disturbed = _decibels(signal[place] / (self.block_noise + interference))
-            codes[place, draws[place] < self.curve.at(disturbed, 1)] = COLLISION
+            interference[index] = (per_block[others] * boosted[:, None]).sum(axis=0)
+        if len(met):
+            disturbed = _decibels(signal[met] / (self.block_noise + interference))
+            codes[met] = np.where(draws[met] < self.curve.at(disturbed, 1), COLLISION, DELIVERED)
         ratio = _decibels(signal / self.block_noise)
         codes[draws < self.curve.at(ratio, 1)] = PROPAGATION
         return codes

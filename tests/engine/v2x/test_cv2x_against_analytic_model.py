@@ -1,6 +1,6 @@
 """C-V2X Mode 4 on the simulated medium against the analytic model of Gonzalez-Martín et al. (IEEE TVT 2019).
 
-Stations stand on a straight road of 2.4 km, each with 10 messages of 190 bytes per second; 600 m in its middle count.
+Stations stand on a straight road of 2 km, each with 10 messages of 190 bytes per second; 600 m in its middle count.
 The medium has the assumptions of the model as settings: WINNER+ B1 with antennas of 1.5 m over an environment of 0 m,
 shadowing of 3 dB, QPSK 0.7, 20 dBm without antenna gain, detection and busy ratio from -90.5 dBm on.
 
@@ -27,8 +27,8 @@ from eidrive_scenario.v2x.surroundings import Surroundings
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
 DISTANCES = (100, 200, 300)
-LENGTH, MIDDLE = 2400.0, 600.0
-DT, WARM_UP, END = 0.02, 3.0, 9.0
+LENGTH, MIDDLE = 2000.0, 600.0
+DT, WARM_UP, END = 0.02, 3.0, 7.0
 SENSED = -90.5
 PROFILE: dict[str, Any] = {
     "technology": "cv2x_mode4",
@@ -52,8 +52,12 @@ class Counts:
     busy_ratio: float = 0.0
     occupancy: float = 0.0
 
-    def delivery_ratio(self, distance: int) -> float:
-        return self.outcomes[distance][CAUSES[0]] / self.outcomes[distance].total()
+    def ratio(self, cause: str, distance: int) -> float:
+        return self.outcomes[distance][cause] / self.outcomes[distance].total()
+
+    def __add__(self, other: Counts) -> Counts:
+        outcomes = {distance: self.outcomes[distance] + other.outcomes[distance] for distance in DISTANCES}
+        return Counts(outcomes, (self.busy_ratio + other.busy_ratio) / 2.0, (self.occupancy + other.occupancy) / 2.0)
 
 
 def simulate(density: float, seed: int) -> Counts:
@@ -88,7 +92,7 @@ def simulate(density: float, seed: int) -> Counts:
     after = [now * (carrier.busy_ratio(names[row]) or 0.0) for row in middle]
     counts.busy_ratio = float(np.mean(np.array(after) - before)) / (now - since)
     loss = carrier._budget.loss  # type: ignore[union-attr]
-    counts.occupancy = float(np.mean([occupied(sent, 20.0 - loss[:, row], row, since, now) for row in middle[::5]]))
+    counts.occupancy = float(np.mean([occupied(sent, 20.0 - loss[:, row], row, since, now) for row in middle[::15]]))
     return counts
 
 
@@ -107,13 +111,14 @@ def occupied(sent: list[Transmission], power: Any, row: int, since: float, until
     return used / (4 * (1000 * (until - since) - len(own)))
 
 
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("golden", GOLDEN["cv2x_mode4"], ids=lambda golden: str(golden["veh_per_m"]))
 def test_mode_4_medium_delivers_as_the_analytic_model(golden: dict[str, Any]) -> None:
-    counts = simulate(golden["veh_per_m"], seed=1)
+    counts = simulate(golden["veh_per_m"], seed=1) + simulate(golden["veh_per_m"], seed=2)
     expected = dict(zip(GOLDEN["distance_m"], golden["pdr"], strict=True))
     for distance in DISTANCES:
-        assert counts.delivery_ratio(distance) == pytest.approx(expected[distance], abs=0.05), distance
-        assert counts.outcomes[distance]["collision"] > 0
-        assert counts.outcomes[distance]["half_duplex"] / counts.outcomes[distance].total() < 0.02
+        assert counts.ratio(CAUSES[0], distance) == pytest.approx(expected[distance], abs=0.05), distance
+        assert counts.ratio("collision", distance) > 0.0
+        assert counts.ratio("half_duplex", distance) == pytest.approx(0.01, abs=0.01)
     assert counts.busy_ratio == pytest.approx(counts.occupancy, abs=0.02)
     assert counts.busy_ratio == pytest.approx(golden["cbr"], abs=0.02)

@@ -26,8 +26,12 @@ TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
 class Air:
     """Stations on one channel, each with messages of its own size and rate, and all that they transmit."""
 
-    def __init__(self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05) -> None:
+    def __init__(
+        self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05, listeners: int | None = None
+    ) -> None:
+        """Only the first stations, `listeners` of them, receive messages; None: all do."""
         self.carrier, self.places, self.dt, self.tick = carrier, dict(places), dt, 0
+        self.listeners = list(places)[:listeners]
         self.events: list[LinkEvent] = []
         self.transmissions: list[Transmission] = []
         begin = carrier._access._begin
@@ -44,7 +48,7 @@ class Air:
             now = self.tick * self.dt
             self.carrier.around(Surroundings(self.places))
             outbox = [
-                (message(name, self.tick, now, sizes[self.tick % len(sizes)]), [n for n in self.places if n != name])
+                (message(name, self.tick, now, sizes[self.tick % len(sizes)]), [n for n in self.listeners if n != name])
                 for name, period in every.items()
                 if name in self.places and self.tick % period == 0
             ]
@@ -118,25 +122,14 @@ def test_resources_are_kept_with_the_probability_that_was_set(keep: float) -> No
 
 
 def test_stations_that_sense_each_other_hardly_collide() -> None:
-    """60 stations for 400 resources: after the first second only those collide that select in the same 100 ms."""
+    """60 stations for 400 resources: after the first seconds only those collide that select in the same 100 ms."""
     places = many(60)
-    carrier = radio(5, **MODE_4)
-    air = Air(carrier, places, 0.01)
-    events = air.run(1.5, {}).events
-    for tick in range(150, 1500):
-        now = 0.01 * tick
-        carrier.around(Surroundings(places))
-        outbox = [
-            (message(name, tick, now, 190), [n for n in places if n != name])
-            for place, name in enumerate(places)
-            if tick % 10 == place % 10
-        ]
-        events = [*events, *carrier.transmit(outbox, now)]
-    late = [event for event in events if event.sent > 4.0]
+    air = Air(radio(5, **MODE_4), places, 0.1, listeners=4).run(30.0, dict.fromkeys(places, 1))
+    late = [event for event in air.events if event.sent > 4.0]
     reasons = Counter(event.reason for event in late)
     assert set(reasons) <= {"", "half_duplex", "collision", "propagation"}
-    assert 0 < reasons["collision"] / len(late) < 0.02, "random choice among 400 resources would lose 14 %"
-    assert reasons["half_duplex"] / len(late) == pytest.approx(0.01, abs=0.006)
+    assert 0 < reasons["collision"] / len(late) < 0.05, "random choice among 400 resources would lose 14 %"
+    assert reasons["half_duplex"] / len(late) == pytest.approx(0.01, abs=0.008)
 
 
 def test_stations_do_not_receive_in_subframes_in_which_they_transmit() -> None:
@@ -215,7 +208,7 @@ def test_resource_is_given_up_after_so_many_unused_opportunities(limit: int | No
 def test_busy_ratio_is_the_occupancy_of_subchannels(rate: int, size: int) -> None:
     """40 stations: what C senses agrees with the subchannels that were used, in the subframes that it measured."""
     places = many(40)
-    air = Air(radio(2, **MODE_4, sidelink={"interval": 0.1}), places, 0.1)
+    air = Air(radio(2, **MODE_4, sidelink={"interval": 0.1}), places, 0.1, listeners=0)
     air.run(8.0, dict.fromkeys(places, rate), (size,))
     heard = [air.carrier.busy_ratio(name) for name in places]
     assert heard == pytest.approx([air.occupancy(0.0, 7.9)] * 40, abs=0.02)
@@ -297,7 +290,7 @@ def test_ticks_of_any_length_give_the_same_resources() -> None:
 def test_congestion_control_acts_on_the_occupancy_of_its_last_period(kind: str, period: float) -> None:
     places = many(40)
     profile = {**MODE_4, "queue": {"discipline": "lcfs"}, "congestion": {"kind": kind}}
-    air = Air(radio(3, **profile, sidelink={"interval": 0.05}), places).run(0.05, {})
+    air = Air(radio(3, **profile, sidelink={"interval": 0.05}), places, listeners=0).run(0.05, {})
     gate = air.carrier._access.gate
     measured: list[NDArray[np.float64]] = []
     control = gate.measured
@@ -320,8 +313,10 @@ def test_reactive_control_follows_the_busy_ratio_of_subchannels() -> None:
     """60 stations at 20 Hz want 30 % of the subchannels: above 20 % they send at 5 Hz, at 7.5 % again at 10 Hz."""
     places = many(60)
     profile = {**MODE_4, "queue": {"discipline": "lcfs"}, "sidelink": {"interval": 0.05}}
-    free = Air(radio(3, **profile), places).run(6.0, dict.fromkeys(places, 1))
-    held = Air(radio(3, **profile, congestion={"kind": "reactive"}), places).run(6.0, dict.fromkeys(places, 1))
+    free, held = (
+        Air(radio(3, **profile, congestion={"kind": kind}), places, listeners=0).run(6.0, dict.fromkeys(places, 1))
+        for kind in ("none", "reactive")
+    )
     assert free.occupancy(2.0, 5.9) == pytest.approx(0.3, abs=0.02)
     assert held.occupancy(2.0, 5.9) == pytest.approx(0.15, abs=0.02)
     assert {held.carrier.interval(name) for name in places} == {0.1}
