@@ -22,7 +22,7 @@ _SHORT = 10
 
 @dataclass(frozen=True)
 class ResolvedSettings:
-    """Everything that determines the result of one run.
+    """All settings that determine the result of one run.
 
     scenario         name in the library, or of the file
     seed             of all randomness

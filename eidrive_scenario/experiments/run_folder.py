@@ -39,12 +39,12 @@ class RunFolder:
 
     @property
     def recording(self) -> Path:
-        """Where the recording is written while the run goes on."""
+        """Path of the recording while the run goes on."""
         return partial(self.path / RECORDING)
 
     @property
     def pictures(self) -> Path:
-        """Where camera images are written while the run goes on."""
+        """Folder of the camera images while the run goes on."""
         return partial(self.path / PICTURES)
 
     def prepare(self) -> None:

@@ -17,15 +17,15 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     """
     values = data.count(b",") + data.count(b"[") + data.count(b"{")
     if values > max_values:
-        raise ValueError(f"it has more than {max_values} values")
+        raise ValueError(f"the document has more than {max_values} values")
     try:
         document = json.loads(data.decode())
     except UnicodeDecodeError as error:
-        raise ValueError(f"it is not UTF-8 (byte {error.start})") from None
+        raise ValueError(f"the document is not UTF-8 (byte {error.start})") from None
     except RecursionError:
-        raise ValueError("it is nested too deeply") from None
+        raise ValueError("the document is nested too deeply") from None
     if max_depth is not None and _is_deeper(document, max_depth):
-        raise ValueError(f"it is nested more than {max_depth} deep")
+        raise ValueError(f"the document is nested more than {max_depth} deep")
     return document
 
 

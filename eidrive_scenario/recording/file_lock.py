@@ -12,7 +12,7 @@ _BUSY = frozenset({errno.EWOULDBLOCK, errno.EACCES, errno.EAGAIN})
 
 
 class FileLock:
-    """An exclusive lock on a file of its own, which exists as long as the lock is held.
+    """An exclusive lock on a separate file, which exists as long as the lock is held.
 
     A lock file that a killed process has left behind does not count: only the lock of a living process does. On a file
     system without locks the first process that creates the file holds it.

@@ -135,7 +135,7 @@ class McapFile:
         return Record(opcode, offset, self.read(offset + _HEAD.size, min(length, LARGEST_RECORD)))
 
     def _next_chunk(self, start: int) -> int | None:
-        """Where the next compressed chunk begins, from `start` on."""
+        """Return the offset of the next compressed chunk from `start` on, or None."""
         before = _HEAD.size + _CHUNK_HEAD.size
         offset, held = start, b""
         while True:

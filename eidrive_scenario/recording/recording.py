@@ -48,7 +48,7 @@ class Recording:
     frame_count: int = 0
     damage: tuple[str, ...] = ()
     _blocks: tuple[int, ...] = field(default=(), repr=False)
-    """Where the records with frames begin in the file, in the order of their first frames."""
+    """Offsets of the records with frames, in the order of their first frames."""
 
     @property
     def scenario(self) -> str:

@@ -50,7 +50,7 @@ class ReportedRun(BaseModel):
 
 
 def reported(result: Mapping[str, Any]) -> ReportedRun:
-    """What pages tell of a run, from what `--json` prints. Raises InputError if it is none."""
+    """Return a checked run from the object that `--json` prints. Raise InputError if it is not one."""
     try:
         return ReportedRun.model_validate(result)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Resolved settings for human eyes: as lines of a page, and as the entries in which runs differ."""
+"""Resolved settings as text: lines of a page, and the entries in which runs differ."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def channel_text(settings: Mapping[str, Any]) -> str:
 
 
 def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """What a page lists of a run's settings; parameters with a dollar sign, as scenarios refer to them."""
+    """Return the settings that a page lists, by title; parameters with a dollar sign, as scenarios refer to them."""
     facts: dict[str, str] = {}
     for key in ("scenario", "run", "seed", "channel"):
         if settings.get(key) is not None:
