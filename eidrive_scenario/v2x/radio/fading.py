@@ -1,4 +1,4 @@
-"""Fast fading: the power of each message at each receiver, drawn anew around the link budget."""
+"""Fast fading: the power of each message at each receiver, drawn separately around the link budget."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reception of sidelink control information (SCI) on the PSCCH: whoever does not decode it receives no data either."""
+"""Reception of sidelink control information (SCI) on the PSCCH, without which a station receives no data."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BOOST = 2.0
 
 @dataclass(frozen=True)
 class Pdu:
-    """What a station transmits in one subframe."""
+    """The part of a transmission in one subframe."""
 
     subframe: int
     row: int

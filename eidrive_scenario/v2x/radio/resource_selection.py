@@ -25,7 +25,7 @@ WINDOW = 10 * PSTEP
 
 @dataclass(frozen=True)
 class Request:
-    """What a station asks for in subframe `now`.
+    """Request of a station for a resource in subframe `now`.
 
     first, last    selection window, from n + T1 to n + T2 [subframes]
     width, length  subchannels and subframes of a resource
@@ -51,11 +51,11 @@ class Request:
 
 @dataclass(frozen=True)
 class Sensed:
-    """What one station has sensed by subframe n.
+    """Sensing results of one station before subframe n.
 
     rssi       (WINDOW, S) S-RSSI of subframe z in row z mod WINDOW, 0 where not monitored [mW]
     monitored  (WINDOW,) whether the station received in that subframe
-    own        (Z,) subframes of its own transmissions
+    own        (Z,) subframes of the transmissions of the station
     reserved   (R,) subframes of decoded SCI, bands (R,) their first subchannels, widths (R,), and rsrp (R,) [dBm]
     """
 
@@ -89,18 +89,18 @@ def candidates(request: Request, sensed: Sensed, order: Array) -> Rows:
 
 
 def _mark(
-    level: Array, request: Request, heard: Rows, bands: Rows, widths: Rows, power: NDArray[np.float32] | float
+    level: Array, request: Request, announced_in: Rows, bands: Rows, widths: Rows, power: NDArray[np.float32] | float
 ) -> None:
     """Steps 5 and 6: note the largest `power` in each subframe and subchannel of the window whose use by this station,
-    now or within `uses` intervals, meets what was announced in the subframes `heard`."""
-    if not len(heard):
+    now or within `uses` intervals, meets what was announced in the subframes `announced_in`."""
+    if not len(announced_in):
         return
     interval = request.interval
     repeats = -(-PSTEP // interval) if interval < PSTEP else 1  # Q
-    recent = request.now - heard <= interval
-    powers = np.broadcast_to(np.asarray(power, dtype=np.float64), heard.shape)
+    recent = request.now - announced_in <= interval
+    powers = np.broadcast_to(np.asarray(power, dtype=np.float64), announced_in.shape)
     for repeat in range(1, repeats + 1):
-        use = heard + repeat * interval
+        use = announced_in + repeat * interval
         counts = recent if repeat > 1 else np.ones_like(recent)
         start = (use - request.first) % interval
         for place in range(0, len(level), interval):

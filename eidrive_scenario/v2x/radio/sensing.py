@@ -1,4 +1,4 @@
-"""What the stations of C-V2X Mode 4 have sensed in the last second: S-RSSI, and decoded control information."""
+"""Sensing results of the stations of C-V2X Mode 4 in the last second: S-RSSI, and decoded control information."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class SensingHistory:
         self.reservations.add(subframes, bands, widths, np.where(heard, rsrp, NOT_DECODED))
 
     def of(self, row: int, now: int, own: Rows) -> Sensed:
-        """What one station has sensed before subframe `now`; `own` are subframes in which it transmitted."""
+        """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
         self.proceed(now)
         return Sensed(self.rssi[:, :, row], self.monitored[:, row], own, *self.reservations.of(row, now))
 

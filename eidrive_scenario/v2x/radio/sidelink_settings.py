@@ -88,7 +88,7 @@ class SidelinkSettings(Settings):
         return CURVES[self.pscch_errors]
 
     def extent(self, size: int) -> tuple[int, int]:
-        """How many subchannels and how many subframes a message of `size` bytes takes."""
+        """Numbers of subchannels and of subframes that a message of `size` bytes takes."""
         needed = max(1, math.ceil(size / self.subchannel_bytes))
         return min(needed, self.subchannels), math.ceil(needed / self.subchannels)
 

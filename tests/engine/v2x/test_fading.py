@@ -39,12 +39,12 @@ def test_nakagami_shape_follows_the_distance() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    "invalid",
     [{"m": 0.4}, {"m": [1, 2]}, {"m": 1, "distances": [80]}, {"m": [1, 2, 3], "distances": [200, 80]}, {}, {"m": "a"}],
 )
-def test_nakagami_settings_that_mean_nothing_are_an_error(wrong: dict[str, object]) -> None:
+def test_nakagami_settings_that_mean_nothing_are_an_error(invalid: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
-        RadioProfile.model_validate({"fading": {"kind": "nakagami", **wrong}})
+        RadioProfile.model_validate({"fading": {"kind": "nakagami", **invalid}})
 
 
 @pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
@@ -63,7 +63,7 @@ def test_fading_changes_the_signal_of_each_message_and_not_the_path_loss(technol
     assert np.mean(power < np.log(2.0)) == pytest.approx(0.5, abs=0.03)
 
 
-def test_fading_decides_who_notices_a_busy_medium() -> None:
+def test_fading_applies_to_carrier_sensing() -> None:
     """Mean power 3 dB below the threshold: Rayleigh fading lifts e^-2 = 13.5 % of the messages above it."""
     places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
     mean = 29.0 - (47.8588 + 50.0)

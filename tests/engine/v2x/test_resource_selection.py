@@ -40,7 +40,7 @@ def reported(request: Request, history: Sensed, seed: int = 1) -> set[tuple[int,
 
 
 def everything(request: Request, history: Sensed) -> set[tuple[int, int]]:
-    """All that is reported for some order of equal resources."""
+    """Return the resources that are reported for any order of equal ones."""
     return set().union(*(reported(request, history, seed) for seed in range(60)))
 
 
@@ -99,7 +99,7 @@ def test_average_rssi_leaves_out_subframes_that_were_not_monitored() -> None:
     assert (5050, 0) not in everything(REQUEST, sensed(rssi=rssi, own=own))
 
 
-def test_short_intervals_are_projected_over_100_ms_and_averaged_at_their_own_distance() -> None:
+def test_short_intervals_are_projected_and_averaged_at_their_own_distance() -> None:
     """At 20 ms, an SCI in 4990 announces 5010 (q = 1), and its repetitions fall on the same candidate."""
     request = replace(REQUEST, last=NOW + 20, interval=20)
     left = everything(request, sensed(sci=[(4990, 0, 1, -90.0)]))

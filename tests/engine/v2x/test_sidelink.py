@@ -24,7 +24,7 @@ TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
 
 
 class Air:
-    """Stations on one channel, each with messages of its own size and rate, and all that they transmit."""
+    """Stations on one channel, each with messages of a given size and rate, and all that they transmit."""
 
     def __init__(
         self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05, listeners: int | None = None
@@ -240,7 +240,7 @@ def test_station_alone_measures_an_empty_channel_and_sends_all_messages() -> Non
 
 
 def test_message_without_decoded_control_information_is_lost() -> None:
-    """From 100 to 2,900 m: whoever does not decode the control information does not receive the message."""
+    """From 100 to 2,900 m: a station that does not decode the control information does not receive the message."""
     places = {"A": (0.0, 0.0, 1.5), **{f"R{n}": (100.0 * n, 0.0, 1.5) for n in range(1, 30)}}
     robust, deaf = (
         Air(radio(1, **MODE_4, tx_power_dbm=5, sidelink={"pscch_errors": curve}), places, 0.1).run(20.0, {"A": 1})
@@ -251,7 +251,7 @@ def test_message_without_decoded_control_information_is_lost() -> None:
     assert {e.reason for e in deaf.events} <= {"", "propagation", "sensing"}
 
 
-def test_stations_that_join_late_and_leave_keep_the_books_whole() -> None:
+def test_link_statistics_with_joining_and_leaving_stations_are_complete() -> None:
     """Every fourth tick another station comes or goes; nothing vanishes, and resources of the others stay."""
     carrier = radio(2, **MODE_4, queue={"discipline": "lcfs"})
     all_places = many(12, 20.0)
