@@ -3,7 +3,8 @@
     python tests/engine/hostile/campaign.py --count 3000 --out /tmp/mutants
 
 prints a line for each mutant that ends in an internal error, blocks, or needs too much time or memory, and keeps its
-file. The mutants of a seed are the same on every machine with the same files.
+file. The mutants of a seed are the same on every machine with the same files. Set OPENBLAS_NUM_THREADS and
+OMP_NUM_THREADS to 1: each trial is a fork.
 """
 
 from __future__ import annotations
