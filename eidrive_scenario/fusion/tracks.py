@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.detections import CLASSES
+from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import first_heading, known_turn, predicted_heading, updated_heading
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import Gate, likely_pairs, matched_pairs
 from eidrive_scenario.fusion.prediction import predicted
-from eidrive_scenario.perception.existence import detected, likelihood_ratio, survived
+from eidrive_scenario.perception.existence import LIFETIME, detected, likelihood_ratio
 from eidrive_scenario.perception.existence import missed as after_miss
 from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking import LEAST_DEVIATION, UNKNOWN_DEVIATION
@@ -32,6 +32,7 @@ TRACK = np.dtype(
         ("pose", "f8", (2, 2)),  # of x y, from where the station may really have been [m²]
         ("vague", "?"),  # the station does not say how exact its positions are
         ("moving", "?"),  # the velocity is known
+        ("judged", "?"),  # the station itself tracks the object, and states its existence
         ("body", "f8", (4,)),  # z l w h [m]
         ("weight", "f8"),  # of the body: the sum of scores
         ("heading", "f8", (2,)),  # yaw and its rate [rad, rad/s]
@@ -39,7 +40,6 @@ TRACK = np.dtype(
         ("facing", "f8"),  # how sure the front is the front
         ("score", "f8"),
         ("existence", "f8"),  # probability that there is such an object
-        ("judged", "?"),  # the station itself tracks the object, and states its existence
         ("votes", "f8", (len(CLASSES),)),
     ],
     align=True,  # else numpy copies every number that stands behind a flag before it reckons with it
@@ -69,9 +69,11 @@ def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
     table["vague"] = _make_plausible(covariance)
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
-    table["score"] = table["weight"] = np.minimum(np.maximum(scores, 0.0), 1.0)
-    table["existence"] = np.minimum(np.maximum(np.concatenate([found.confidence for found in lists]), 0.0), 1.0)
-    table["judged"] = np.repeat([len(found.existence) > 0 or len(found.tracks) > 0 for found in lists], counts)
+    table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
+    if any([found.existence is not NOT_ESTIMATED or found.tracks for found in lists]):
+        existence = np.concatenate([found.confidence for found in lists])
+        table["existence"] = np.minimum(np.maximum(existence, 0.0), 1.0)
+        table["judged"] = np.repeat([len(found.existence) > 0 or len(found.tracks) > 0 for found in lists], counts)
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
@@ -117,7 +119,7 @@ def move_on(tracks: Table, time: Array) -> None:
     )
     mean[:], covariance[:] = predicted(mean, covariance, step, known_turn(heading, of_heading))
     heading[:], of_heading[:] = predicted_heading(heading, of_heading, step)
-    tracks["existence"] = survived(tracks["existence"], step)
+    tracks["existence"] *= np.exp(np.abs(step) / -LIFETIME)
     tracks["time"] = time
 
 
@@ -164,12 +166,11 @@ def _updated(old: Table, new: Table) -> Table:
     """Tracks, predicted to the time of a report, with the boxes `new` of that report, which become the answer."""
     after = new
     still = ~new["moving"]
-    again = ~(new["judged"] | new["moving"])
-    if again.any():
-        # A station that tracks has counted its past; of others each report is news.
-        after["existence"][again] = _existence_after(old[again], new[again])
     if still.any():
-        mean, covariance = _filtered(old[still], new[still])
+        before, given = old[still], new[still]
+        # A station that tracks has counted its past; of others each report is news.
+        after["existence"][still] = np.where(given["judged"], given["existence"], _existence_after(before, given))
+        mean, covariance = _filtered(before, given)
         after["mean"][still], after["covariance"][still] = mean, covariance
         after["moving"][still] = True
     after["heading"], after["heading_covariance"], after["facing"] = updated_heading(
@@ -188,8 +189,9 @@ def _existence_after(old: Table, new: Table) -> Array:
     """(N,) probabilities of existence of tracks that are detected again, as in `perception.existence`."""
     spread = old["covariance"][:, :2, :2] + new["covariance"][:, :2, :2]
     offset = new["mean"][:, :2] - old["mean"][:, :2]
-    squared = np.einsum("ni,nij,nj->n", offset, np.linalg.inv(spread), offset)
-    determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
+    x, y, a, b, d = offset[:, 0], offset[:, 1], spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
+    determinant = a * d - b * b
+    squared = (d * x * x - 2.0 * b * x * y + a * y * y) / determinant
     return detected(old["existence"], likelihood_ratio(squared, determinant, new["score"]))
 
 

@@ -63,6 +63,6 @@ def likelihood_ratio(
     squared      (N,) Mahalanobis distances of the innovations, squared;  determinant  (N,) of their covariances [m⁴]
     confidence   (N,) of the detector in them
     """
-    sure = np.clip(confidence, LEAST, MOST)
+    sure = np.minimum(np.maximum(confidence, LEAST), MOST)
     density = np.exp(-0.5 * squared) / (2.0 * math.pi * np.sqrt(determinant))
     return np.asarray(1.0 - detection + density / birth * sure / (1.0 - sure))

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.storyboard.states import State
@@ -77,3 +79,23 @@ def test_the_schema_names_all_fields_of_a_frame() -> None:
     assert set(schema["properties"]) == {f.name for f in fields(Frame)}
     station = schema["properties"]["steps"]["additionalProperties"]
     assert station["properties"]["outbox"]["items"]["properties"]["sender"] == {"type": "string"}
+
+
+def test_existence_and_reasons_are_recorded_and_may_be_missing_in_older_files() -> None:
+    found = Detections(
+        0.5,
+        np.zeros((1, 7)),
+        np.ones(1),
+        ("car",),
+        np.zeros((1, 2)),
+        np.zeros((1, 2, 2)),
+        existence=np.array([0.1 + 0.2]),
+    )
+    assert round_trip(Detections, found).existence.tolist() == [0.1 + 0.2]
+    text = codec(Detections).encode(found)
+    del text["existence"]
+    assert codec(Detections).decode(text).existence.shape == (0,)
+    plan = codec(Plan).encode(Plan(np.zeros((2, 2)), np.zeros(2), "", objects=(1, 3)))
+    assert codec(Plan).decode(plan).objects == (1, 3)
+    del plan["objects"]
+    assert codec(Plan).decode(plan).objects == ()
