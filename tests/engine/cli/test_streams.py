@@ -55,7 +55,9 @@ def test_a_full_disk_is_said_in_one_line(passing_by: Path, arguments: list[str])
     with FULL.open("wb") as full:
         result = eidrive(*given, stdout=full)
     assert result.returncode == 3
-    assert result.stderr.decode().splitlines()[-1].startswith("broken off: No space left on device")
+    broken, *reproduction = result.stderr.decode().splitlines()
+    assert broken.startswith("broken off: No space left on device")
+    assert all(line.startswith("reproduce: eidrive run ") for line in reproduction)
     assert b"internal error" not in result.stderr
     assert b"Traceback" not in result.stderr
 
