@@ -148,6 +148,7 @@ def test_what_a_station_reads_itself_depends_on_the_classes_of_the_network() -> 
     assert signal_kinds(("car", "traffic light")) == {"light"}
     settings = LearnedSettings(weights=str(ONNX), classes=("truck", "car"), input_size=(96, 64))
     detector = YoloDetector(settings)
+    detector.load_weights()
     assert detector.sees_signals == {"light"}
     detector.install(Installation(TRUCK, {}, CROSSING))
     camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "red"})
