@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import ConstraintError, InputError
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.pytest_plugin.items import ScenarioItem
 from eidrive_scenario.pytest_plugin.options import arms
-from eidrive_scenario.pytest_plugin.outcome import failure_text, judge
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
-    from eidrive_scenario.pytest_plugin.options import Arm
 
 _LEFT_OUT = pytest.StashKey[dict[str, list[int]]]()
 """By the file's node: how many of its runs are tests, and how many there are."""
@@ -27,7 +25,7 @@ _LONGEST = 100
 class DistributionFile(pytest.File):
     """A `.xosc` file that unfolds into concrete runs of a scenario."""
 
-    def collect(self) -> Iterable[RunItem]:
+    def collect(self) -> Iterable[ScenarioItem]:
         """One item per run, channel and seed. Raises CollectError if the distribution is wrong."""
         from eidrive_scenario.openscenario import load_distribution
 
@@ -42,31 +40,7 @@ class DistributionFile(pytest.File):
         for number in numbers:
             run = runs[number]
             for arm in arms(self.config):
-                yield RunItem.from_parent(self, name=f"{self.path.stem}[{_named(run)}-{arm}]", run=run, arm=arm)
-
-
-class RunItem(pytest.Item):
-    """A concrete run with one channel and one seed; skipped where the scenario's constraints rule it out."""
-
-    def __init__(self, *, run: ConcreteRun, arm: Arm, **named: Any) -> None:
-        super().__init__(**named)
-        self.run = run
-        self.arm = arm
-
-    def runtest(self) -> None:
-        """Play it and note its numbers. Raises ScenarioFailed, InputError."""
-        try:
-            judge(self, self.path, self.arm, run=self.run)
-        except ConstraintError as error:
-            pytest.skip(f"ruled out by constraints: {error}")
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """The verdict's reason, or file and line of a wrong input; a traceback for anything else."""
-        return failure_text(excinfo.value) or super().repr_failure(excinfo, style)
-
-    def reportinfo(self) -> tuple[os.PathLike[str], int | None, str]:
-        """Where a report points to."""
-        return self.path, None, self.name
+                yield ScenarioItem.from_parent(self, name=f"{self.path.stem}[{_named(run)}-{arm}]", run=run, arm=arm)
 
 
 def _named(run: ConcreteRun) -> str:

@@ -34,17 +34,13 @@ class ScenarioFailed(Exception):
         self.result = result
 
 
-def judge(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = None) -> None:
-    """Play a test's scenario, or that run of its distribution, and note its numbers.
-
-    Raises ScenarioFailed, InputError.
-    """
+def play_file(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = None) -> RunResult:
+    """Run a test's scenario, or that run of its distribution, and record its properties. Raise InputError."""
     result = _play(item.config, source, run or source, arm, {})
     item.user_properties.extend(properties(result))
     if run is not None:
         item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
-    if not result.passed:
-        raise ScenarioFailed(result)
+    return result
 
 
 def play_arm(item: pytest.Item, source: Source, arm: Arm, **overrides: Any) -> RunResult:

@@ -31,8 +31,8 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess("xosc", "-p", "no:cacheprovider")
-    result.assert_outcomes(passed=1, failed=2)
-    result.stdout.fnmatch_lines(
+    result.assert_outcomes(passed=1, failed=1, errors=1)
+    result.stdout.fnmatch_lines_random(
         [
             "*failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",

@@ -1,0 +1,65 @@
+"""Runs of scenarios as test items: a run that does not come to its end is an error, a failed verdict is a failure."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from eidrive_scenario.errors import ConstraintError
+from eidrive_scenario.pytest_plugin.options import Arm
+from eidrive_scenario.pytest_plugin.outcome import ScenarioFailed, failure_text, play_file
+
+if TYPE_CHECKING:
+    from eidrive_scenario.openscenario import ConcreteRun
+    from eidrive_scenario.simulation import RunResult
+
+
+class ScenarioItem(pytest.Item):
+    """One run of a scenario, with one channel and one seed.
+
+    The run is the setup of the test and its verdict is the test. So a wrong file, an extension that raises an exception
+    and a run beyond the wall limit are errors, which pytest and JUnit report apart from failures.
+
+    run  concrete run of a parameter value distribution; one that its scenario's constraints rule out is skipped
+    """
+
+    def __init__(self, *, arm: Arm, run: ConcreteRun | None = None, **named: Any) -> None:
+        super().__init__(**named)
+        self.arm = arm
+        self.run = run
+        self._result: RunResult | None = None
+
+    def setup(self) -> None:
+        """Run the scenario and record its properties. Raise an exception of pytest with the text of what is wrong."""
+        if self.config.getoption("setuponly"):
+            return
+        try:
+            self._result = play_file(self, self.path, self.arm, self.run)
+        except ConstraintError as error:
+            if self.run is None:
+                raise pytest.fail.Exception(str(error), pytrace=False) from error
+            pytest.skip(f"ruled out by constraints: {error}")
+        except Exception as error:
+            text = failure_text(error)
+            if text is None:
+                raise
+            raise pytest.fail.Exception(text, pytrace=False) from error
+
+    def runtest(self) -> None:
+        """Raise ScenarioFailed if a criterion failed or the simulated time ran out."""
+        if self._result is not None and not self._result.passed:
+            raise ScenarioFailed(self._result)
+
+    def teardown(self) -> None:
+        """Release the result: a session holds its items until it ends."""
+        self._result = None
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """Return the reason of the verdict, or a traceback for any other exception."""
+        return failure_text(excinfo.value) or super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[os.PathLike[str], int | None, str]:
+        """Return the location that reports name."""
+        return self.path, None, self.name
