@@ -44,3 +44,14 @@ def made_often(record: type[T]) -> type[T]:
     initialiser.__qualname__ = f"{record.__qualname__}.__init__"
     record.__init__ = initialiser  # type: ignore[method-assign]
     return record
+
+
+def replaced(record: T, **changes: Any) -> T:
+    """Return a copy of a record of `made_often` with other values of some fields.
+
+    As `dataclasses.replace` in a fraction of its time: names are not checked, and `__post_init__` is not called.
+    """
+    copy = object.__new__(type(record))
+    copy.__dict__.update(record.__dict__)
+    copy.__dict__.update(changes)
+    return copy

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, Polygon
 from eidrive_scenario.driving.step import Goal, Plan
 from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.records import replaced
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec
@@ -39,9 +39,9 @@ class ConflictAreaPlanner(RoutePlanner):
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
-            return replace(plan, reason=reason, braking=self.settings.conflict_brake, objects=inside_area)
+            return replaced(plan, reason=reason, braking=self.settings.conflict_brake, objects=inside_area)
         if now - self._last_sighting < self.settings.conflict_hold - 1e-9:
-            return replace(plan, reason="an object was in the conflict area", braking=self.settings.conflict_brake)
+            return replaced(plan, reason="an object was in the conflict area", braking=self.settings.conflict_brake)
         return plan
 
     def _in_areas(self, objects: Detections) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.association import FEW as FEW_PAIRS
 from eidrive_scenario.fusion.association import associate, associate_few
 from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.records import replaced
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -45,12 +46,12 @@ class AverageFusion(FusionMethod):
             only = present[0]
             if only.time == now:
                 return only
-            return replace(only, time=now)
+            return replaced(only, time=now)
         labels = self._labels(present)
         fused = joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
-        return replace(fused, existence=joint_existence(present, labels))
+        return replaced(fused, existence=joint_existence(present, labels))
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
         """The object of each box, over all boxes of all reports in order; objects are numbered as they appear."""

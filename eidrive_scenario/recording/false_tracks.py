@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.view import WorldView
 
@@ -63,12 +62,12 @@ class FalseTracks:
             station = self._stations.get(name)
             if station is None:
                 station = self._stations[name] = _Station(limit)
-            rows = _unmatched(step, view, view.rows.get(name, -1)) if len(step.fused.boxes) else ()
+            boxes = step.fused.boxes.tolist()
+            rows = _unmatched(boxes, view, view.rows.get(name, -1)) if boxes else ()
             if rows:
                 existence = step.fused.confidence.tolist()
                 rows = [row for row in rows if existence[row] >= limit]
             if rows or station.false:
-                boxes = step.fused.boxes.tolist()
                 places = [(boxes[row][0], boxes[row][1]) for row in rows]
                 station.tracks += sum(
                     all(math.dist(place, before) > SAME for before in station.false) for place in places
@@ -92,11 +91,11 @@ class FalseTracks:
         return found
 
 
-def _unmatched(step: AgentStep, view: WorldView, own: int) -> Sequence[int]:
+def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:
     """The rows of the objects without a true actor within GATE."""
     bodies = view.plain_boxes
     found = []
-    for row, box in enumerate(step.fused.boxes.tolist()):
+    for row, box in enumerate(boxes):
         x, y = box[0], box[1]
         for index, body in enumerate(bodies):
             dx, dy = x - body[0], y - body[1]
