@@ -226,7 +226,7 @@ def test_a_mirrored_scene_gives_the_mirrored_sweep(boxes: Any) -> None:
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [
-        ({"channels": 0}, "greater than 0"),
+        ({"channels": 0}, "greater than or equal to 1"),
         ({"channels": 3, "elevations": [1, 2]}, "3 channels need as many elevations, found 2"),
         ({"channels": 64, "points_per_second": 100}, "less than one column"),
         ({"range": -1}, "greater than 0"),
