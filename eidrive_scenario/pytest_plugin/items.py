@@ -39,13 +39,13 @@ class ScenarioItem(pytest.Item):
             self._result = play_file(self, self.path, self.arm, self.run)
         except ConstraintError as error:
             if self.run is None:
-                raise pytest.fail.Exception(str(error), pytrace=False) from error
+                raise pytest.fail.Exception(str(error), pytrace=False) from None
             pytest.skip(f"ruled out by constraints: {error}")
         except Exception as error:
             text = failure_text(error)
             if text is None:
                 raise
-            raise pytest.fail.Exception(text, pytrace=False) from error
+            raise pytest.fail.Exception(text, pytrace=False) from None
 
     def runtest(self) -> None:
         """Raise ScenarioFailed if a criterion failed or the simulated time ran out."""

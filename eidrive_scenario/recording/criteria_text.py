@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, Protocol
 
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import InvalidResult, Problem, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.parameters import Scope
@@ -104,6 +104,10 @@ def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mappi
         raise SettingError(Problem(f"{kind} is given {settings!r}", remedy, source, line))
     parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
     criterion: Criterion = construct(criterion_type, parsed)
+    name: object = getattr(criterion, "name", kind)
+    if not isinstance(name, str) or not name:
+        raise InvalidResult(criterion, "name", f"is {name!r} (expected a text)")
+    criterion.name = name
     return criterion
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from eidrive_scenario.errors import SettingError
+from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.criteria_text import (
     exit_verdict,
@@ -14,6 +14,9 @@ from eidrive_scenario.recording.criteria_text import (
     stop_trigger_criteria,
     unbuilt_criteria,
 )
+from eidrive_scenario.recording.criterion import Criterion, Verdict
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.registry import Registry
 from eidrive_scenario.storyboard.commands import CustomCommand
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -31,6 +34,34 @@ def test_one_criterion() -> None:
     assert criterion.subjects == ("Ego", "Incoming")
     assert criterion.verdict().limit == 3.5
     assert not criterion.fatal
+
+
+class Unnamed(Criterion):
+    """States no name."""
+
+    def observe(self, frame: Frame) -> None:
+        pass
+
+    def verdict(self) -> Verdict:
+        return Verdict(self.name, True, None, None, "", None, "")
+
+
+def load_unnamed(self: Registry, name: str, base: type | None = None) -> type[Criterion]:
+    assert name == "collision"
+    return Unnamed
+
+
+def test_criterion_without_a_name_has_that_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Registry, "load", load_unnamed)
+    (criterion,) = parse_criteria("collision: {}")
+    assert criterion.verdict().name == "collision"
+
+
+def test_criterion_with_a_number_for_a_name_is_an_invalid_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Registry, "load", load_unnamed)
+    monkeypatch.setattr(Unnamed, "name", 5, raising=False)
+    with pytest.raises(InvalidResult, match=r"name is 5 \(expected a text\)"):
+        parse_criteria("collision: {}")
 
 
 def test_several_of_one_kind_get_numbers() -> None:
