@@ -125,7 +125,10 @@ def view(
 
 def report(
     runs: Annotated[list[Path], typer.Argument(help="Folders written by run --out, or folders of such folders.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the report.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder of report.html, or a page.", show_default="the first folder of runs"),
+    ] = None,
 ) -> None:
     """Write one page over many runs."""
     from eidrive_scenario.recording.run_files import read_results, unfinished_runs
@@ -137,4 +140,6 @@ def report(
     if not results:
         places = ", ".join(map(str, runs))
         raise SettingError(Problem(f"no result.json in {places}", "give folders that eidrive run --out has written"))
+    if out is None:
+        out = runs[0] if runs[0].is_dir() else runs[0].parent
     typer.echo(str(write_report(results, out)))

@@ -105,6 +105,9 @@ def test_report_over_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) ->
     page = Path(result.stdout.strip())
     assert page.is_relative_to(tmp_path / "report")
     assert "hit each other" in page.read_text(encoding="utf-8")
+    beside = Path(eidrive("report", tmp_path / "runs").stdout.strip())
+    assert beside == tmp_path / "runs" / "report.html"
+    assert beside.read_bytes() == page.read_bytes()
 
 
 def test_report_without_runs(eidrive: Eidrive, tmp_path: Path) -> None:
