@@ -25,6 +25,10 @@ _QUOTED = re.compile(r"'[^']{2,}'|\"[^\"]{2,}\"")
 """Quoted words of a text, and not the brackets and commas that YAML expects."""
 
 
+_ALIAS = "anchors and aliases are not read"
+_MERGE = "merge keys are not read"
+
+
 class _Loader(yaml.SafeLoader):
     """YAML's safe loader, which by itself keeps the last of several equal keys, and expands aliases without bounds.
 
@@ -41,7 +45,7 @@ class _Loader(yaml.SafeLoader):
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         self._count += 1
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
-            raise yaml.MarkedYAMLError(problem="anchors and aliases are not read", problem_mark=event.start_mark)
+            raise yaml.MarkedYAMLError(problem=_ALIAS, problem_mark=event.start_mark)
         if self._depth >= MAX_DEPTH:
             raise yaml.MarkedYAMLError(problem="nested too deeply", problem_mark=event.start_mark)
         if self._count > MAX_NODES:
@@ -77,7 +81,7 @@ class _Loader(yaml.SafeLoader):
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.constructor.ConstructorError(None, None, "a key is a single word", key.start_mark)
             if key.tag == "tag:yaml.org,2002:merge":
-                raise yaml.constructor.ConstructorError(None, None, "merge keys are not read", key.start_mark)
+                raise yaml.constructor.ConstructorError(None, None, _MERGE, key.start_mark)
             if key.value in seen:
                 what = f"{quoted(key.value, 100)} stands here twice"
                 raise yaml.constructor.ConstructorError(None, None, what, key.start_mark)
@@ -124,7 +128,8 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
         place = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
         what = getattr(error, "problem", None) or "a character is not allowed"
         what = what if quote else _QUOTED.sub("…", what)
-        raise SettingError(Problem(f"not valid YAML: {what}", "check the syntax there", source, place)) from error
+        hint = "write the value out in each place" if what in (_ALIAS, _MERGE) else "check the syntax there"
+        raise SettingError(Problem(f"not valid YAML: {what}", hint, source, place)) from error
     except (ValueError, ArithmeticError) as error:  # what looks like a date or a number and is none
         what = f"not valid YAML: {_QUOTED.sub('…', str(error))}"
         raise SettingError(Problem(what, "put it in quotes", source, line)) from error

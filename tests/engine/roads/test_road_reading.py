@@ -158,6 +158,22 @@ def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
     assert len(paint.faces) == 2 * 12
 
 
+@pytest.mark.parametrize(
+    "curve",
+    [
+        '<paramPoly3 aU="0" bU="1" cU="0" dU="0" aV="-1e9" bV="0" cV="0" dV="0" pRange="arcLength"/>',
+        '<paramPoly3 aU="0" bU="1" cU="0" dU="0" aV="0" bV="0" cV="0" dV="1e9" pRange="normalized"/>',
+        '<poly3 a="0" b="0" c="0" d="1e6"/>',
+    ],
+)
+def test_curve_that_leads_immensely_far_is_refused(road: Text, map_of: Text, curve: str) -> None:
+    """A grid over such a road would take gigabytes."""
+    text = road("1", geometry=f'<geometry s="0" x="0" y="0" hdg="0" length="100">{curve}</geometry>')
+    far = [found for found in problems(map_of(text)) if "a geometry of road '1' leads 1e+" in found]
+    assert len(far) == 1
+    assert "at most 1e+06 m are read" in far[0]
+
+
 def test_a_namespace_is_no_obstacle(road: Text, map_of: Text) -> None:
     text = map_of(road()).replace(
         "<OpenDRIVE>", '<OpenDRIVE xmlns="http://code.asam.net/simulation/standard/opendrive_schema">'
