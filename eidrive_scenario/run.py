@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
@@ -148,3 +149,12 @@ class Observer(Protocol):
 
     def close(self) -> None:
         """The run is over."""
+
+
+def checked_observer(observer: Observer) -> Observer:
+    """Raise SettingError for an object that lacks the methods of an observer."""
+    for method in ("observe", "close"):
+        if not callable(getattr(observer, method, None)):
+            name = type(observer).__name__
+            raise SettingError(Problem(f"observer {name} has no method {method}", "define observe(frame) and close()"))
+    return observer

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
-from pathlib import Path
 from types import FrameType
 from typing import Self
 
@@ -17,11 +15,10 @@ from eidrive_scenario.driving.declared import possible_drivers
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Problem, SettingError, SimulationError, Together, WallLimitError, suggestion
-from eidrive_scenario.library import name_of, resolve_scenario
-from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
-from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
-from eidrive_scenario.openscenario.variation import drawn_parameters
+from eidrive_scenario.errors import Problem, SimulationError, Together, WallLimitError
+from eidrive_scenario.library import name_of
+from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
+from eidrive_scenario.openscenario.loading import load_for_run, load_for_seed
 from eidrive_scenario.recording.criteria_text import (
     exit_verdict,
     parse_criteria,
@@ -43,11 +40,13 @@ from eidrive_scenario.run import (
     Observer,
     RunResult,
     RunSettings,
+    checked_observer,
 )
 from eidrive_scenario.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.unstarted import unstarted
+from eidrive_scenario.storyboard.user_values import user_value_warnings
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
@@ -101,7 +100,7 @@ class Simulation:
             self.add_observer(observer)
         self._run = source.number if isinstance(source, ConcreteRun) else None
         together = Together()
-        self.scenario = scenario = _load_for_run(source, seed, self.settings.parameters, together)
+        self.scenario = scenario = load_for_run(source, seed, self.settings.parameters, together)
         self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
         with together:
             check_commands(scenario)
@@ -166,7 +165,7 @@ class Simulation:
 
     def add_observer(self, observer: Observer) -> None:
         """Show the frames of all ticks from now on to this observer too, and close it with the run."""
-        self._observers = (*self._observers, _checked_observer(observer))
+        self._observers = (*self._observers, checked_observer(observer))
 
     @attributed
     def close(self) -> None:
@@ -335,21 +334,12 @@ class Simulation:
     def _command_exit(self, command: CustomCommand) -> None:
         self._exit = exit_verdict(command, self.world.time)
 
-    def _mistaken_values(self) -> Iterator[str]:
-        """Warnings of user-defined values that nobody gave, or nobody asked for."""
-        wanted = self.storyboard.stage.wanted_values
-        for name, by in wanted.items():
-            if name not in self._user_values:
-                where = f"{by.source}:{by.line}"
-                yield f"{where}: nobody gave the user-defined value {name!r}; use --user-value or set_user_value"
-        for name in self.settings.user_values:
-            if name not in wanted:
-                yield f"no UserDefinedValueCondition asks for {name!r}; {suggestion(name, wanted)}"
-
     def _late_warnings(self, time_s: float, end: str) -> Iterator[str]:
         """Warnings that only the whole run can give."""
         yield from map(str, self.storyboard.stage.warnings)
-        yield from self._mistaken_values()
+        yield from user_value_warnings(
+            self.storyboard.stage.wanted_values, self._user_values, self.settings.user_values
+        )
         yield from map(str, self._motionless.warnings(self.scenario, time_s))
         if end not in _CUT_SHORT and not end.startswith("criterion: "):
             yield from map(str, unstarted(self.storyboard.root, self.scenario, time_s, end))
@@ -387,15 +377,6 @@ class Simulation:
         )
 
 
-def _checked_observer(observer: Observer) -> Observer:
-    """Raise SettingError for an object that lacks the methods of an observer."""
-    for method in ("observe", "close"):
-        if not callable(getattr(observer, method, None)):
-            name = type(observer).__name__
-            raise SettingError(Problem(f"observer {name} has no method {method}", "define observe(frame) and close()"))
-    return observer
-
-
 def run_file(
     source: Scenario | Source | ConcreteRun,
     *,
@@ -414,49 +395,3 @@ def run_file(
     """
     with limit_wall_time(wall_limit):
         return Simulation(source, seed=seed, settings=settings, observers=observers).run()
-
-
-def load_for_seed(
-    source: Scenario | Source | ConcreteRun, seed: int, parameters: Mapping[str, str | Assignment] | None = None
-) -> Scenario:
-    """Load a scenario with the parameters that its `eidrive.variation` commands draw for this seed.
-
-    source      path, library name, one run of a distribution, a Scenario that is loaded already (returned as it is if
-                no parameter changes), or any other source of `load_scenario`
-    parameters  values that win over drawn ones and over those of the distribution
-
-    Raises ScenarioError for a wrong file, SettingError for a wrong variation.
-    """
-    scenario = _load(source, parameters)
-    return _draw(scenario, seed, parameters)
-
-
-def _load(source: Scenario | Source | ConcreteRun, parameters: Mapping[str, str | Assignment] | None) -> Scenario:
-    if isinstance(source, Scenario):
-        return source
-    if isinstance(source, ConcreteRun):
-        return load_scenario(source.scenario, {**source.assignments, **(parameters or {})})
-    return load_scenario(resolve_scenario(source) if isinstance(source, str | Path) else source, parameters)
-
-
-def _draw(scenario: Scenario, seed: int, parameters: Mapping[str, str | Assignment] | None) -> Scenario:
-    """The scenario with what the caller assigns and the seed draws; loaded again only if that changes a value."""
-    given = {**scenario.assigned, **as_assignments(parameters)}
-    drawn = {name: Assignment(text) for name, text in drawn_parameters(scenario, seed).items() if name not in given}
-    wanted = {**drawn, **given}
-    if all(scenario.parameters.get(name) == value.text for name, value in wanted.items()):
-        return scenario
-    return replace(load_scenario(scenario.source, wanted), assigned=given)
-
-
-def _load_for_run(
-    source: Scenario | Source | ConcreteRun,
-    seed: int,
-    parameters: Mapping[str, str | Assignment],
-    together: Together,
-) -> Scenario:
-    """As `load_for_seed`; a wrong variation is one of several mistakes that are reported at once."""
-    scenario = _load(source, parameters)
-    with together:
-        scenario = _draw(scenario, seed, parameters)
-    return scenario

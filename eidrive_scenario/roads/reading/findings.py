@@ -70,10 +70,7 @@ class Findings:
                 self._missing(element, name)
                 return 0.0
             return default
-        try:
-            value = float(text) if _plain(text) else math.nan
-        except ValueError:
-            value = math.nan
+        value = _number(text)
         if abs(value) <= LARGEST:
             return value
         remedy = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
@@ -85,10 +82,7 @@ class Findings:
         text = element.get(name)
         if text is None:
             return default
-        try:
-            value = float(text) if _plain(text) else math.nan
-        except ValueError:
-            value = math.nan
+        value = _number(text)
         if abs(value) <= LARGEST:
             return value
         self.doubt_mark(element, f"<{element.tag}> has {name}={quoted(text)}")
@@ -153,6 +147,14 @@ class Findings:
         near = suggestion(name, map(str, element.attrib)) if element.attrib else ""
         remedy = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
         self.add(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)
+
+
+def _number(text: str) -> float:
+    """Return the number that a text states, NaN if it is none."""
+    try:
+        return float(text) if _plain(text) else math.nan
+    except ValueError:
+        return math.nan
 
 
 def _plain(text: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -106,8 +107,47 @@ class Tr37885(Settings):
         return np.where(mean > 0.0, np.exp(np.log(some) - variance / 2.0 + np.sqrt(variance) * ndtri(draws)), 0.0)
 
 
-class WinnerB1(Settings):
-    """WINNER+ B1 as in 3GPP TR 36.885, with one loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+class _LossPerVehicle(Settings):
+    """Base of path loss with LOS that adds a fixed loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+
+    Buildings have the NLOS of TR 37.885 where that loses more.
+    """
+
+    per_vehicle_db: NonNegativeFloat = 6.9
+
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
+    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
+    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
+
+    @abstractmethod
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m]."""
+
+    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+        clear = self.line_of_sight_loss(between.distance, frequency_ghz)
+        if not between.states.any():
+            return clear
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self.per_vehicle_db * between.vehicles],
+            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
+        )
+
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        clear = float(self.line_of_sight_loss(distance, frequency_ghz))
+        if link.state == LOS:
+            return clear
+        if link.state == NLOSV:
+            return clear + self.per_vehicle_db * link.vehicles
+        return max(clear, float(building_nlos(distance, frequency_ghz)))
+
+
+class WinnerB1(_LossPerVehicle):
+    """WINNER+ B1 as in 3GPP TR 36.885, with one loss for each vehicle in between.
 
     environment_height  taken off the antennas' heights [m]: 1.0 after 3GPP; 0.5 and 0 in the analytic models of 802.11p
                         and C-V2X. 16 dB at 200 m hang on it
@@ -116,78 +156,27 @@ class WinnerB1(Settings):
 
     kind: Literal["winner_b1"]
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 1.0
-    per_vehicle_db: NonNegativeFloat = 6.9
 
-    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
-    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
-    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
-    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
-
-    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
-        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m], for antennas at 1.5 m."""
         height = 1.5 - self.environment_height
-        clear = winner_b1(between.distance, frequency_ghz, height, height)
-        if not between.states.any():
-            return clear
-        return np.select(
-            [between.states == LOS, between.states == NLOSV],
-            [clear, clear + self.per_vehicle_db * between.vehicles],
-            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
-        )
-
-    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """The same for one link."""
-        distance = max(link.distance, 1.0)
-        height = 1.5 - self.environment_height
-        clear = float(winner_b1(distance, frequency_ghz, height, height))
-        if link.state == LOS:
-            return clear
-        if link.state == NLOSV:
-            return clear + self.per_vehicle_db * link.vehicles
-        return max(clear, float(building_nlos(distance, frequency_ghz)))
+        return winner_b1(distance, frequency_ghz, height, height)
 
 
-class LogDistance(Settings):
-    """Log-distance path loss, with one loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+class LogDistance(_LossPerVehicle):
+    """Log-distance path loss, with one loss for each vehicle in between.
 
     exponent            10 times this many dB per decade of distance; 2 is free space
     reference_distance  [m], with the loss `reference_loss_db` there and below; None: of free space at the carrier
-    Buildings have the NLOS of TR 37.885 where that loses more.
     """
 
     kind: Literal["log_distance"]
     exponent: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     reference_distance: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
     reference_loss_db: float | None = None
-    per_vehicle_db: NonNegativeFloat = 6.9
 
-    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
-    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
-    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
-    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
-
-    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
-        """(M,) path loss without shadowing [dB]; nothing is drawn."""
-        clear = self._clear(between.distance, frequency_ghz)
-        if not between.states.any():
-            return clear
-        return np.select(
-            [between.states == LOS, between.states == NLOSV],
-            [clear, clear + self.per_vehicle_db * between.vehicles],
-            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
-        )
-
-    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """The same for one link."""
-        distance = max(link.distance, 1.0)
-        clear = float(self._clear(distance, frequency_ghz))
-        if link.state == LOS:
-            return clear
-        if link.state == NLOSV:
-            return clear + self.per_vehicle_db * link.vehicles
-        return max(clear, float(building_nlos(distance, frequency_ghz)))
-
-    def _clear(self, distance: Array | float, frequency_ghz: float) -> Array:
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m]."""
         reference = self.reference_loss_db
         at_reference = free_space(self.reference_distance, frequency_ghz) if reference is None else reference
         return log_distance(distance, self.exponent, self.reference_distance, at_reference)
