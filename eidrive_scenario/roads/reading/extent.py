@@ -35,15 +35,19 @@ def check_extent(roads: Mapping[str, Road], findings: Findings) -> None:
 
 def _check_geometries(road: Road, findings: Findings) -> None:
     """A cubic may leave its start further than by its length, unlike all other geometries."""
+    farthest: dict[int | None, float] = {}
     for curve in road.reference.curves:
         if not isinstance(curve, Cubic):
             continue
         points = [curve.at(share * curve.length) for share in _SHARES]
         away = max(math.hypot(point.x - curve.x, point.y - curve.y) for point in points)
         if not away <= MAX_SHAPE:
-            message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
-            place = curve.line or road.line
-            findings.tell(Problem(message, f"at most {MAX_SHAPE:g} m are read", findings.source, place))
+            # One geometry of a file may be several curves here.
+            line = curve.line or road.line
+            farthest[line] = max(away, farthest.get(line, 0.0))
+    for line, away in farthest.items():
+        message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
+        findings.tell(Problem(message, f"at most {MAX_SHAPE:g} m are read", findings.source, line))
 
 
 def _check_cross_section(road: Road, findings: Findings) -> None:
