@@ -250,7 +250,8 @@ class Simulation:
         if self._motionless.watching:
             self._motionless.observe(view, commands.driven)
         self._trace.observe(frame)
-        self._false_tracks.observe(frame, self.stations.min_existence)
+        if self.stations.min_existence:
+            self._false_tracks.observe(frame, self.stations.min_existence)
         for observer in self._observers:
             observer.observe(frame)
         for criterion in self.criteria:

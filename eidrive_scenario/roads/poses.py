@@ -95,7 +95,9 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
     ahead, left, roll = 0.0, t, 0.0
     if road.superelevation.is_zero:
         z, climb = road.elevation.value_and_slope(s)
-        along = max(speed * (1.0 - curvature * t), LEAST_STRETCH)
+        along = speed * (1.0 - curvature * t)
+        if along < LEAST_STRETCH:
+            along = LEAST_STRETCH
         if sideways and climb:
             length = math.sqrt(along * along + sideways * sideways + climb * climb)
             roll = math.atan2(-climb * sideways, along * length)

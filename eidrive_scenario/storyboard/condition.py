@@ -10,6 +10,7 @@ import numpy as np
 
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.stage import Stage
 
 TOLERANCE = 1e-6
@@ -114,6 +115,12 @@ class EntityCondition(Condition):
 
     unit: ClassVar[str] = ""
     """Of the quantity that it compares."""
+    third_party: ClassVar[bool] = False
+    """Whether it is no part of this project: what it returns for each entity is then checked."""
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        cls.third_party = not is_built_in(cls)
 
     def __init__(self, element: model.Element, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element)
@@ -124,10 +131,11 @@ class EntityCondition(Condition):
 
     def holds(self, stage: Stage) -> bool:
         """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
-        self.fulfilled = tuple([name for name in self.entities if name in stage.view and self._holds_for(stage, name)])
+        holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, stage.view
+        self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(stage, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
 
-    def _holds_for(self, stage: Stage, entity: str) -> bool:
+    def _checked_holds_for(self, stage: Stage, entity: str) -> bool:
         held: object = self.holds_for(stage, entity)
         return held if held is True or held is False else truth(self, held)
 

@@ -156,9 +156,9 @@ class Storyboard:
 def _check_placements(placements: Mapping[str, Placement]) -> None:
     """Raise SimulationError for the first placement that is not finite; pybullet would take it as it is."""
     total = 0.0
-    for placement in placements.values():
-        total += placement.x + placement.y + placement.z + placement.yaw + placement.speed
-    if math.isfinite(total):
+    for place in placements.values():
+        total += place.x + place.y + place.z + place.yaw + place.speed
+    if total - total == 0.0:  # neither NaN nor infinite
         return
     for name, placement in placements.items():
         if not all(map(math.isfinite, (placement.x, placement.y, placement.z, placement.yaw, placement.speed))):
