@@ -26,6 +26,8 @@ MARGIN = 2.0
 """How far from the outermost lane a vehicle may be and still count as on the road [m]: a bay, a verge."""
 SPACING = 2.0
 """Distance between the points of a trajectory that are looked at [m]."""
+MAX_POINTS = 5000
+"""Maximum number of these points: those of a trajectory of more than 10 km are further apart."""
 
 
 class _Relative(Exception):
@@ -48,7 +50,7 @@ def trajectories_off_road(survey: RoadSurvey) -> Iterator[Problem]:
 def _leaves(
     survey: RoadSurvey, action: FollowTrajectoryAction, trajectory: Trajectory, layout: Layout
 ) -> Iterator[Problem]:
-    count = max(2, math.ceil(layout.length / SPACING) + 1)
+    count = min(max(2, math.ceil(layout.length / SPACING) + 1), MAX_POINTS)
     along = [layout.length * number / (count - 1) for number in range(count)]
     points = [layout.at(s) for s in along]
     outside = survey.outside([point.x for point in points], [point.y for point in points])
