@@ -41,8 +41,8 @@ def check_commands(scenario: Scenario) -> None:
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }
     problems: list[Problem] = []
-    for command in scenario.storyboard.walk():
-        if not isinstance(command, CustomCommandAction) or not command.type.startswith(PREFIX):
+    for command in scenario.custom_commands:
+        if not command.type.startswith(PREFIX):
             continue
         reader = readers.get(command.type)
         if reader is None:

@@ -14,7 +14,6 @@ from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.files import is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.library import library_path, name_of
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.registry import registry
 from eidrive_scenario.resolved_settings import (
@@ -99,8 +98,8 @@ def _dump(model: BaseModel | None) -> dict[str, Any] | None:
 def _later_channels(scenario: Scenario) -> Iterator[dict[str, Any] | None]:
     """The profiles of the commands that stand in events."""
     at_start = {id(one.custom_command_action) for one in scenario.storyboard.init.actions.user_defined_action}
-    for command in scenario.storyboard.walk():
-        if isinstance(command, CustomCommandAction) and command.type == CHANNEL and id(command) not in at_start:
+    for command in scenario.custom_commands:
+        if command.type == CHANNEL and id(command) not in at_start:
             profile: ChannelProfile | None = load_profile(
                 command.content,
                 (library_path() / "channels",),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
@@ -17,6 +18,7 @@ from eidrive_scenario.openscenario.model import (
     CatalogReference,
     Center,
     Controller,
+    CustomCommandAction,
     Dimensions,
     Element,
     ExternalObjectReference,
@@ -84,6 +86,11 @@ class Scenario:
         """What happens when."""
         assert self.document.storyboard is not None
         return self.document.storyboard
+
+    @cached_property
+    def custom_commands(self) -> tuple[CustomCommandAction, ...]:
+        """All CustomCommandActions of the storyboard, in the order of the file."""
+        return tuple(one for one in self.storyboard.walk() if isinstance(one, CustomCommandAction))
 
     def resolved(self, reference: CatalogReference) -> Element:
         """The catalog's entry, with the values that the reference assigns to its parameters."""

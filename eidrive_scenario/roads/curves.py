@@ -225,13 +225,13 @@ class ReferenceLine:
 
     def at(self, s: float) -> CurvePoint:
         """The point at s [m]; the first and last curve go on beyond the ends."""
-        curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
+        curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.at(s - curve.s)
 
     def ahead(self, s: float, direction: int) -> tuple[Curve, float]:
         """The curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
         starts = self.starts
-        index = max(bisect_right(starts, s) - 1, 0)
+        index = bisect_right(starts, s, 1) - 1
         if direction > 0:
             return self.curves[index], starts[index + 1] if index + 1 < len(starts) else math.inf
         while index > 0 and starts[index] >= s:
@@ -240,7 +240,7 @@ class ReferenceLine:
 
     def bend(self, s: float) -> tuple[float, float]:
         """Curvature [1/m] and metres of path per metre of s at s [m]."""
-        curve = self.curves[max(bisect_right(self.starts, s) - 1, 0)]
+        curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.bend(s - curve.s)
 
 

@@ -177,7 +177,7 @@ class Road:
 
     def section_at(self, s: float) -> LaneSection:
         """The lane section at s."""
-        return self.sections[max(bisect_right(self.section_starts, s) - 1, 0)]
+        return self.sections[bisect_right(self.section_starts, s, 1) - 1]
 
 
 @dataclass(frozen=True)

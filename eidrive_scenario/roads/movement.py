@@ -192,8 +192,10 @@ def _along(
         curve, limit = road.reference.ahead(s, direction)
         reach = min(room, (limit - s) * direction)
         if steady and isinstance(curve, Arc):
-            t = lane_t(road, section, lane, s)[0] + offset
-            stretch = max(1.0 - curve.curvature * t, LEAST_STRETCH)
+            stretch = 1.0
+            if curve.curvature:
+                t = lane_t(road, section, lane, s)[0] + offset
+                stretch = max(1.0 - curve.curvature * t, LEAST_STRETCH)
             ds = remaining / stretch
         else:
             stretch = _stretch(road, section, lane, s, offset)
@@ -219,7 +221,8 @@ def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: flo
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
     across = speed * (1.0 - curvature * (t + offset))
-    return max(math.hypot(across, slope) if slope else across, LEAST_STRETCH)
+    stretch = math.hypot(across, slope) if slope else across
+    return stretch if stretch > LEAST_STRETCH else LEAST_STRETCH
 
 
 def _wrap(angle: float) -> float:

@@ -51,7 +51,7 @@ class Polynomials:
         """The function at s."""
         if self._constant is not None:
             return self._constant
-        start, a, b, c, d = self.pieces[max(bisect_right(self.starts, s) - 1, 0)]
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return a + ds * (b + ds * (c + ds * d))
 
@@ -59,7 +59,7 @@ class Polynomials:
         """The function and its derivative at s."""
         if self._constant is not None:
             return self._constant, 0.0
-        start, a, b, c, d = self.pieces[max(bisect_right(self.starts, s) - 1, 0)]
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
 
@@ -70,7 +70,7 @@ class Polynomials:
 
     def coefficients_at(self, s: float) -> tuple[float, float, float, float]:
         """The coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
-        start, a, b, c, d = self.pieces[max(bisect_right(self.starts, s) - 1, 0)]
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
         ds = s - start
         return (
             a + ds * (b + ds * (c + ds * d)),

@@ -87,6 +87,17 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def update(self) -> Status:
         """Decide on the step that begins now."""
 
+    def tick_once(self) -> None:
+        """Tick as py_trees does; while the action runs, without a generator, as that happens in every step of a run."""
+        if self.status is not Status.RUNNING or self.third_party:
+            super().tick_once()
+            return
+        status: object = self.update()
+        new = status if isinstance(status, Status) else Status.INVALID
+        if new is not Status.RUNNING:
+            self.stop(new)
+        self.status = new
+
     def describe(self) -> str:
         """The action in words."""
         return type(self.action).__name__

@@ -82,7 +82,8 @@ class StoryElement(Composite):
             self.begin(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
         if record.state is State.RUNNING:
             for element in self.elements:
-                element.judge()
+                if element.record.state is not State.COMPLETE:
+                    element.judge()
 
     def begin(self, why: str = "") -> None:
         """standby -> running; the children stand by, or start where they have no trigger."""
@@ -133,12 +134,12 @@ class StoryElement(Composite):
 
     def settle(self) -> None:
         """End if all children are complete; what has none has no end of its own, and runs until it is stopped."""
-        if (
-            self.state is State.RUNNING
-            and self.elements
-            and all(element.state is State.COMPLETE for element in self.elements)
-        ):
-            self.finish()
+        if self.record.state is not State.RUNNING or not self.elements:
+            return
+        for element in self.elements:
+            if element.record.state is not State.COMPLETE:
+                return
+        self.finish()
 
     def _arm(self) -> None:
         for leaf in (self.start_leaf, self.stop_leaf):

@@ -63,10 +63,15 @@ class InitBlock(Composite):
         self.running = [other for other in self.running if other is not behaviour]
 
     def tick(self) -> Iterator[Behaviour]:
-        """The running ones decide on the next step."""
+        """`tick_once` as py_trees asks for it."""
+        self.tick_once()
+        yield self
+
+    def tick_once(self) -> None:
+        """Let the running ones decide on the next step."""
         for behaviour in tuple(self.running):
             try:
-                yield from behaviour.tick()
+                behaviour.tick_once()
                 if behaviour.third_party or behaviour.status is Status.INVALID:
                     behaviour.check_decision()
             except Absent as who:
@@ -75,4 +80,3 @@ class InitBlock(Composite):
                 self.running.remove(behaviour)
                 self.stage.release(behaviour)
         self.status = Status.RUNNING if self.running else Status.SUCCESS
-        yield self
