@@ -1,8 +1,28 @@
-"""Lets the rooms of the tests share what lies here."""
+"""Makes the modules of this folder importable in the folders below, and shares fixtures with them."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of the installed package of faulty extensions."""
+    from faulty_extensions import BROKEN_MODULES, install
+
+    from eidrive_scenario.registry import registry
+
+    folder = install(tmp_path_factory.mktemp("faulty"))
+    registry.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        yield folder
+    registry.cache_clear()
+    for name in ("faulty", *BROKEN_MODULES):
+        sys.modules.pop(name, None)

@@ -4,30 +4,14 @@ from __future__ import annotations
 
 import pickle
 import re
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faulty_extensions import BROKEN_MODULES, install, line_of, write_scenario
+from faulty_extensions import line_of, write_scenario
 
 from eidrive_scenario.errors import ExtensionError, InputError, RegistryError
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
-
-
-@pytest.fixture(scope="module")
-def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The installed package of faulty extensions."""
-    folder = install(tmp_path_factory.mktemp("faulty"))
-    registry.cache_clear()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(folder))
-        yield folder
-    registry.cache_clear()
-    for name in ("faulty", *BROKEN_MODULES):
-        sys.modules.pop(name, None)
 
 
 def run(tmp_path: Path, *, detector: str = "oracle", channel: str = "ideal", **extensions: object) -> RunResult:

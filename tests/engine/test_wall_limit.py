@@ -3,37 +3,22 @@
 from __future__ import annotations
 
 import signal
-import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from faulty_extensions import install, line_of, write_scenario
+from faulty_extensions import line_of, write_scenario
 
 from eidrive_scenario.errors import InputError, WallLimitError
 from eidrive_scenario.experiments.single_run import play
 from eidrive_scenario.recording import read_recording
-from eidrive_scenario.registry import registry
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.wall_limit import current_limit, limit_wall_time
 
 pytestmark = pytest.mark.timeout(600)
 LONG = 3600.0
 """A limit that no run here reaches [s]."""
-
-
-@pytest.fixture(scope="module")
-def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The installed package of faulty extensions."""
-    folder = install(tmp_path_factory.mktemp("faulty"))
-    registry.cache_clear()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(folder))
-        yield folder
-    registry.cache_clear()
-    sys.modules.pop("faulty", None)
 
 
 def hung(tmp_path: Path, detector: str) -> WallLimitError:

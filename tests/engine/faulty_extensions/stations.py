@@ -1,0 +1,84 @@
+"""Source text of faulty extensions of stations other than detectors: fusion methods, planners, a channel."""
+
+STATIONS = """
+class FusionNaN(FusionMethod):
+    def fuse(self, reports, now):
+        return Detections(now, np.full((1, 7), math.inf), np.ones(1), ("car",), np.zeros((1, 2)), np.zeros((1, 2, 2)))
+
+
+class FusionNone(FusionMethod):
+    def fuse(self, reports, now):
+        pass
+
+
+class FusionHearRaises(FusionMethod):
+    def hear(self, report):
+        raise ZeroDivisionError("division by zero")
+
+    def fuse(self, reports, now):
+        return Detections(now)
+
+
+class PlannerNone(RoutePlanner):
+    def plan(self, ego, objects, goal, now):
+        return None
+
+
+class PlannerNaN(RoutePlanner):
+    def plan(self, ego, objects, goal, now):
+        plan = super().plan(ego, objects, goal, now)
+        return Plan(plan.points, plan.speeds * math.nan, "undefined")
+
+
+class PlannerOnePoint(RoutePlanner):
+    def plan(self, ego, objects, goal, now):
+        plan = super().plan(ego, objects, goal, now)
+        return Plan(plan.points[:1], plan.speeds[:1], "short")
+
+
+class PlannerStands(RoutePlanner):
+    def plan(self, ego, objects, goal, now):
+        plan = super().plan(ego, objects, goal, now)
+        return Plan(np.repeat(plan.points[:1], 5, axis=0), plan.speeds[:5], "the same point")
+
+
+class PlannerStaticRaises(RoutePlanner):
+    @staticmethod
+    def plan(ego, objects, goal, now):
+        raise RuntimeError("from a static method")
+
+
+class PlannerArguments(RoutePlanner):
+    def __init__(self, settings):
+        pass
+
+
+class FaultyProfile(ChannelProfile):
+    fault: str = "none"
+
+
+class FaultyChannel(LinkChannel):
+    settings = FaultyProfile
+
+    def __init__(self, profile, seed):
+        super().__init__()
+        self.profile = profile
+
+    def fate(self, message, receiver, now):
+        match self.profile.fault:
+            case "nan":
+                return math.nan
+            case "inf":
+                return math.inf
+            case "none":
+                return None
+            case "raises":
+                raise OSError("no radio")
+        return 0.1
+
+    def interval(self, station):
+        return math.nan if self.profile.fault == "interval" else 0.0
+
+    def deliver(self, receiver, now):
+        return None if self.profile.fault == "deliver" else super().deliver(receiver, now)
+"""
