@@ -19,7 +19,9 @@ TOPIC = "/frame"
 FORMAT = "2"
 """Version of the recording's layout, in its metadata."""
 _CHUNK = 256 * 2**10
-"""Size of a chunk before compression [bytes]; what is lost where a run is killed, or a chunk is damaged."""
+"""Size of a chunk before compression [bytes]."""
+_SPAN = 1_000_000_000
+"""Simulated time after which a chunk is written whatever its size [ns]."""
 RUN = "run"
 """Name of the metadata record that describes the run."""
 
@@ -29,6 +31,8 @@ class Recorder:
 
     metadata     what was run: scenario, seed, settings; versions of the packages are added
     attachments  files to carry along by name, say the scenario and its road
+
+    A chunk is written after every second of simulated time, or 256 KiB: a killed process loses at most one.
 
     Times in the file are simulated ones, so equal runs give equal files. Raises SettingError if the file cannot be
     written.
@@ -47,6 +51,7 @@ class Recorder:
         for name, data in (attachments or {}).items():
             self._writer.add_attachment(0, 0, name, "application/octet-stream", data)
             self._seal.add_attachment(name, data)
+        self._due = 0
         self._codec = codec(Frame)
         schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Frame", **self._codec.schema}
         schema_id = self._writer.register_schema("eidrive.Frame", "jsonschema", json.dumps(schema).encode())
@@ -58,6 +63,9 @@ class Recorder:
         data, instant = text.encode(), round(frame.view.time * 1e9)
         self._writer.add_message(self._channel, instant, data, instant, sequence=frame.view.tick)
         self._seal.add_frame(frame.view.tick, instant, data)
+        if instant >= self._due:
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._due = instant + _SPAN
 
     def close(self) -> None:
         """Finish the file; a second call does nothing."""

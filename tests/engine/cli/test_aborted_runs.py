@@ -111,6 +111,16 @@ def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
     assert json.loads(out)["error"]["name"] == "hangs_in_c"
 
 
+def test_run_that_never_returns_to_python_leaves_its_recording_but_for_the_last_second(folder: Path) -> None:
+    """The detector hangs at 2.5 s; the process has ended without closing a file."""
+    write_scenario(folder / "s.xosc", detector="hangs_in_c_later", end=5.0)
+    assert run(folder, "s.xosc", "--wall-limit", "6", "--out", "runs")[0] == 3
+    (recording,) = folder.glob("runs/*/recording.partial.mcap")
+    times = [frame.view.time for frame in read_recording(recording).frames()]
+    assert times == pytest.approx([0.05 * tick for tick in range(len(times))])
+    assert times[-1] >= 2.5 - 1.05
+
+
 def test_run_that_waits_in_native_code_ends_with_3_and_a_closed_recording(folder: Path) -> None:
     code, _, err = run(folder, "s.xosc", "--detector", "deadlocks", "--wall-limit", "6", "--out", "runs")
     assert code == 3

@@ -1,6 +1,7 @@
 """What a run leaves behind can be read again, to the last bit."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,34 @@ def test_a_file_that_was_cut_short_gives_what_it_holds(tmp_path: Path, make_fram
     assert ticks == list(range(len(ticks)))
     assert len(ticks) < 600
     assert share < 0.9 or ticks
+
+
+def test_recorder_that_is_never_closed_leaves_all_but_the_last_second(tmp_path: Path, make_frame: MakeFrame) -> None:
+    """Frames every 0.05 s up to 2.95 s, as of a process that is killed: those since 2.0 s may be missing."""
+    recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    for tick in range(60):
+        recorder.observe(make_frame(tick))
+    left = (tmp_path / "run.mcap").read_bytes()
+    recorder.close()
+    (tmp_path / "left.mcap").write_bytes(left)
+    recording = read_recording(tmp_path / "left.mcap")
+    assert [frame.view.tick for frame in recording.frames()] == list(range(41))
+    assert recording.scenario == "cut_in"
+
+
+@pytest.mark.parametrize("step", [0.3, 1.0, 7.0])
+def test_recorder_of_long_steps_loses_less_than_a_second(tmp_path: Path, make_frame: MakeFrame, step: float) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
+    frames = [
+        replace(frame, view=replace(frame.view, time=frame.view.tick * step)) for frame in map(make_frame, range(9))
+    ]
+    for frame in frames:
+        recorder.observe(frame)
+    left = (tmp_path / "run.mcap").read_bytes()
+    recorder.close()
+    (tmp_path / "left.mcap").write_bytes(left)
+    last = list(read_recording(tmp_path / "left.mcap").frames())[-1]
+    assert last.view.time > frames[-1].view.time - 1.0
 
 
 @pytest.mark.parametrize("content", [b"", b"not a recording", b"\x89MCAP0\r\n"])
