@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from types import FrameType
 from typing import Self
 
 from eidrive_scenario.attribution import attributed, report_extension, wall_limit_error
-from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX, check_commands
-from eidrive_scenario.driving.area_checks import areas_off_road
+from eidrive_scenario.custom_commands import CustomCommands
 from eidrive_scenario.driving.declared import possible_drivers
 from eidrive_scenario.driving.motionless import MotionlessStations
-from eidrive_scenario.driving.stations import Stations
-from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Problem, SimulationError, Together, WallLimitError
+from eidrive_scenario.errors import SimulationError, WallLimitError
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
-from eidrive_scenario.openscenario.loading import load_for_run, load_for_seed
-from eidrive_scenario.recording.criteria_text import (
-    exit_verdict,
-    parse_criteria,
-    stop_trigger_criteria,
-    unbuilt_criteria,
-)
-from eidrive_scenario.recording.criterion import Criterion, Verdict, checked_metrics, checked_verdict
+from eidrive_scenario.openscenario.loading import load_for_seed
+from eidrive_scenario.recording.criterion import Criterion, checked_verdict
 from eidrive_scenario.recording.false_tracks import FalseTracks
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
-from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.roads import Pose
 from eidrive_scenario.run import (
     BROKEN,
     DEFAULT_SEED,
@@ -42,16 +33,14 @@ from eidrive_scenario.run import (
     RunSettings,
     checked_observer,
 )
+from eidrive_scenario.run_outcome import TIME_LIMIT, criteria_metrics, exit_code_of, final_verdicts, late_warnings
+from eidrive_scenario.run_setup import set_up_run
 from eidrive_scenario.settings_resolution import resolve_settings
-from eidrive_scenario.storyboard.commands import Commands, CustomCommand
-from eidrive_scenario.storyboard.storyboard import Storyboard
-from eidrive_scenario.storyboard.unstarted import unstarted
-from eidrive_scenario.storyboard.user_values import user_value_warnings
+from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.specs import actor_spec
-from eidrive_scenario.world.weather import Weather, load_weather
 from eidrive_scenario.world.weather_of import weather_of
 
 __all__ = [
@@ -67,10 +56,6 @@ __all__ = [
     "load_for_seed",
     "run_file",
 ]
-
-
-_CUT_SHORT = ("command: exitFailure",)
-"""Ends of a failed run that leave the rest of the storyboard out."""
 
 
 class Simulation:
@@ -96,56 +81,26 @@ class Simulation:
         self.seed = seed
         self.settings = settings or RunSettings()
         self._observers: tuple[Observer, ...] = ()
+        self._unclosed: list[Observer] = []
         for observer in observers:
             self.add_observer(observer)
         self._run = source.number if isinstance(source, ConcreteRun) else None
-        together = Together()
-        self.scenario = scenario = load_for_run(source, seed, self.settings.parameters, together)
-        self.roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
-        with together:
-            check_commands(scenario)
-        with together:
-            self.storyboard = Storyboard(
-                scenario, self.roads, dt=self.settings.dt, seed=seed, controllers=self.settings.controllers
-            )
-        with together:
-            self.stations = Stations(
-                scenario,
-                self.roads,
-                seed=seed,
-                dt=self.settings.dt,
-                channel=self.settings.channel,
-                detector=self.settings.detector,
-                cooperate=self.settings.cooperate,
-                load_weights=load_weights,
-                allow_torchscript=self.settings.allow_torchscript,
-            )
-        with together:
-            self.criteria: list[Criterion] = list(stop_trigger_criteria(scenario))
-        self._weather: Weather | None = None
-        with together:
-            if self.settings.weather is not None:
-                self._weather = load_weather(self.settings.weather, origin="--weather")
-        together.settle()
-        self.world = World(self.roads, dt=self.settings.dt, entities=self.storyboard.road_objects)
-        if self._weather is not None:
-            self.world.set_weather(self._weather)
+        setup = set_up_run(source, seed, self.settings, load_weights=load_weights)
+        self.scenario, self.roads = setup.scenario, setup.roads
+        self.storyboard, self.stations, self.world = setup.storyboard, setup.stations, setup.world
+        self.criteria: list[Criterion] = list(setup.criteria)
+        self._weather = setup.weather
+        self._warnings = list(setup.warnings)
         self._trace = TraceHash()
         self._false_tracks = FalseTracks()
-        doubts = self.roads.doubts if self.roads is not None else ()
-        self._warnings = [str(problem) for problem in (*scenario.warnings, *unbuilt_criteria(scenario), *doubts)]
-        self._warn(areas_off_road(scenario, self.stations.settings, self.roads))
-        self._warn(short_detector_latencies(self.stations.settings, self.settings.dt))
-        if self.settings.channel is not None:
-            self._warn(short_channel_delay(self.stations.channel_profile, self.settings.dt, "--channel"))
-        self._motionless = MotionlessStations(possible_drivers(scenario, self.stations.settings))
+        self._motionless = MotionlessStations(possible_drivers(self.scenario, self.stations.settings))
+        self._commands = CustomCommands(self.scenario, self.stations, self.settings, self.criteria, self._warnings)
         self._user_values = dict(self.settings.user_values)
         self.storyboard.stage.user_values = self._user_values.get
         self._environment: Environment | None = None
-        self._exit: Verdict | None = None
         try:
             self._apply(self.storyboard.initial())
-            resolved = resolve_settings(scenario, seed, self.settings, self.stations, self._weather)
+            resolved = resolve_settings(self.scenario, seed, self.settings, self.stations, self._weather)
         except BaseException:
             self.world.close()
             raise
@@ -156,6 +111,7 @@ class Simulation:
         self._last: tuple[Frame, str, float] | None = None
         """The last frame, the reason for the end, and the wall time until then [s]."""
         self._started = time.perf_counter()
+        self._is_closed = False
 
     def __enter__(self) -> Self:
         return self
@@ -166,14 +122,16 @@ class Simulation:
     def add_observer(self, observer: Observer) -> None:
         """Show the frames of all ticks from now on to this observer too, and close it with the run."""
         self._observers = (*self._observers, checked_observer(observer))
+        self._unclosed.append(observer)
 
     @attributed
     def close(self) -> None:
-        """Free the world and finish what the observers write, each of them, whatever another one meets at it."""
+        """Free the world and close the observers, each once and whatever another one raises; no tick can follow."""
         with ExitStack() as stack:
-            for observer in reversed(self._observers):
-                stack.callback(observer.close)
+            while self._unclosed:
+                stack.callback(self._unclosed.pop().close)
             self.world.close()
+        self._is_closed = True
 
     def set_user_value(self, name: str, value: str) -> None:
         """Give a value to the UserDefinedValueConditions of this name, from the next tick on."""
@@ -211,8 +169,9 @@ class Simulation:
         Raises ExtensionError if an extension raises an exception or returns something invalid, SimulationError after
         the end.
         """
-        if self._last is not None:
-            raise SimulationError("the run has ended; a second run needs a second Simulation")
+        if self._last is not None or self._is_closed:
+            what = "the simulation is closed" if self._last is None else "the run has ended"
+            raise SimulationError(f"{what}; a second run needs a second Simulation")
         try:
             return self._tick()
         except BaseException as error:
@@ -226,9 +185,9 @@ class Simulation:
 
     def describe_hang(self, limit: float, frame: FrameType | None) -> WallLimitError:
         """Return the error of this run, which executes this frame; its observers are closed, so that files end well."""
-        for observer in self._observers:
+        while self._unclosed:
             with suppress(Exception):
-                observer.close()
+                self._unclosed.pop(0).close()
         return wall_limit_error(frame, limit, time=self.world.time, observers=self._observers)
 
     def _tick(self) -> tuple[Frame, str | None]:
@@ -266,14 +225,14 @@ class Simulation:
         return frame, end
 
     def _end(self, frame: Frame) -> str | None:
-        if self._exit is not None:
-            return f"command: {self._exit.name}"
+        if self._commands.exit is not None:
+            return f"command: {self._commands.exit.name}"
         for criterion in self.criteria:
             if criterion.fatal and (verdict := checked_verdict(criterion)).fatal and not verdict.passed:
                 return f"criterion: {criterion.name}"
         if self.storyboard.ended is not None:
             return self.storyboard.ended
-        return "time limit" if frame.view.time >= self.settings.time_limit - 1e-9 else None
+        return TIME_LIMIT if frame.view.time >= self.settings.time_limit - 1e-9 else None
 
     def _apply(self, commands: Commands) -> None:
         """Carry out what the storyboard decided, except the placements, which are the world's step."""
@@ -294,83 +253,31 @@ class Simulation:
             if self._weather is None:
                 self.world.set_weather(weather_of(commands.environment, self.world.time))
         for command in commands.custom:
-            self._command(command)
-
-    def _command(self, command: CustomCommand) -> None:
-        """A CustomCommandAction; one that is not ours is recorded and does nothing: it never starts a program."""
-        run = {
-            CHANNEL: self._command_channel,
-            CRITERION: self._command_criterion,
-            "exitSuccess": self._command_exit,
-            "exitFailure": self._command_exit,
-        }.get(command.type)
-        if run is not None:
-            run(command)
-        elif not command.type.startswith(PREFIX):
-            self._warnings.append(
-                f"{command.source}:{command.line}: command of type {command.type!r} is recorded, not executed"
-            )
-
-    def _command_channel(self, command: CustomCommand) -> None:
-        self.stations.use_channel(command.content, source=command.source, line=command.line, scope=command.scope)
-        if self.settings.channel is None:
-            profile = self.stations.channel_profile
-            self._warn(short_channel_delay(profile, self.settings.dt, command.source, command.line))
-
-    def _warn(self, problems: Iterable[Problem]) -> None:
-        self._warnings += map(str, problems)
-
-    def _command_criterion(self, command: CustomCommand) -> None:
-        self.criteria.extend(
-            parse_criteria(
-                command.content,
-                source=command.source,
-                line=command.line,
-                entities=self.scenario.entities,
-                taken=[criterion.name for criterion in self.criteria],
-                scope=command.scope,
-            )
-        )
-
-    def _command_exit(self, command: CustomCommand) -> None:
-        self._exit = exit_verdict(command, self.world.time)
-
-    def _late_warnings(self, time_s: float, end: str) -> Iterator[str]:
-        """Warnings that only the whole run can give."""
-        yield from map(str, self.storyboard.stage.warnings)
-        yield from user_value_warnings(
-            self.storyboard.stage.wanted_values, self._user_values, self.settings.user_values
-        )
-        yield from map(str, self._motionless.warnings(self.scenario, time_s))
-        if end not in _CUT_SHORT and not end.startswith("criterion: "):
-            yield from map(str, unstarted(self.storyboard.root, self.scenario, time_s, end))
+            self._commands.execute(command, self.world.time)
 
     @attributed
     def _result(self, frame: Frame, end: str, wall_s: float) -> RunResult:
-        verdicts = [checked_verdict(criterion) for criterion in self.criteria]
-        if self._exit is not None:
-            verdicts.append(self._exit)
-        metrics: dict[str, float] = {}
-        for criterion in self.criteria:
-            metrics.update(checked_metrics(criterion))
+        verdicts = final_verdicts(self.criteria, self._commands.exit)
+        exit_code = exit_code_of(verdicts, end)
+        metrics = criteria_metrics(self.criteria)
         metrics.update(self.stations.metrics(frame.view.time))
         metrics.update(self._false_tracks.metrics())
         metrics.update({f"monitor.{name}": float(value) for name, value in frame.monitors.items()})
-        passed = all(verdict.passed for verdict in verdicts)
-        timed_out = end == "time limit"
+        given = self._user_values, self.settings.user_values
+        late = late_warnings(self.scenario, self.storyboard, self._motionless, given, frame.view.time, end)
         return RunResult(
             scenario=name_of(self.scenario.path) if self.scenario.path is not None else self.scenario.name,
             seed=self.seed,
             channel=self.stations.channel_name,
-            passed=passed and not timed_out,
+            passed=exit_code == PASSED,
             end=end,
-            exit_code=FAILED if not passed else BROKEN if timed_out else PASSED,
-            criteria=tuple(verdicts),
+            exit_code=exit_code,
+            criteria=verdicts,
             metrics=metrics,
             trace_hash=self._trace.hexdigest(),
             simulated_s=frame.view.time,
             wall_s=wall_s,
-            warnings=tuple(dict.fromkeys([*self._warnings, *self._late_warnings(frame.view.time, end)])),
+            warnings=tuple(dict.fromkeys([*self._warnings, *late])),
             parameters=dict(self.scenario.parameters),
             run=self._run,
             links=dict(self.stations.link_statistics(frame.view.time)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 ONE = "coop/scenario_1"
@@ -34,6 +35,34 @@ def test_result_before_the_end_is_an_error() -> None:
         simulation.tick()
         with pytest.raises(SimulationError, match="the run has not ended; call tick until"):
             simulation.result()
+
+
+class Closings:
+    """Counts how often it is closed."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def observe(self, frame: Frame) -> None: ...
+
+    def close(self) -> None:
+        self.count += 1
+
+
+def test_observer_of_run_within_with_is_closed_once() -> None:
+    early, late = Closings(), Closings()
+    with Simulation(ONE, settings=RunSettings(time_limit=0.1), observers=[early]) as simulation:
+        simulation.add_observer(late)
+        simulation.run()
+    assert (early.count, late.count) == (1, 1)
+
+
+def test_tick_of_closed_simulation_is_an_error() -> None:
+    with Simulation(ONE) as simulation:
+        simulation.tick()
+    for step in (simulation.tick, simulation.run):
+        with pytest.raises(SimulationError, match="the simulation is closed; a second run needs a second Simulation"):
+            step()
 
 
 def test_tick_after_the_end_is_an_error() -> None:
