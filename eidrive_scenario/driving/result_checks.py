@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-import math
+from typing import Any
 
 import numpy as np
 
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.perception.result_checks import describe, raise_not_finite
+from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside
+
+FASTEST = 1e4
+"""Largest magnitude of a planned speed [m/s], as of the property `target_speed`, and of an acceleration [m/s²]."""
 
 
 def check_plan(planner: Planner, plan: object) -> None:
-    """Raise InvalidResult unless `plan` is a Plan of at least two different points and as many speeds, all finite."""
+    """Raise InvalidResult unless `plan` is a Plan of at least two points and as many speeds.
+
+    All numbers are finite. No coordinate exceeds LARGEST [m], no speed or acceleration FASTEST.
+    """
     if not isinstance(plan, Plan):
         raise InvalidResult(planner, "plan", f"returned {describe(plan)} (expected Plan)")
     if not isinstance(plan.objects, tuple):
@@ -27,20 +33,20 @@ def check_plan(planner: Planner, plan: object) -> None:
         shapes = f"points of shape {points.shape} and speeds of shape {speeds.shape}"
         raise InvalidResult(planner, "plan", f"returned {shapes} (expected (M, 2) and (M,), M at least 2)")
     try:
-        if is_finite_plan(plan):
+        if _is_in_range(plan):
             return
     except (TypeError, ValueError, AttributeError):
         pass
-    raise_not_finite(
-        planner,
-        "plan",
-        {
-            "points": points,
-            "speeds": speeds,
-            "acceleration": plan.acceleration,
-            "braking": 0.0 if plan.braking is None else plan.braking,
-        },
-    )
+    numbers: dict[str, Any] = {
+        "points": points,
+        "speeds": speeds,
+        "acceleration": plan.acceleration,
+        "braking": 0.0 if plan.braking is None else plan.braking,
+    }
+    raise_not_finite(planner, "plan", numbers)
+    for name, value in numbers.items():
+        limit = LARGEST if name == "points" else FASTEST
+        raise_outside(planner, "plan", name, np.atleast_1d(value).astype(float), -limit, limit)
 
 
 def check_followed(planner: Planner, plan: Plan) -> None:
@@ -53,11 +59,11 @@ def check_followed(planner: Planner, plan: Plan) -> None:
         raise InvalidResult(planner, "plan", text)
 
 
-def is_finite_plan(plan: Plan) -> bool:
-    """Return whether all numbers of a plan are finite: a quick check that may fail for huge ones."""
-    return (
-        math.isfinite(np.vdot(plan.points, plan.points))
-        and math.isfinite(np.vdot(plan.speeds, plan.speeds))
-        and math.isfinite(plan.acceleration)
-        and (plan.braking is None or math.isfinite(plan.braking))
+def _is_in_range(plan: Plan) -> bool:
+    """Return whether all numbers of a plan are surely in their ranges; each line is False for NaN."""
+    return bool(
+        are_within(plan.points, LARGEST)
+        and are_within(plan.speeds, FASTEST)
+        and abs(plan.acceleration) <= FASTEST
+        and (plan.braking is None or abs(plan.braking) <= FASTEST)
     )

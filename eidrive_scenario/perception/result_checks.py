@@ -1,17 +1,27 @@
-"""Checks of what detectors and fusion methods return: a list of objects without infinite or undefined numbers."""
+"""Checks of what detectors and fusion methods return: a list of objects of finite numbers and possible sizes."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.registry import is_built_in
 
+Array = NDArray[np.float64]
+
 _FINITE_BY_CONSTRUCTION = ("perception.oracle", "fusion.average")
 """Modules whose classes copy or average finite numbers; a check of theirs in each tick would cost 1 % of a run."""
+
+LARGEST = 1e9
+"""Largest magnitude of a coordinate [m], as in road files; of speeds too [m/s]."""
+LARGEST_SIZE = 1e5
+"""Largest length, width or height of an object [m], as of objects in road files."""
+_ROUNDING = 1e-5
+"""Excess of a probability over 1 that single precision explains."""
 
 _REAL = "fiu"
 """Kinds of numpy arrays of real numbers."""
@@ -25,17 +35,16 @@ def is_checked(extension: object) -> bool:
 
 
 def check_detections(extension: object, method: str, found: object) -> None:
-    """Raise InvalidResult unless `found` is a Detections of finite numbers; velocity and covariance may be NaN."""
+    """Raise InvalidResult unless `found` is a Detections of finite numbers in their ranges.
+
+    Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, and no coordinate or speed
+    exceeds LARGEST. Velocity and covariance may be NaN.
+    """
     if not isinstance(found, Detections):
         raise InvalidResult(extension, method, f"returned {describe(found)} (expected Detections)")
-    boxes, scores = found.boxes, found.scores
     _check_rows(extension, method, found)
     try:
-        # One product per array is a third of the time of np.isfinite; a sum that overflows is looked at closely.
-        quick = found.time + np.vdot(boxes, boxes) + np.vdot(scores, scores)
-        if found.existence.size:
-            quick += np.vdot(found.existence, found.existence)
-        if math.isfinite(quick) and not (np.isinf(found.velocity).any() or np.isinf(found.covariance).any()):
+        if math.isfinite(found.time) and (not len(found.boxes) or _is_in_range(found)):
             return
     except (TypeError, ValueError, AttributeError):
         pass
@@ -44,13 +53,21 @@ def check_detections(extension: object, method: str, found: object) -> None:
         method,
         {
             "time": found.time,
-            "boxes": boxes,
-            "scores": scores,
+            "boxes": found.boxes,
+            "scores": found.scores,
             "existence": found.existence,
             "velocity": _without_nan(found.velocity),
             "covariance": _without_nan(found.covariance),
         },
     )
+    variances = found.covariance.reshape(-1, 4)[:, ::3]
+    raise_outside(extension, method, "boxes", found.boxes, -LARGEST, LARGEST)
+    raise_outside(extension, method, "a length, width or height", found.boxes[:, 3:6], 0.0, LARGEST_SIZE)
+    raise_outside(extension, method, "scores", found.scores, 0.0, 1.0, _ROUNDING)
+    raise_outside(extension, method, "existence", found.existence, 0.0, 1.0, _ROUNDING)
+    raise_outside(extension, method, "velocity", found.velocity, -LARGEST, LARGEST)
+    raise_outside(extension, method, "covariance", found.covariance, -(LARGEST**2), LARGEST**2)
+    raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
 
 
 def check_in_view(extension: object, shares: object, count: int) -> None:
@@ -78,11 +95,46 @@ def raise_not_finite(extension: object, method: str, fields: dict[str, object]) 
             )
 
 
+def raise_outside(
+    extension: object, method: str, name: str, values: Array, low: float, high: float, tolerance: float = 0.0
+) -> None:
+    """Raise InvalidResult that names the first of these values outside of [low, high]; NaN is inside."""
+    wrong = values[(values < low - tolerance) | (values > high + tolerance)]
+    if wrong.size:
+        text = f"returned {name} with the value {wrong[0]:g} (expected {low:g} to {high:g})"
+        raise InvalidResult(extension, method, text)
+
+
+def are_within(values: Array, limit: float) -> bool:
+    """Return whether all values are real numbers in [-limit, limit]; not for NaN."""
+    return bool(values.dtype.kind in _REAL and values.min() >= -limit and values.max() <= limit)
+
+
 def describe(value: object) -> str:
     """Return what was returned in a few words: None, or the type of the object."""
     if isinstance(value, np.ndarray):
         return f"an array of type {value.dtype}"
     return "None" if value is None else f"an object of type {type(value).__name__}"
+
+
+def _is_in_range(found: Detections) -> bool:
+    """Return whether all numbers of at least one object are surely in their ranges; each line is False for NaN."""
+    boxes, covariance = found.boxes, found.covariance
+    sizes = boxes[:, 3:6]
+    return bool(
+        are_within(boxes, LARGEST)
+        and sizes.min() >= 0.0
+        and sizes.max() <= LARGEST_SIZE
+        and _are_probabilities(found.scores)
+        and (not found.existence.size or _are_probabilities(found.existence))
+        and not (np.abs(found.velocity) > LARGEST).any()
+        and not (np.abs(covariance) > LARGEST**2).any()
+        and not (covariance.reshape(-1, 4)[:, ::3] < 0.0).any()
+    )
+
+
+def _are_probabilities(values: Array) -> bool:
+    return bool(values.min() >= 0.0 and values.max() <= 1.0 + _ROUNDING)
 
 
 def _check_rows(extension: object, method: str, found: Detections) -> None:
