@@ -145,7 +145,7 @@ class ExtensionError(SimulationError):
 
 
 class WallLimitError(SimulationError):
-    """A run took longer than its limit of wall time.
+    """A run or a check took longer than its limit of wall time.
 
     limit   [s] of wall time
     place   the extension that was running; None if none was
@@ -160,7 +160,7 @@ class WallLimitError(SimulationError):
             running = f"{place}: still running" + (f" in {place.function}" if place.function else "")
         else:
             running = f"{where}: " if where else ""
-            running += "the run is not finished" + (f" at t = {time:.3f} s" if time is not None else "")
+            running += "not finished" + (f" at t = {time:.3f} s" if time is not None else "")
         super().__init__(f"{running} after {limit:g} s of wall time (the wall limit)")
         self.limit, self.place, self.time, self.where = limit, place, time, where
 

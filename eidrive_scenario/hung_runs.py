@@ -1,4 +1,7 @@
-"""Reports of runs that cannot be interrupted: from the frame of a thread, or from the stack that faulthandler wrote."""
+"""Reports of runs and checks that cannot be interrupted.
+
+They are made from the frame of a thread, or from the stack that faulthandler wrote.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from eidrive_scenario.registry import GROUPS, registry, singular
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.wall_limit import Limit
 
+_MODULES = ("simulation.py", "inspection.py")
+"""Modules in the stack of the thread of a run or a check."""
 _DUMPED = re.compile(r'^  File "(.+)", line (\d+) in (.+)$', re.MULTILINE)
 
 
@@ -30,9 +35,9 @@ def describe_hung_run(limit: Limit, frame: FrameType | None) -> WallLimitError:
 
 
 def describe_dump(limit: float, dump: str) -> WallLimitError:
-    """Return the error of a run that ended with a dump of its stack by faulthandler."""
+    """Return the error of a run or check that ended with a dump of its stack by faulthandler."""
     threads = re.split(r"^(?:Current thread|Thread) .*$", dump, flags=re.MULTILINE)
-    of_run = next((text for text in threads if "simulation.py" in text), dump)
+    of_run = next((text for text in threads if any(module in text for module in _MODULES)), dump)
     calls = [(file, int(line), function) for file, line, function in _DUMPED.findall(of_run)]
     for file, line, function in calls:
         for kind, name, value in _extensions_at(file, line):

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from eidrive_scenario.cli.failures import BROKEN, WRONG_INPUT, tell
+from eidrive_scenario.cli.hung_check import HungCheck
+from eidrive_scenario.cli.supervision import supervise
 from eidrive_scenario.errors import InputError, Problem
 from eidrive_scenario.library import definition, resolve_scenario
+from eidrive_scenario.wall_limit import LimitReached, check_wall_limit, limit_wall_time
+
+if TYPE_CHECKING:
+    from eidrive_scenario.experiments.inspection import Findings
 
 _SUFFIX = ".xosc"
 _ROADS = ".xodr"
@@ -24,32 +31,34 @@ def check(
     ignore: Annotated[
         list[str] | None, typer.Option(metavar="RULE", help="A rule to leave out; repeatable.", show_default="none")
     ] = None,
+    wall_limit: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Maximum wall time of each file.", show_default="none"),
+    ] = None,
 ) -> None:
     """Print every mistake in scenarios, distributions and roads as `file:line: what is wrong; what would be right`.
 
     Findings end with the rule that made them: `eidrive list checks` names all rules.
     """
-    from eidrive_scenario.experiments.distribution_inspection import DistributionFindings, inspect_distribution
-    from eidrive_scenario.experiments.inspection import inspect_catalog, inspect_roads, inspect_scenario
+    from eidrive_scenario.experiments.distribution_inspection import DistributionFindings
 
+    hung = HungCheck()
+    if wall_limit is not None:
+        check_wall_limit(wall_limit, "--wall-limit")
+        supervise(hung.end, partial(hung.report_dump, wall_limit), "check")
     missing: list[Problem] = []
-    broken: list[Exception] = []
+    broken: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     told: dict[str, dict[Problem, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
     for problem in missing:
         typer.echo(str(problem))
     for path in files:
+        hung.file = path
         try:
-            kind = definition(path)
-            if kind == "catalog":
-                findings = inspect_catalog(path, ignored)
-            elif kind == "roads" or path.suffix == _ROADS:
-                findings = inspect_roads(path, ignored)
-            else:
-                findings = (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
+            findings = _inspect(path, ignored, wall_limit)
         except InputError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if context.find_root().params.get("traceback"):
                 raise
             tell(error, path)
@@ -67,6 +76,25 @@ def check(
     if broken:
         raise typer.Exit(BROKEN)
     raise typer.Exit(WRONG_INPUT if told["problem"] or (strict and told["warning"]) else 0)
+
+
+def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> Findings:
+    """What is wrong with a file of any kind. Raises WallLimitError if that takes longer than the limit [s]."""
+    from eidrive_scenario.attribution import report_extension
+    from eidrive_scenario.experiments.distribution_inspection import inspect_distribution
+    from eidrive_scenario.experiments.inspection import inspect_catalog, inspect_roads, inspect_scenario
+
+    with limit_wall_time(wall_limit):
+        try:
+            kind = definition(path)
+            if kind == "catalog":
+                return inspect_catalog(path, ignored)
+            if kind == "roads" or path.suffix == _ROADS:
+                return inspect_roads(path, ignored)
+            return (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
+        except LimitReached as error:
+            report_extension(error)  # names the extension that was running, if one was
+            raise
 
 
 def _mark(level: str, rule: str) -> str:

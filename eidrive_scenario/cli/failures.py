@@ -46,12 +46,12 @@ class Guarded(TyperGroup):
 def tell(error: BaseException, file: object = None) -> None:
     """Say on stderr what broke in a few words: the run, what the system refused, or an error of this program's own.
 
-    file  which one it broke at, where several are worked through
+    file  file whose check broke; None for a run
     """
     place = f"{file}: " if file is not None else ""
     error = _attributed(error)
     if isinstance(error, EidriveError):
-        typer.echo(f"{place}the run broke: {error}", err=True)
+        typer.echo(f"{place}the {'run' if file is None else 'check'} broke: {error}", err=True)
         tell_notes(error)
         return
     if isinstance(error, OSError) and error.strerror:

@@ -1,4 +1,4 @@
-"""`eidrive run --wall-limit` in a process of its own, whose parent reports a run that no code in it can interrupt."""
+"""`--wall-limit` of commands in a process of their own, whose parent reports what no code in it can interrupt."""
 
 from __future__ import annotations
 
@@ -30,11 +30,12 @@ def allow() -> None:
     _allowed = True
 
 
-def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[str], None]) -> None:
+def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[str], None], what: str = "run") -> None:
     """Continue in a child process; the parent waits for it and ends with its exit code, 3 where that is none of a run.
 
     end     report a run that cannot be interrupted, in the child, with the frame that it executes
     report  the same in the parent, with the stack that faulthandler wrote
+    what    of which messages speak: run or check
 
     Without `fork`, or in a process that is not the command line's, nothing is done but to limit runs that return to the
     interpreter.
@@ -55,7 +56,7 @@ def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[
         set_last_resort(LastResort(end, dump))
         return
     os.close(finish)
-    code = _exit_code(_wait(child), finished, dump, report)
+    code = _exit_code(_wait(child), finished, dump, report, what)
     raise typer.Exit(code)
 
 
@@ -67,7 +68,7 @@ def _wait(child: int) -> int:
     return os.waitpid(child, 0)[1]
 
 
-def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str], None]) -> int:
+def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str], None], what: str) -> int:
     dump.seek(0)
     stack = dump.read().decode(errors="replace")
     if stack:
@@ -75,9 +76,9 @@ def _exit_code(status: int, finished: int, dump: BinaryIO, report: Callable[[str
         return BROKEN
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        typer.echo(f"the run broke: its process was ended by {signal.Signals(-code).name}", err=True)
+        typer.echo(f"the {what} broke: its process was ended by {signal.Signals(-code).name}", err=True)
         return BROKEN
     if code != BROKEN and not os.read(finished, 1):
-        typer.echo("the run broke: an extension ended its process (os._exit)", err=True)
+        typer.echo(f"the {what} broke: an extension ended its process (os._exit)", err=True)
         return BROKEN
     return code

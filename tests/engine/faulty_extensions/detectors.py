@@ -68,6 +68,14 @@ class HangsWhenBuilt(Detector):
         return Detections(readings.time)
 
 
+class HangsInCWhenBuilt(Detector):
+    def __init__(self):
+        sum(itertools.repeat(1))
+
+    def detect(self, readings):
+        return Detections(readings.time)
+
+
 class Exits(Detector):
     def detect(self, readings):
         if readings.time >= AFTER:

@@ -38,6 +38,7 @@ POINTS = {
         "deadlocks": "Deadlocks",
         "ends_process": "EndsProcess",
         "hangs_when_built": "HangsWhenBuilt",
+        "hangs_in_c_when_built": "HangsInCWhenBuilt",
         "exits": "Exits",
         "exits_when_built": "ExitsWhenBuilt",
         "wrong_settings": "WrongSettings",

@@ -1,0 +1,41 @@
+"""Report of a check that exceeds its wall limit and cannot be interrupted."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from eidrive_scenario.cli.failures import BROKEN, tell
+
+if TYPE_CHECKING:
+    from eidrive_scenario.wall_limit import Limit
+
+
+class HungCheck:
+    """Reports of `eidrive check` for `supervise`; `file` is the one that is being checked."""
+
+    def __init__(self) -> None:
+        self.file: Path | None = None
+
+    def end(self, limit: Limit, frame: FrameType | None) -> None:
+        """Report a check that executes this frame, and end the process."""
+        from eidrive_scenario.attribution import wall_limit_error
+
+        try:
+            tell(wall_limit_error(frame, limit.seconds), self.file)
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(BROKEN)
+
+    def report_dump(self, limit: float, dump: str) -> None:
+        """Report a check whose process ended with this dump of its stack.
+
+        The file is not known here: it was read in the child process.
+        """
+        from eidrive_scenario.hung_runs import describe_dump
+
+        tell(describe_dump(limit, dump))

@@ -1,0 +1,90 @@
+"""`eidrive check` of files that take too long, and of files whose extensions end the process."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from faulty_extensions import install, line_of, write_scenario
+
+from eidrive_scenario.library import library_path
+
+pytestmark = pytest.mark.timeout(600)
+"""Hung checks take their limit and the grace after it, and several processes load the engine."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the faulty extensions and a scenario that is right."""
+    install(tmp_path)
+    write_scenario(tmp_path / "z_right.xosc")
+    return tmp_path
+
+
+def check(folder: Path, *arguments: str) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "eidrive_scenario", "check", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_check_that_exceeds_its_wall_limit_ends_with_3_and_names_each_file(folder: Path) -> None:
+    """No file is checked within a microsecond."""
+    names = ("coop/scenario_1", "coop/scenario_2")
+    code, out, err = check(folder, *names, "--wall-limit", "1e-6")
+    assert code == 3
+    for name in names:
+        path = re.escape(str(library_path() / f"{name}.xosc"))
+        assert re.search(rf"^{path}: the check broke: .*not finished after 1e-06 s of wall time", err, re.MULTILINE), (
+            err
+        )
+    assert out == "2 files, 0 problems, 0 warnings\n"
+
+
+def test_check_within_its_wall_limit_is_as_without(folder: Path) -> None:
+    assert check(folder, "coop/scenario_1", "--wall-limit", "600") == check(folder, "coop/scenario_1")
+
+
+def test_check_of_extension_that_hangs_names_it_and_goes_on_with_other_files(folder: Path) -> None:
+    write_scenario(folder / "hangs.xosc", detector="hangs_when_built")
+    code, out, err = check(folder, "hangs.xosc", "z_right.xosc", "--wall-limit", "20")
+    assert code == 3
+    assert "hangs.xosc: the check broke: " in err
+    assert "detector 'hangs_when_built' (faulty:HangsWhenBuilt)" in err
+    assert "still running in __init__ after 20 s of wall time" in err
+    assert "z_right.xosc" not in err
+    assert out == "2 files, 0 problems, 0 warnings\n"
+
+
+def test_check_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
+    write_scenario(folder / "hangs.xosc", detector="hangs_in_c_when_built")
+    code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6")
+    assert code == 3
+    place = f"{folder / 'faulty.py'}:{line_of('sum(itertools.repeat(1))')}: detector 'hangs_in_c_when_built'"
+    assert f"{place} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
+
+
+def test_check_of_extension_that_exits_reports_it_and_goes_on_with_other_files(folder: Path) -> None:
+    write_scenario(folder / "exits.xosc", detector="exits_when_built")
+    code, out, err = check(folder, "exits.xosc", "z_right.xosc")
+    assert code == 3
+    assert "exits.xosc: the check broke: " in err
+    assert "detector 'exits_when_built' (faulty:ExitsWhenBuilt)" in err
+    assert "internal error" not in err
+    assert out == "2 files, 0 problems, 0 warnings\n"
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
+def test_check_wall_limit_that_is_not_positive_is_wrong_input(folder: Path, limit: str) -> None:
+    code, _, err = check(folder, "z_right.xosc", "--wall-limit", limit)
+    assert code == 2
+    assert "--wall-limit" in err
