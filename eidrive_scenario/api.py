@@ -47,9 +47,10 @@ from eidrive_scenario.storyboard.distances import box_of, closing_speed, distanc
 from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.environments import changed as changed_environment
 from eidrive_scenario.storyboard.motion import STEEPEST, Motion, Place, Steering
-from eidrive_scenario.storyboard.positions import count_lanes, facing, references, resolve, trajectory_of
+from eidrive_scenario.storyboard.positions import references, resolve, trajectory_of
 from eidrive_scenario.storyboard.progress import Progress, Watch
 from eidrive_scenario.storyboard.random_way import any_branch, random_route
+from eidrive_scenario.storyboard.road_positions import count_lanes, facing
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.storyboard.stand_in import StandIn

@@ -6,13 +6,30 @@ import math
 
 from eidrive_scenario.errors import InputError, Problem, ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.orientations import oriented
+from eidrive_scenario.storyboard.position_errors import roads_of
 from eidrive_scenario.storyboard.stage import Stage
 
 FAR = 1e4
 """Above and below all roads [m]."""
 APART = 0.5
 """Roads whose surfaces differ by less are on one level [m]."""
+
+
+def geo_position(frame: model.GeoPosition, stage: Stage, actor: str | None) -> Place:
+    """Resolve a GeoPosition by the road network's projection.
+
+    Relative angles, and missing ones, refer to the lane there.
+    """
+    roads = roads_of(frame, stage)
+    x, y = plane_coordinates(frame, roads, stage)
+    height = frame.altitude if frame.altitude is not None else frame.height
+    z = height_of_level(frame, roads, x, y) if height is None else height - roads.header.offset[2]
+    here = roads.locate_at(x, y, z=z)
+    base = roads.pose(here) if here is not None else Pose(x, y, 0.0, 0.0, 0.0, 0.0)
+    return Place(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
 
 def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, stage: Stage) -> tuple[float, float]:

@@ -13,7 +13,8 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.distances import closing_speed, distance
 from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.positions import count_lanes, resolve
+from eidrive_scenario.storyboard.positions import resolve
+from eidrive_scenario.storyboard.road_positions import count_lanes
 from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.world.view import WorldView
 
