@@ -106,14 +106,15 @@ def view(
 ) -> None:
     """Write a recorded run as an HTML replay."""
     from eidrive_scenario.recording.recording import open_recording
-    from eidrive_scenario.recording.run_files import is_partial, recording_in, result_of
+    from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in, result_of
     from eidrive_scenario.reporting.replay import make_replay
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
     check_places({"--out": page}, [path])
     complete = not is_partial(path)
-    replay = make_replay(open_recording(path), page, result_of(path), complete=complete)
+    beside = path.with_name(RESULT)
+    replay = make_replay(open_recording(path), page, result_of(path), result_file=beside, complete=complete)
     for line in replay.damage:
         typer.secho(f"warning: {path} is damaged: {line}", fg="yellow", err=True)
     if not complete:
@@ -131,10 +132,11 @@ def report(
     ] = None,
 ) -> None:
     """Write one page over many runs."""
-    from eidrive_scenario.recording.run_files import read_results, unfinished_runs
+    from eidrive_scenario.recording.run_files import read_result, result_paths, unfinished_runs
     from eidrive_scenario.reporting.report import write_report
 
-    results = read_results(runs)
+    files = list(result_paths(runs))
+    results = [read_result(path) for path in files]
     for path in unfinished_runs(runs):
         typer.secho(f"warning: {path}: the run did not end, it is not in the report", fg="yellow", err=True)
     if not results:
@@ -142,4 +144,4 @@ def report(
         raise SettingError(Problem(f"no result.json in {places}", "give folders that eidrive run --out has written"))
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
-    typer.echo(str(write_report(results, out)))
+    typer.echo(str(write_report(results, out, sources=files)))

@@ -62,11 +62,17 @@ def write_replay(recording: Recording, out: Path, result: Mapping[str, Any] | No
 
 
 def make_replay(
-    recording: Recording, out: Path, result: Mapping[str, Any] | None = None, *, complete: bool = True
+    recording: Recording,
+    out: Path,
+    result: Mapping[str, Any] | None = None,
+    *,
+    result_file: str | Path = "",
+    complete: bool = True,
 ) -> Replay:
     """Write the replay of a recording to the file `out`, with the verdicts of its `result` if it is given.
 
-    complete  whether the run has ended; a page of one that has not says so
+    result_file  file of the result, which errors name
+    complete     whether the run has ended; a page of one that has not says so
 
     A damaged recording is shown as far as it can be read, and its page lists the damage. Raises InputError if no frame
     can be read, or the result is not one.
@@ -87,7 +93,7 @@ def make_replay(
         out,
         "replay.html.jinja",
         title=f"{name}, seed {recording.seed}",
-        result=None if result is None else reported(result),
+        result=None if result is None else reported(result, result_file),
         facts=_facts(recording, settings),
         settings=json.dumps(settings, indent=1, ensure_ascii=False) if settings else "",
         command=recording.metadata.get("command", ""),

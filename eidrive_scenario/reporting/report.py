@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,12 @@ _UNITS = {"count": "", "impact_speed": "m/s"}
 """Of metrics that have another unit than the value of their criterion, by the last part of their name."""
 
 
-def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str = "") -> Path:
+def write_report(
+    results: Iterable[Mapping[str, Any]], out: Path, *, sources: Sequence[Path] = (), footer: str = ""
+) -> Path:
     """One page over these results, given as `--json` prints them. Returns the page's path.
+
+    sources  files of the results in their order, which errors name
 
     Runs are grouped by the settings in which those of a scenario differ. A run that lies in several folders is listed
     each time, and counts once.
@@ -34,7 +39,7 @@ def write_report(results: Iterable[Mapping[str, Any]], out: Path, *, footer: str
     there are no results, or one of them is none.
     """
     page = out if out.suffix == ".html" else out / "report.html"
-    runs = [reported(result) for result in results]
+    runs = [reported(result, source) for result, source in zip(results, chain(sources, repeat("")), strict=False)]
     if not runs:
         raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -49,13 +50,20 @@ class ReportedRun(BaseModel):
         return self.end != "time limit"
 
 
-def reported(result: Mapping[str, Any]) -> ReportedRun:
-    """Return a checked run from the object that `--json` prints. Raise InputError if it is not one."""
+def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
+    """Return a checked run from the object that `--json` prints, read from the file `source` if that is given.
+
+    Raises InputError if it is not one.
+    """
     try:
         return ReportedRun.model_validate(result)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise InputError(
-            Problem(f"a result's {where[:200]!r}: {first['msg'].lower()}", "give what eidrive run --json prints")
+            Problem(
+                f"a result's {where[:200]!r}: {first['msg'].lower()}",
+                "give what eidrive run --json prints",
+                str(source),
+            )
         ) from error

@@ -1,5 +1,6 @@
 """`eidrive list`, `tree`, `view`, `report` and the help."""
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -110,6 +111,21 @@ def test_report_over_runs(eidrive: Eidrive, passing_by: Path, tmp_path: Path) ->
     assert beside.read_bytes() == page.read_bytes()
 
 
+@pytest.mark.parametrize("command", ["report", "view"])
+def test_malformed_result_is_named_by_its_file(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, command: str
+) -> None:
+    """Among the results of several runs, that one which lacks its seed."""
+    eidrive("run", passing_by, "--out", tmp_path, "--repeat", "2")
+    _, file = sorted(tmp_path.glob("*/result.json"))
+    content = json.loads(file.read_text())
+    del content["seed"]
+    file.write_text(json.dumps(content))
+    result = eidrive(command, tmp_path if command == "report" else file.parent)
+    assert result.exit_code == 2
+    assert result.stderr == f"{file}: a result's 'seed': field required; give what eidrive run --json prints\n"
+
+
 def test_report_without_runs(eidrive: Eidrive, tmp_path: Path) -> None:
     result = eidrive("report", tmp_path, "-o", tmp_path / "report")
     assert result.exit_code == 2
@@ -131,7 +147,7 @@ def test_the_page_of_a_recording_has_the_verdicts_beside_it(eidrive: Eidrive, pa
     assert "Ego and Parked hit each other" in page.read_text(encoding="utf-8")
     kept.write_text('{"trace_hash": "00"}')
     wrong = eidrive("view", tmp_path)
-    assert (wrong.exit_code, wrong.stderr.startswith("a result's 'scenario': field required")) == (2, True)
+    assert (wrong.exit_code, wrong.stderr.startswith(f"{kept}: a result's 'scenario': field required")) == (2, True)
     kept.unlink()
     eidrive("view", tmp_path)
     assert "<h3>Verdict" not in page.read_text(encoding="utf-8")
