@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
 
-from eidrive_scenario.errors import InputError, suggestion
+from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.library import definition, library_path, resolve_scenario
 from eidrive_scenario.pytest_plugin.options import Arm, arms
 from eidrive_scenario.pytest_plugin.outcome import explain, play_arm, properties
@@ -101,14 +102,18 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
 
     In a test with the marker `scenario` it is called without arguments. Any other scenario is played by
     `run_scenario("coop/scenario_1", channel="none", seed=3)`; further keywords are fields of RunSettings. In place of a
-    name it takes what load_scenario takes, as a Scenario of scenariogeneration. A wrong input fails the test with file
-    and line.
+    name it takes what load_scenario takes, as a Scenario of scenariogeneration.
+
+    The run is part of the test, which may expect its errors: `pytest.raises(WallLimitError)`. So an aborted run is a
+    failure of the test, where a `.xosc` file as a test item has an error. A wrong input fails the test with file and
+    line.
     """
     case: Case | None = getattr(request, "param", None)
 
     def run(
         source: Source | None = None, *, channel: str | None = None, seed: int | None = None, **settings: object
     ) -> RunResult:
+        __tracebackhide__ = True  # a failure shows the line of the test that called it
         source = case.source if source is None and case is not None else source
         if source is None:
             pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
@@ -120,6 +125,11 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
             result = play_arm(request.node, source, arm, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
+        except SimulationError as error:
+            place = error.place if isinstance(error, ExtensionError | WallLimitError) else None
+            if error.__cause__ is not None and place is not None:
+                error.__cause__.__traceback__ = _from_file(error.__cause__.__traceback__, place.file)
+            raise error.with_traceback(None) from error.__cause__
         result = replace(result, warnings=(*result.warnings, *arm.replaced))
         request.node.user_properties.extend(properties(result))
         if not result.passed:
@@ -127,3 +137,11 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         return result
 
     return run
+
+
+def _from_file(trace: TracebackType | None, file: str) -> TracebackType | None:
+    """The part of a traceback that begins in a file; all of it if none does."""
+    part = trace
+    while part is not None and part.tb_frame.f_code.co_filename != file:
+        part = part.tb_next
+    return part or trace

@@ -97,6 +97,37 @@ def test_wall_limit_option_wins_over_ini(project: pytest.Pytester) -> None:
     sound.assert_outcomes(passed=1)
 
 
+def test_aborted_run_of_run_scenario_fails_with_the_line_of_the_test_and_of_the_extension(
+    project: pytest.Pytester,
+) -> None:
+    """Neither frames of the engine nor of the plugin are shown."""
+    project.makepyfile(
+        """
+        import pytest
+        from eidrive_scenario.api import ExtensionError
+
+        @pytest.mark.scenario("xosc/exits")
+        def test_exits(run_scenario):
+            run_scenario()
+
+        @pytest.mark.scenario("xosc/exits")
+        def test_expected(run_scenario):
+            with pytest.raises(ExtensionError) as caught:
+                run_scenario()
+            assert isinstance(caught.value.__cause__, SystemExit)
+        """
+    )
+    result = project.runpytest_subprocess("-p", "no:cacheprovider", "--junitxml", "junit.xml")
+    result.assert_outcomes(passed=1, failed=1)
+    text = "\n".join(result.outlines)
+    assert re.search(r"^>\s+run_scenario\(\)$", text, re.MULTILINE)
+    assert f"faulty.py:{line_of('sys.exit(0)')}: detector 'exits' (faulty:Exits) of station 'Ego'" in text
+    assert "reproduce: eidrive run" in text
+    assert f"faulty.py:{line_of('sys.exit(0)')}: SystemExit" in text
+    for file in ("simulation.py", "attribution.py", "fixture.py"):
+        assert file not in text
+
+
 def test_wall_limit_of_run_scenario_fixture(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
