@@ -39,7 +39,8 @@ def write_report(
     there are no results, or one of them is none.
     """
     page = out if out.suffix == ".html" else out / "report.html"
-    runs = [reported(result, source) for result, source in zip(results, chain(sources, repeat("")), strict=False)]
+    files: Iterable[str | Path] = chain(sources, repeat(""))
+    runs = [reported(result, file) for result, file in zip(results, files, strict=False)]
     if not runs:
         raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)
