@@ -48,17 +48,29 @@ class Limit:
     armed: bool = True
     """Whether the run is interrupted; False once its error is on its way."""
 
+    def add_note(self, note: str) -> None:
+        """Add a line to the report of the last resort."""
+        self.notes.append(note)
+        self.publish()
+
+    def publish(self) -> None:
+        """Pass the notes on to where they outlast the process."""
+        if _last_resort is not None and _last_resort.publish is not None:
+            _last_resort.publish(self)
+
 
 @dataclass(frozen=True)
 class LastResort:
     """End of a process whose run cannot be interrupted.
 
-    end   called in the watchdog thread, with the limit and the topmost frame of the run; shall end the process
-    dump  file, kept open, for the stack of a process in which no thread can run; it is then ended with exit code 1
+    end      called in the watchdog thread, with the limit and the topmost frame of the run; shall end the process
+    dump     file, kept open, for the stack of a process in which no thread can run; it is then ended with exit code 1
+    publish  called when a limit begins and with each of its notes: saves them for the reader of `dump`
     """
 
     end: Callable[[Limit, FrameType | None], None]
     dump: IO[Any] | None = None
+    publish: Callable[[Limit], None] | None = None
 
 
 _of_thread = threading.local()
@@ -90,6 +102,7 @@ def limit_wall_time(seconds: float | None) -> Iterator[Limit | None]:
         yield current_limit()
         return
     limit = _of_thread.limit = Limit(seconds)
+    limit.publish()
     watchdog = _Watchdog(limit)
     try:
         with watchdog:

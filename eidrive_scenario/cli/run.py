@@ -102,7 +102,8 @@ def run(
 
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     if wall_limit is not None:
-        supervise(failures.end_hung_run, partial(failures.report_dump, _positive("--wall-limit", wall_limit)))
+        report = partial(failures.report_dump, _positive("--wall-limit", wall_limit))
+        supervise(failures.end_hung_run, report, publish=failures.share)
     parameters = _assigned("--param", param or [])
     settings = RunSettings(
         channel=channel,

@@ -13,6 +13,7 @@ import typer
 from eidrive_scenario.cli.failures import BROKEN, show_traceback, tell
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.errors import EidriveError, SimulationError
+from eidrive_scenario.files import file_in_memory
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit
@@ -31,6 +32,8 @@ class RunFailures:
         self._traceback = traceback
         self._seed: int | None = None
         self._run: int | None = None
+        self._shared = file_in_memory()
+        """The run in progress, for the process that waits for it."""
 
     def begin(self, seed: int, run: int | None) -> None:
         """Name the run that begins: its seed, and its number in a distribution."""
@@ -56,11 +59,23 @@ class RunFailures:
         finally:
             os._exit(BROKEN)
 
+    def share(self, limit: Limit) -> None:
+        """Save seed, number and notes of the present run for `report_dump` in another process."""
+        self._shared.seek(0)
+        self._shared.truncate()
+        self._shared.write(json.dumps([self._seed, self._run, limit.notes]).encode())
+        self._shared.flush()
+
     def report_dump(self, limit: float, dump: str) -> None:
         """Report a run whose process ended with this dump of its stack."""
         from eidrive_scenario.hung_runs import describe_dump
 
         error = describe_dump(limit, dump)
+        self._shared.seek(0)
+        if shared := self._shared.read():
+            self._seed, self._run, notes = json.loads(shared)
+            for note in notes:
+                error.add_note(note)
         self._print_json(error)
         tell(error)
 

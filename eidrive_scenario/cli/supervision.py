@@ -30,12 +30,18 @@ def allow() -> None:
     _allowed = True
 
 
-def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[str], None], what: str = "run") -> None:
+def supervise(
+    end: Callable[[Limit, FrameType | None], None],
+    report: Callable[[str], None],
+    what: str = "run",
+    publish: Callable[[Limit], None] | None = None,
+) -> None:
     """Continue in a child process; the parent waits for it and ends with its exit code, 3 where that is none of a run.
 
-    end     report a run that cannot be interrupted, in the child, with the frame that it executes
-    report  the same in the parent, with the stack that faulthandler wrote
-    what    of which messages speak: run or check
+    end      report a run that cannot be interrupted, in the child, with the frame that it executes
+    report   the same in the parent, with the stack that faulthandler wrote
+    what     of which messages speak: run or check
+    publish  save the notes of the run in progress for `report`; see LastResort
 
     Without `fork`, or in a process that is not the command line's, nothing is done but to limit runs that return to the
     interpreter.
@@ -53,7 +59,7 @@ def supervise(end: Callable[[Limit, FrameType | None], None], report: Callable[[
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
         atexit.register(os.write, finish, b".")
-        set_last_resort(LastResort(end, dump))
+        set_last_resort(LastResort(end, dump, publish))
         return
     os.close(finish)
     code = _exit_code(_wait(child), finished, dump, report, what)

@@ -80,7 +80,7 @@ def play(
     try:
         with limit_wall_time(wall_limit) as limit, ExitStack() as stack:
             if limit is not None and command:
-                limit.notes.append(f"reproduce: {command}")
+                limit.add_note(f"reproduce: {command}")
             simulation = stack.enter_context(
                 Simulation(source, seed=seed, settings=settings, observers=tuple(explanations))
             )
@@ -99,7 +99,7 @@ def play(
             if folder is not None and record:
                 recording = folder.recording
                 if limit is not None:
-                    limit.notes.append(f"recording: {recording}")
+                    limit.add_note(f"recording: {recording}")
                 _record(simulation, folder, source, settings, command)
             result = replace(simulation.run(), command=command)
             return result if folder is None else _keep(result, folder, record)

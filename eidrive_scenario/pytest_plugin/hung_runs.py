@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 from argparse import ArgumentTypeError
+from contextlib import suppress
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
@@ -60,8 +61,9 @@ def pytest_configure(config: pytest.Config) -> None:
         except OSError:  # the process has no standard error
             return
     config.stash[_file] = file
+    publish = None if workerinput is None else _Notes(Path(workerinput[_WORKER_KEY]) / workerinput["workerid"])
     dump = None if _has_faulthandler_timeout(config) else file
-    config.stash[_before] = set_last_resort(LastResort(_Reporter(file), dump))
+    config.stash[_before] = set_last_resort(LastResort(_Reporter(file), dump, publish))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -92,7 +94,8 @@ def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
         from eidrive_scenario.hung_runs import describe_dump
 
         limit = node.config.stash[_limit] or 0.0
-        text = f"{describe_dump(limit, text)}\n\n{text}"
+        notes = _Notes(file).read()
+        text = "\n".join([str(describe_dump(limit, text)), *notes, "", text])
     if text:
         report.longrepr = f"{text}\n\n{report.longrepr}"
 
@@ -100,6 +103,23 @@ def pytest_handlecrashitem(crashitem: str, report: pytest.TestReport) -> None:
 def wall_limit_of(config: pytest.Config) -> float | None:
     """Return the limit of the wall time of each run [s], or None."""
     return config.stash[_limit]
+
+
+class _Notes:
+    """The notes of the run in progress, in a file beside the report of its worker."""
+
+    def __init__(self, report: Path) -> None:
+        self._path = report.with_name(f"{report.name}.notes")
+
+    def __call__(self, limit: Limit) -> None:
+        with suppress(OSError):  # the run does not depend on it
+            self._path.write_text("\n".join(limit.notes), encoding="utf-8", errors="surrogateescape")
+
+    def read(self) -> list[str]:
+        """The lines; none if no run has begun."""
+        if not self._path.is_file():
+            return []
+        return self._path.read_text(encoding="utf-8", errors="replace").splitlines()
 
 
 class _Reporter:

@@ -114,8 +114,15 @@ def test_run_that_never_returns_to_python_ends_with_3(folder: Path) -> None:
 def test_run_that_never_returns_to_python_leaves_its_recording_but_for_the_last_second(folder: Path) -> None:
     """The detector hangs at 2.5 s; the process has ended without closing a file."""
     write_scenario(folder / "s.xosc", detector="hangs_in_c_later", end=5.0)
-    assert run(folder, "s.xosc", "--wall-limit", "6", "--out", "runs")[0] == 3
+    code, out, err = run(
+        folder, "s.xosc", "--wall-limit", "6", "--out", "runs", "--json", "--seed", "4", "--repeat", "2"
+    )
+    assert code == 3
     (recording,) = folder.glob("runs/*/recording.partial.mcap")
+    notes = [f"reproduce: eidrive run {folder / 's.xosc'} --seed 4", f"recording: {recording.relative_to(folder)}"]
+    entry = json.loads(out)
+    assert (entry["seed"], entry["notes"]) == (4, notes)
+    assert err.splitlines()[-2:] == notes
     times = [frame.view.time for frame in read_recording(recording).frames()]
     assert times == pytest.approx([0.05 * tick for tick in range(len(times))])
     assert times[-1] >= 2.5 - 1.05

@@ -86,6 +86,7 @@ def test_run_that_never_returns_to_python_fails_alone_over_workers(project: pyte
     line = line_of("sum(itertools.repeat(0))")
     assert f"{code}:{line}: detector 'hangs_in_c' (faulty:HangsInC): still running in detect" in cases["native"]
     assert "crashed while running 'hung/native.xosc::native[seed1]'" in cases["native"]
+    assert f"reproduce: eidrive run {folder / 'native.xosc'} --seed 1" in cases["native"]
     assert not any(cases[name] for name in SOUND[:3])
 
 
