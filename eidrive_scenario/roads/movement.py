@@ -58,11 +58,13 @@ class Movement:
         route: Route | None = None,
         choose: Choose | None = None,
         visit: int = 0,
+        to_end: bool = False,
     ) -> LaneLocation | None:
         """The place `distance` metres further in the lane's driving direction (back where negative), or None.
 
         The distance is measured on the path, at the location's offset. Where the lane forks, the route decides, else
-        `choose`, else the straightest way on is taken. None says that the lane ends.
+        `choose`, else the straightest way on is taken. None says that the lane ends; with `to_end` the result is the
+        place where it does.
         """
         road = self._roads[location.road]
         section, lane = lane_at(road, location.lane, location.s)
@@ -79,8 +81,9 @@ class Movement:
             if remaining <= 0.0 and (inside or s < section.end):
                 break
             following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
-            if following is None and remaining <= 0.0:
-                s = math.nextafter(s, section.s)  # where the section ends, the next one begins, without this lane
+            if following is None and (remaining <= 0.0 or to_end):
+                if not inside:
+                    s = math.nextafter(s, section.s)  # where the section ends, the next one begins, without this lane
                 break
             if following is None:
                 return None

@@ -202,13 +202,15 @@ class RoadNetwork(Roads):
         route: Route | None = None,
         choose: Choose | None = None,
         visit: int = 0,
+        to_end: bool = False,
     ) -> LaneLocation | None:
         """The place `distance` metres further along the lane in its driving direction (back where negative).
 
         Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
-        taken. None where the lane ends. `visit` says where on a route that comes by several times (`Route.visit`).
+        taken. None where the lane ends, or the place where it does with `to_end`. `visit` says where on a route that
+        comes by several times (`Route.visit`).
         """
-        return self.movement.advance(location, distance, route, choose, visit)
+        return self.movement.advance(location, distance, route, choose, visit, to_end)
 
     def route(
         self,

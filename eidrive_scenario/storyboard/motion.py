@@ -216,7 +216,7 @@ class Motion:
         if distance != 0.0:
             there = self.ahead(here, distance * self.direction)
             if there is None:
-                there = self._last_place(here, distance * self.direction * way)
+                there = self._last_place(here, distance * self.direction)
                 if self.end_of_road:
                     self.speed = 0.0
                 self.end_of_road = True
@@ -278,9 +278,12 @@ class Motion:
         x, y, z, h, p, r = pose.turned(turn)
         return Pose(x, y, z, wrap_angle(h), p, r)
 
-    def _last_place(self, here: LaneLocation, along: float) -> LaneLocation:
+    def _last_place(self, here: LaneLocation, distance: float) -> LaneLocation:
+        """Where the lane ends, in a section inside its road or at the road's end, within the distance [m]."""
         assert self.roads is not None
-        return here._replace(s=self.roads.roads[here.road].length if along > 0.0 else 0.0)
+        last = self.roads.advance(here, distance, route=self._route, choose=self.choose, visit=self._visit, to_end=True)
+        assert last is not None
+        return last
 
     def _freely(self, distance: float) -> None:
         x, y, z, h, p, r = self.pose

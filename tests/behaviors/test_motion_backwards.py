@@ -150,6 +150,24 @@ def test_braking_from_a_negative_speed_is_bounded_by_the_deceleration(scene: Any
     assert played.when("action 0", "completeState") == pytest.approx(5.0)
 
 
+@pytest.mark.element("LongitudinalDistanceAction")
+@pytest.mark.parametrize("lane", [-1, 1])
+def test_distance_backwards_is_the_mirror_image_of_forwards(scene: Any, lane: int) -> None:
+    """200 m from rest, forwards and backwards: speed is gained by 2 m/s² and lost by up to 6 m/s² both ways."""
+    limits = '<DynamicConstraints maxAcceleration="2" maxDeceleration="6" maxSpeed="40"/>'
+    action, way = keep("trailingReferencedEntity", limits), 1.0 if lane < 0 else -1.0
+    other = (lane, 500.0, 0.0)
+    far = ("Ego", action.replace('distance="20"', 'distance="220"'))
+    forwards = scene(40, ("Ego", action), ego=(lane, 500.0 - way * 220.0, 0.0), other=other)
+    backwards = scene(40, far, ego=(lane, 500.0 - way * 20.0, 0.0), other=other)
+    speeds = [[row["Ego"].speed for row in played.rows] for played in (forwards, backwards)]
+    assert speeds[1] == pytest.approx([-speed for speed in speeds[0]], abs=1e-6)
+    assert speeds[1][51] - speeds[1][1] == pytest.approx(-2.0 * 5.0)
+    peak = speeds[1].index(min(speeds[1]))
+    braking = [(after - before) / 0.1 for before, after in pairwise(speeds[1][peak:])]
+    assert max(braking) == pytest.approx(6.0)
+
+
 @pytest.mark.element("EndOfRoadCondition")
 def test_end_of_road_is_over_after_backing_away(run: Any) -> None:
     """At 20 m/s from 980 m, Ego is at the end, 1000 m, after 1 s; from 2 s on it goes back."""

@@ -21,7 +21,8 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     Without limits of acceleration the actor is moved to the wanted distance at once and takes the other's speed. With
     limits it follows like a critically damped spring whose stiffness goes with the limit, within the limits of
-    speed, acceleration and its rate. The standard leaves the course of the distance open.
+    speed, acceleration and its rate. Deceleration is a change of speed towards 0, also backwards. The standard leaves
+    the course of the distance open.
     """
 
     domains = Domain.LONGITUDINAL
@@ -58,13 +59,17 @@ class LongitudinalDistanceAction(ActionBehaviour):
             motion.speed = other
             return 0.0
         assert limits is not None
-        wanted = self._spring(error, motion.speed - other, faster if error < 0.0 else slower)
-        wanted = min(max(wanted, -slower), faster)
         dt = self.stage.dt
+        up, down = faster, slower
+        more, less = _change(limits.max_acceleration_rate, dt), _change(limits.max_deceleration_rate, dt)
+        if motion.speed < 0.0 or (motion.speed == 0.0 and error < 0.0):
+            up, down, more, less = down, up, less, more
+        wanted = self._spring(error, motion.speed - other, up if error < 0.0 else down)
+        wanted = min(max(wanted, -down), up)
         if wanted < min(self._acceleration, 0.0):
-            wanted = max(wanted, self._acceleration - _change(limits.max_deceleration_rate, dt))
+            wanted = max(wanted, self._acceleration - less)
         elif wanted > max(self._acceleration, 0.0):
-            wanted = min(wanted, self._acceleration + _change(limits.max_acceleration_rate, dt))
+            wanted = min(wanted, self._acceleration + more)
         self._acceleration = wanted
         top = min(_or_infinite(limits.max_speed), self.actor.limits()[0])
         motion.speed = min(max(motion.speed + wanted * dt, -top), top)

@@ -135,6 +135,23 @@ def test_where_a_lane_ends_the_car_stays_where_it_is_on_the_lane_beside(road: Te
     assert (moved.lane, moved.s, moved.offset, moved.t) == pytest.approx((-1, 45.0, -3.0, -4.5))
 
 
+def test_advance_to_end_of_a_lane_inside_its_road_stays_on_it(road: Text, map_of: Text) -> None:
+    """Lane -1 ends at s = 40 and nothing is beside it; lane 1 begins there, and its traffic leaves it there."""
+    both = section(0, lane(-1)) + section(40, "", lane(1))
+    network = RoadNetwork.parse(map_of(road("r", lanes=both)))
+    here, there = network.location("r", -1, 35.0), network.location("r", 1, 45.0)
+    assert network.advance(here, 10.0) is None
+    assert network.advance(there, 10.0) is None
+    for start, number in ((here, -1), (there, 1)):
+        last = network.advance(start, 10.0, to_end=True)
+        assert last is not None
+        assert (last.lane, last.s) == pytest.approx((number, 40.0))
+        assert network.pose(last).x == pytest.approx(40.0)
+    short = network.advance(here, 3.0, to_end=True)
+    assert short is not None
+    assert short.s == pytest.approx(38.0)
+
+
 def fork(road: Text, map_of: Text) -> RoadNetwork:
     """Road a leads to a junction with a way to the left and one that bends a little to the right."""
     ways = []

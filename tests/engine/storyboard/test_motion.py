@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.roads import Pose
+from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Motion, Place, Steering
 
 
@@ -77,6 +77,38 @@ def test_it_stops_where_the_road_ends(street: Any) -> None:
     assert placement.x == 200.0
     assert motion.end_of_road
     assert motion.step(0.1).speed == 0.0
+
+
+def section(s: int, number: int, link: str = "") -> str:
+    side = "right" if number < 0 else "left"
+    lane = f'<lane id="{number}" type="driving"><link>{link}</link><width sOffset="0" a="4" b="0" c="0" d="0"/></lane>'
+    center = '<center><lane id="0" type="none"/></center>'
+    lanes = f"<left>{lane}</left>{center}" if side == "left" else f"{center}<right>{lane}</right>"
+    return f'<laneSection s="{s}">{lanes}</laneSection>'
+
+
+@pytest.mark.parametrize(
+    ("sections", "lane", "start", "speed", "end"),
+    [
+        (section(0, -1) + section(100, 1), -1, 99.0, 30.0, 100.0),
+        (section(0, -1) + section(100, 1), 1, 101.0, 30.0, 100.0),
+        (section(0, 1) + section(100, -1), -1, 101.0, -30.0, 100.0),
+        (section(0, -2, '<successor id="-1"/>') + section(199, -1, '<predecessor id="-2"/>'), -2, 198.0, 30.0, 200.0),
+    ],
+)
+def test_step_beyond_the_end_of_a_lane_stops_there(
+    sections: str, lane: int, start: float, speed: float, end: float
+) -> None:
+    """Lanes that end inside their road, and one that has another number in the last section before the road's end."""
+    text = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/><road name="" length="200" id="1" junction="-1"><link/>
+      <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
+      <lanes>{sections}</lanes></road></OpenDRIVE>"""
+    motion = on_lane(RoadNetwork.parse(text), lane, start)
+    motion.speed = speed
+    assert motion.step(0.1).x == pytest.approx(end)
+    assert motion.end_of_road
+    placement = motion.step(0.1)
+    assert (placement.x, placement.speed) == (pytest.approx(end), 0.0)
 
 
 @pytest.mark.parametrize(("lane", "y"), [(-1, -1.4), (1, 1.4)])
