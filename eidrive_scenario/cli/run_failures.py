@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import mmap
 import os
+import struct
 import sys
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -13,10 +15,14 @@ import typer
 from eidrive_scenario.cli.failures import BROKEN, show_traceback, tell
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.errors import EidriveError, SimulationError
-from eidrive_scenario.files import file_in_memory
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit
+
+
+_SHARED = 2**16
+"""Size of the memory that is shared with the process that waits for a run [bytes]."""
+_LENGTH = struct.Struct("<I")
 
 
 class RunFailures:
@@ -32,8 +38,8 @@ class RunFailures:
         self._traceback = traceback
         self._seed: int | None = None
         self._run: int | None = None
-        self._shared = file_in_memory()
-        """The run in progress, for the process that waits for it."""
+        self._shared = mmap.mmap(-1, _SHARED)
+        """The run in progress, for the process that waits for it: length and JSON."""
 
     def begin(self, seed: int, run: int | None) -> None:
         """Name the run that begins: its seed, and its number in a distribution."""
@@ -61,19 +67,19 @@ class RunFailures:
 
     def share(self, limit: Limit) -> None:
         """Save seed, number and notes of the present run for `report_dump` in another process."""
-        self._shared.seek(0)
-        self._shared.truncate()
-        self._shared.write(json.dumps([self._seed, self._run, limit.notes]).encode())
-        self._shared.flush()
+        data = json.dumps([self._seed, self._run, limit.notes]).encode()
+        if _LENGTH.size + len(data) > _SHARED:
+            data = json.dumps([self._seed, self._run, []]).encode()
+        self._shared[: _LENGTH.size + len(data)] = _LENGTH.pack(len(data)) + data
 
     def report_dump(self, limit: float, dump: str) -> None:
         """Report a run whose process ended with this dump of its stack."""
         from eidrive_scenario.hung_runs import describe_dump
 
         error = describe_dump(limit, dump)
-        self._shared.seek(0)
-        if shared := self._shared.read():
-            self._seed, self._run, notes = json.loads(shared)
+        (length,) = _LENGTH.unpack_from(self._shared)
+        if length:
+            self._seed, self._run, notes = json.loads(self._shared[_LENGTH.size : _LENGTH.size + length])
             for note in notes:
                 error.add_note(note)
         self._print_json(error)
