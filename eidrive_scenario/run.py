@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
+from operator import index
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, SupportsIndex
 
 from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.openscenario.parameters import Assignment
@@ -33,7 +34,7 @@ class RunSettings:
     dt              step [s]
     controllers     who stands in for controllers of other tools, by the controller's name; without an entry its entity
                     keeps lane and speed
-    time_limit      [s] of simulated time, for files that do not end by themselves
+    time_limit      [s] of simulated time, above 0, for files that do not end by themselves
     weather         preset or file; it wins over all that the file says of weather and road
     user_values     for UserDefinedValueConditions, by name; `Simulation.set_user_value` changes them during the run
     allow_torchscript   whether detectors may load TorchScript weights, which can execute any code; see docs/security.md
@@ -49,6 +50,25 @@ class RunSettings:
     weather: str | Path | None = None
     user_values: Mapping[str, str] = field(default_factory=dict)
     allow_torchscript: bool = False
+
+    def __post_init__(self) -> None:
+        """Raise SettingError for stations that are given as one text, and for a time limit that ends no run."""
+        senders: Any = self.cooperate
+        if isinstance(senders, str):
+            raise SettingError(Problem(f"cooperate is the text {senders!r}", "give a tuple of station names"))
+        if senders is not None and not isinstance(senders, tuple):
+            names = sorted(senders) if isinstance(senders, Set) else senders
+            object.__setattr__(self, "cooperate", tuple(names))
+        if not self.time_limit > 0.0:
+            raise SettingError(Problem(f"time_limit is {self.time_limit}", "give a positive number of seconds"))
+
+
+def checked_seed(seed: SupportsIndex) -> int:
+    """Return a seed as an int, such as an entry of an array. Raise SettingError if it is no integer."""
+    try:
+        return index(seed)
+    except TypeError:
+        raise SettingError(Problem(f"the seed is {seed!r}", "give an integer")) from None
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from eidrive_scenario.run import (
     RunResult,
     RunSettings,
     checked_observer,
+    checked_seed,
 )
 from eidrive_scenario.run_outcome import TIME_LIMIT, criteria_metrics, exit_code_of, final_verdicts, late_warnings
 from eidrive_scenario.run_setup import set_up_run
@@ -78,10 +79,10 @@ class Simulation:
         observers: Sequence[Observer] = (),
         load_weights: bool = True,
     ) -> None:
-        self.seed = seed
-        self.settings = settings or RunSettings()
         self._observers: tuple[Observer, ...] = ()
         self._unclosed: list[Observer] = []
+        self.seed = seed = checked_seed(seed)
+        self.settings = settings or RunSettings()
         for observer in observers:
             self.add_observer(observer)
         self._run = source.number if isinstance(source, ConcreteRun) else None

@@ -28,6 +28,7 @@ from eidrive_scenario.recording.run_files import (
 )
 from eidrive_scenario.recording.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
+from eidrive_scenario.run import checked_seed
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
 from eidrive_scenario.wall_limit import limit_wall_time
 
@@ -75,6 +76,7 @@ def play(
     place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
     settings = settings or RunSettings()
+    seed = checked_seed(seed)
     command = _command(source, seed, settings) or command
     recording: Path | None = None
     try:
