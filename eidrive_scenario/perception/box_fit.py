@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 RANGE_NOISE = 0.03
 """Of the points on a surface, standard deviation [m]."""
+THIN = 3.0 * RANGE_NOISE
+"""Points within so small an extent may be those of a surface across it [m]."""
 SHAPELESS = 0.4
 """Points within so small a rectangle have no heading of their own [m]."""
 FEW_COLUMNS = 1.6
@@ -215,6 +217,9 @@ def _spans(
             spacing = min(spacing, outwards * rings + math.sqrt(1.0 - min(outwards**2, 1.0)) * columns)
         open_low, open_high = not low > 0.0, not high < 0.0
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
+        if high - low <= THIN < shape.high[1 - axis] - shape.low[1 - axis]:
+            # A side across this axis: it faces the sensor and ends the object, whatever hides more of it.
+            ends = ends[0] and open_low, ends[1] and open_high
         if any(cut):
             # A side that faces the sensor ends the object: only the other end may lie beyond the field of view.
             at_low, at_high = _ends_of(points[:, :2], (ax, ay), low, high, cut)
@@ -244,6 +249,10 @@ def _ends_of(
 ) -> tuple[bool, bool]:
     """Whether the low and the high end along an axis is the left or right end that `flags` (left, right) name."""
     x, y = plan.mean(axis=0).tolist()
+    if high - low <= THIN:
+        # The points lie side by side along the axis, so their places are noise; the axis itself leads to one side.
+        leads_left = x * axis[1] - y * axis[0] > 0.0
+        return (flags[1], flags[0]) if leads_left else flags
     bearing = np.arctan2(x * plan[:, 1] - y * plan[:, 0], x * plan[:, 0] + y * plan[:, 1])
     at_low = at_high = False
     for is_hidden, row in zip(flags, (int(np.argmax(bearing)), int(np.argmin(bearing))), strict=True):

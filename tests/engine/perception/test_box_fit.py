@@ -186,3 +186,27 @@ def test_its_uncertainty_covers_its_errors() -> None:
     assert len(distances) > 100
     assert 0.5 < float(np.mean(np.minimum(distances, 30.0))) < 6.0
     assert float(np.median(distances)) < 3.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("hidden", [(False, False), (False, True), (True, False), (True, True)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_fit_box_grazed_flank_lies_behind_the_seen_side(side: float, hidden: tuple[bool, bool], seed: int) -> None:
+    """A truck stands with its flank 0.6 m beside the line of sight ahead: nothing of it can be on the sensor's side."""
+    rng = np.random.default_rng(seed)
+    plan = np.column_stack([np.linspace(3.6, 5.0, 12), np.full(12, side * 0.6)]) + rng.normal(0.0, 0.004, (12, 2))
+    found = fitted(standing(plan, 3.0), hidden=hidden if side > 0.0 else hidden[::-1], classes=("truck",))
+    across = abs(math.sin(found.box[6])) * found.box[3] + abs(math.cos(found.box[6])) * found.box[4]
+    assert side * found.box[1] - across / 2.0 == pytest.approx(0.6, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_fit_box_single_column_beside_an_occluder_extends_behind_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    plan = np.array([[20.0, 0.0]] * 4) + rng.normal(0.0, 0.01, (4, 2))
+    left, right = (
+        fitted(standing(plan, 1.5), hidden=flags, classes=("car",), heading=math.pi / 2.0)
+        for flags in ((True, False), (False, True))
+    )
+    assert left.box[1] == pytest.approx(2.3, abs=0.1)
+    assert right.box[1] == pytest.approx(-2.3, abs=0.1)
