@@ -25,7 +25,8 @@ from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.perception.detector import Installation
 from eidrive_scenario.perception.lidar_detector import LidarDetector
-from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
+from eidrive_scenario.perception.tracker_settings import TrackerSettings
+from eidrive_scenario.perception.tracking import Tracker
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed

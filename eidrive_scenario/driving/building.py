@@ -16,7 +16,8 @@ from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
+from eidrive_scenario.perception.tracker_settings import TrackerSettings
+from eidrive_scenario.perception.tracking import Tracker
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig

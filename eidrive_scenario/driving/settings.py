@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, mo
 from eidrive_scenario.errors import Problem, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.references import resolve_references
-from eidrive_scenario.perception.tracking import TrackerSettings, tracker_setting
+from eidrive_scenario.perception.tracker_settings import TrackerSettings, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,

@@ -16,7 +16,7 @@ from eidrive_scenario.fusion.prediction import predicted
 from eidrive_scenario.perception.existence import LIFETIME, detected, likelihood_ratio
 from eidrive_scenario.perception.existence import missed as after_miss
 from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
-from eidrive_scenario.perception.tracking import LEAST_DEVIATION, UNKNOWN_DEVIATION
+from eidrive_scenario.perception.track_association import LEAST_DEVIATION, UNKNOWN_DEVIATION
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]

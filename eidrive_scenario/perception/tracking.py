@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PositiveInt, model_validator
-from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.existence import (
-    BIRTH_DENSITY,
-    DETECTION_PROBABILITY,
-    LIFETIME,
     MOST,
     detected,
     likelihood_ratio,
@@ -24,67 +18,18 @@ from eidrive_scenario.perception.existence import (
     survived,
 )
 from eidrive_scenario.perception.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
-from eidrive_scenario.settings import Settings
+from eidrive_scenario.perception.track_association import associate, position_noise
+from eidrive_scenario.perception.track_history import TrackHistory
+from eidrive_scenario.perception.tracker_settings import TrackerSettings
 
 Array = NDArray[np.float64]
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 
-UNKNOWN_DEVIATION = 0.5
-"""Of positions for which the detector gives no covariance [m]."""
-LEAST_DEVIATION = 0.05
-"""Of positions for which it gives a smaller one, none at all for instance [m]."""
 MOVING = 1.0
 """From this speed on, the front of an object is where it drives to [m/s]."""
 SMOOTHING = 0.2
 """Share of a new box in the size, height and heading of an object that has been seen often."""
-OUTSIDE = 1e6
-"""Cost of a pair beyond the gate; larger than any sum of costs within."""
-
-
-class TrackerSettings(Settings):
-    """The property `tracker`: a kind, or a mapping with these.
-
-    kind      cv: constant velocity; ctrv: constant turn rate and speed; none
-    confirm   [n, m]: an object is reported once it was detected in n of m successive detections, and
-    confirm_existence   it exists with at least this probability: 0.5 is the likelier of the two hypotheses
-    delete_existence    probability of existence below which a track is deleted
-    coast     maximum time without a detection, after which a track is deleted whatever its existence [s]
-    gate      probability that a detection of an object is within its gate
-    detection_probability   that an object in full view is detected in a scan
-    birth_density       of new objects [1/m² per scan]
-    lifetime  mean time that an object remains [s]
-
-    The recursion of the probability of existence and the sources of its defaults are those of
-    `eidrive_scenario.perception.existence`.
-    """
-
-    kind: Literal["none", "cv", "ctrv"] = "cv"
-    confirm: tuple[PositiveInt, PositiveInt] = (2, 3)
-    confirm_existence: float = Field(default=0.5, ge=0.0, lt=1.0)
-    delete_existence: float = Field(default=0.05, ge=0.0, lt=1.0)
-    coast: float = Field(default=0.5, ge=0.0, le=1e4)
-    gate: float = Field(default=0.99, gt=0.0, lt=1.0)
-    detection_probability: float = Field(default=DETECTION_PROBABILITY, gt=0.0, lt=1.0)
-    birth_density: float = Field(default=BIRTH_DENSITY, gt=0.0, le=1e6)
-    lifetime: float = Field(default=LIFETIME, gt=0.0, le=1e6)
-
-    @model_validator(mode="after")
-    def _n_of_m(self) -> TrackerSettings:
-        if self.confirm[0] > self.confirm[1]:
-            raise ValueError(
-                f"{self.confirm[0]} of {self.confirm[1]} detections can never be; write [n, m] with n <= m"
-            )
-        if self.delete_existence > self.confirm_existence:
-            raise ValueError(
-                f"delete_existence {self.delete_existence:g} is above confirm_existence {self.confirm_existence:g}"
-            )
-        return self
-
-
-def tracker_setting(value: Any) -> Any:
-    """A tracker may be written as its kind alone; None leaves it to the detector."""
-    return {"kind": value} if isinstance(value, str) else value
 
 
 class Tracker:
@@ -108,7 +53,7 @@ class Tracker:
         self._shape = np.empty((0, 5))
         """(N, 5) z, length, width, height, yaw."""
         self._existence = np.empty(0)
-        self._life: list[_Life] = []
+        self._life: list[TrackHistory] = []
         self._confirmed = 0
 
     def update(self, detections: Detections, in_view: Callable[[Array], Array] | None = None) -> Detections:
@@ -126,8 +71,9 @@ class Tracker:
         if step > 0.0 and self._life:
             self._tracks = self._model.predict(self._tracks, step)
             self._existence = survived(self._existence, step, self.settings.lifetime)
-        noise = _noise(detections.covariance)
-        rows, columns = self._associate(detections.boxes, noise)
+        noise = position_noise(detections.covariance)
+        confirmed = np.array([life.number is not None for life in self._life], dtype=bool)
+        rows, columns = associate(self._tracks, confirmed, detections.boxes, noise, self._gate)
         hit = set(rows)
         self._judge(rows, detections, columns, noise, in_view)
         if rows:
@@ -140,28 +86,6 @@ class Tracker:
         self._begin(detections, [column for column in range(len(detections)) if column not in taken], noise)
         self._bury(detections.time)
         return self._reported(detections.time)
-
-    def _associate(self, boxes: Array, noise: Array) -> tuple[list[int], list[int]]:
-        """Rows of tracks and of boxes that belong together; confirmed tracks choose before others."""
-        if not self._life or not len(boxes):
-            return [], []
-        offset = boxes[None, :, :2] - self._tracks.state[:, None, :2]
-        spread = self._tracks.covariance[:, None, :2, :2] + noise[None]
-        a, b, d = spread[..., 0, 0], spread[..., 0, 1], spread[..., 1, 1]
-        x, y = offset[..., 0], offset[..., 1]
-        size = a * d - b * b
-        distance = (d * x * x - 2.0 * b * x * y + a * y * y) / size
-        # Minus twice the log of the likelihood, so that a track of which little is known does not win by its width.
-        cost = np.where(distance <= self._gate, distance + np.log(size), OUTSIDE)
-        confirmed = np.array([life.number is not None for life in self._life], dtype=bool)
-        rows: list[int] = []
-        columns: list[int] = []
-        for group in (np.flatnonzero(confirmed), np.flatnonzero(~confirmed)):
-            free = np.setdiff1d(np.arange(len(boxes)), columns) if columns else np.arange(len(boxes))
-            for row, column in _assigned(cost[group][:, free]):
-                rows.append(int(group[row]))
-                columns.append(int(free[column]))
-        return rows, columns
 
     def _judge(
         self,
@@ -229,7 +153,7 @@ class Tracker:
         self._shape = np.concatenate([self._shape, boxes[:, 2:7]])
         self._existence = np.concatenate([self._existence, np.clip(detections.scores[columns], 0.0, MOST)])
         for column in columns:
-            life = _Life()
+            life = TrackHistory()
             life.note(True, self.settings)
             life.see(detections, column)
             self._life.append(life)
@@ -285,65 +209,3 @@ class Tracker:
             tuple([life.number or 0 for life in lives]),
             existence,
         )
-
-
-class _Life:
-    """When a track was seen, how surely and as what."""
-
-    __slots__ = ("_names", "_recent", "_seen", "hits", "number", "often_seen", "score")
-
-    def __init__(self) -> None:
-        self.often_seen = False
-        """Whether it was detected in n of m successive scans."""
-        self.number: int | None = None
-        """Its number once it is confirmed."""
-        self.hits = 0
-        self.score = 0.0
-        """Of its last detection."""
-        self._recent: list[bool] = []
-        self._names: dict[str, float] = {}
-        self._seen = -math.inf
-
-    @property
-    def name(self) -> str:
-        """The class for which the detections' scores add up to the most."""
-        return max(self._names, key=lambda name: self._names[name])
-
-    def note(self, hit: bool, settings: TrackerSettings) -> None:
-        """Whether the detections just processed show the object."""
-        self.hits += hit
-        if not self.often_seen:
-            self._recent = [*self._recent, hit][-settings.confirm[1] :]
-            self.often_seen = sum(self._recent) >= settings.confirm[0]
-
-    def see(self, detections: Detections, column: int) -> None:
-        """The object is this detection."""
-        self._seen = detections.time
-        self.score = float(detections.scores[column])
-        name = detections.classes[column]
-        self._names[name] = self._names.get(name, 0.0) + self.score
-
-    def goes_on(self, now: float, settings: TrackerSettings) -> bool:
-        """Whether the track is worth keeping."""
-        if self.often_seen:
-            return now - self._seen <= settings.coast + 1e-9
-        return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
-
-
-def _assigned(cost: Array) -> list[tuple[int, int]]:
-    """Pairs of rows and columns with the least sum of costs, as many as there are within the gate."""
-    if not cost.size:
-        return []
-    inside = cost < OUTSIDE
-    rows, columns = np.nonzero(inside)
-    if len(set(rows.tolist())) < len(rows) or len(set(columns.tolist())) < len(columns):
-        rows, columns = linear_sum_assignment(cost)
-    return [(row, column) for row, column in zip(rows.tolist(), columns.tolist(), strict=True) if inside[row, column]]
-
-
-def _noise(covariance: Array) -> Array:
-    """(N, 2, 2) of the positions measured, where the detector says nothing or too little of it."""
-    unknown = np.asarray(np.any(~np.isfinite(covariance), axis=(1, 2)))
-    noise = np.where(unknown[:, None, None], UNKNOWN_DEVIATION**2 * np.eye(2), covariance)
-    thin = (noise[:, 0, 0] < LEAST_DEVIATION**2) | (noise[:, 1, 1] < LEAST_DEVIATION**2)
-    return np.where(thin[:, None, None], noise + LEAST_DEVIATION**2 * np.eye(2), noise)

@@ -9,7 +9,8 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.existence import detected, likelihood_ratio, missed, survived
-from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
+from eidrive_scenario.perception.tracker_settings import TrackerSettings
+from eidrive_scenario.perception.tracking import Tracker
 
 
 @pytest.mark.parametrize("detection", [0.3, 0.9])

@@ -14,7 +14,8 @@ from scipy.stats import chi2
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
-from eidrive_scenario.perception.tracking import Tracker, TrackerSettings
+from eidrive_scenario.perception.tracker_settings import TrackerSettings
+from eidrive_scenario.perception.tracking import Tracker
 
 DT = 0.1
 

@@ -1,0 +1,68 @@
+"""Stations that transmit by C-V2X Mode 4, and a record of all transmissions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from radio_talk import QUIET, Place, message
+
+from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.v2x.radio.access import Transmission
+from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+MODE_4: dict[str, Any] = {**QUIET, "technology": "cv2x_mode4", "jitter": 0.0}
+TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
+
+
+class Air:
+    """Stations on one channel, each with messages of a given size and rate, and all that they transmit."""
+
+    def __init__(
+        self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05, listeners: int | None = None
+    ) -> None:
+        """Only the first stations, `listeners` of them, receive messages; None: all do."""
+        self.carrier, self.places, self.dt, self.tick = carrier, dict(places), dt, 0
+        self.listeners = list(places)[:listeners]
+        self.events: list[LinkEvent] = []
+        self.transmissions: list[Transmission] = []
+        begin = carrier._access._begin
+
+        def note(row: int, transmission: Transmission, start: float) -> None:
+            begin(row, transmission, start)
+            self.transmissions.append(transmission)
+
+        setattr(carrier._access, "_begin", note)  # noqa: B010
+
+    def run(self, seconds: float, every: Mapping[str, int], sizes: Sequence[int] = (190,)) -> Air:
+        """Go on; station S has a message in each `every[S]`-th tick."""
+        for _ in range(round(seconds / self.dt)):
+            now = self.tick * self.dt
+            self.carrier.around(Surroundings(self.places))
+            outbox = [
+                (message(name, self.tick, now, sizes[self.tick % len(sizes)]), [n for n in self.listeners if n != name])
+                for name, period in every.items()
+                if name in self.places and self.tick % period == 0
+            ]
+            self.events += self.carrier.transmit(outbox, now)
+            self.tick += 1
+        return self
+
+    def of(self, name: str) -> list[Transmission]:
+        return [entry for entry in self.transmissions if entry.message.sender == name]
+
+    def occupancy(self, since: float, until: float, subchannels: int = 4) -> float:
+        """Share of the subchannels of all subframes that some station uses, counted from the transmissions."""
+        used = {
+            (round(1000 * entry.start) + part, band)
+            for entry in self.transmissions
+            for part in range(round(1000 * entry.duration))
+            for band in range(entry.first_band, entry.first_band + entry.bands)
+            if since <= entry.start < until
+        }
+        return len(used) / (1000.0 * (until - since) * subchannels)
+
+
+def many(count: int, apart: float = 5.0) -> dict[str, Place]:
+    return {f"S{n:03d}": (apart * n, 0.0, 1.5) for n in range(count)}

@@ -1,0 +1,67 @@
+"""C-V2X Mode 4: collisions, half duplex, the control channel, and statistics of links."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from radio_talk import DT, message, radio
+from sidelink_air import MODE_4, Air, many
+
+from eidrive_scenario.v2x.surroundings import Surroundings
+
+
+def test_stations_that_sense_each_other_hardly_collide() -> None:
+    """60 stations for 400 resources: after the first seconds only those collide that select in the same 100 ms."""
+    places = many(60)
+    air = Air(radio(5, **MODE_4), places, 0.1, listeners=4).run(30.0, dict.fromkeys(places, 1))
+    late = [event for event in air.events if event.sent > 4.0]
+    reasons = Counter(event.reason for event in late)
+    assert set(reasons) <= {"", "half_duplex", "collision", "propagation"}
+    assert 0 < reasons["collision"] / len(late) < 0.05, "random choice among 400 resources would lose 14 %"
+    assert reasons["half_duplex"] / len(late) == pytest.approx(0.01, abs=0.008)
+
+
+def test_stations_do_not_receive_in_subframes_in_which_they_transmit() -> None:
+    """Two stations whose resources share a subframe lose the messages of each other, in both directions."""
+    air = Air(radio(5, **MODE_4), many(10), 0.1).run(40.0, dict.fromkeys(many(10), 1))
+    subframe = {(e.message.sender, e.message.number): round(1000 * e.start) for e in air.transmissions}
+    sent = {(sender, start) for (sender, _), start in subframe.items()}
+    for event in air.events:
+        start = subframe.get((event.sender, event.number))
+        if start is not None:
+            assert (event.reason == "half_duplex") == ((event.receiver, start) in sent)
+
+
+def test_message_without_decoded_control_information_is_lost() -> None:
+    """From 100 to 2,900 m: a station that does not decode the control information does not receive the message."""
+    places = {"A": (0.0, 0.0, 1.5), **{f"R{n}": (100.0 * n, 0.0, 1.5) for n in range(1, 30)}}
+    robust, deaf = (
+        Air(radio(1, **MODE_4, tx_power_dbm=5, sidelink={"pscch_errors": curve}), places, 0.1).run(20.0, {"A": 1})
+        for curve in ("pscch", "80211p_goubet")
+    )
+    delivered = [sum(e.outcome == "delivered" for e in air.events) for air in (robust, deaf)]
+    assert delivered[1] < delivered[0]
+    assert {e.reason for e in deaf.events} <= {"", "propagation", "sensing"}
+
+
+def test_link_statistics_with_joining_and_leaving_stations_are_complete() -> None:
+    """Every fourth tick another station comes or goes; nothing vanishes, and resources of the others stay."""
+    carrier = radio(2, **MODE_4, queue={"discipline": "lcfs"})
+    all_places = many(12, 20.0)
+    events, sent = [], 0
+    for tick in range(240):
+        now = DT * tick
+        places = {name: place for row, (name, place) in enumerate(all_places.items()) if (tick // 4) % (row + 2) != 1}
+        carrier.around(Surroundings(places))
+        for name in places:
+            carrier.deliver(name, now)
+        outbox = [
+            (message(name, tick, now, 190 + 100 * (tick % 5)), [n for n in places if n != name]) for name in places
+        ]
+        sent += sum(len(receivers) for _, receivers in outbox)
+        events += carrier.transmit(outbox, now)
+    books = carrier.statistics(240 * DT).values()
+    assert sum(book.sent for book in books) == sent
+    assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
+    assert {event.reason for event in events} >= {"", "absent", "queue", "half_duplex"}
