@@ -134,6 +134,16 @@ def test_lateral_distance_left_and_right_count_from_the_other_heading(
     assert played.rows[-1]["Ego"].y == pytest.approx(y, abs=0.02)
 
 
+@pytest.mark.element("LaneOffsetAction")
+@pytest.mark.parametrize(("lane", "other", "y"), [(-1, -1, -1.0), (-1, 1, 1.0), (1, 1, 1.0), (1, -1, -1.0)])
+def test_lane_offset_relative_to_an_entity_counts_to_its_left(scene: Any, lane: int, other: int, y: float) -> None:
+    """The centre of lane -1 is at y = -2 towards +x, that of lane 1 at y = 2 towards -x; 1 m to the left of Other."""
+    relative = '<RelativeTargetLaneOffset entityRef="Other" value="1"/>'
+    action = offset(0.0).replace('<AbsoluteTargetLaneOffset value="0.0"/>', relative)
+    played = scene(8, ("Ego", action), ego=(lane, 400.0, 10.0), other=(other, 400.0, 10.0))
+    assert played.rows[-1]["Ego"].y == pytest.approx(y)
+
+
 @pytest.mark.parametrize(
     ("start", "target", "limit"),
     [(0, 10, 3.0), (10, 0, 8.0), (0, -10, 3.0), (-10, 0, 8.0), (-5, -10, 3.0), (-10, -5, 8.0), (10, -10, 3.0)],

@@ -27,6 +27,8 @@ from eidrive_scenario.api import (
 TINY = 1e-6
 STANDING = 1e-6
 """Slower than this an actor does not change lanes [m/s]."""
+SHIFTED = 1e-3
+"""An offset that differs by more from the one before, in a lane that goes on there, counts from a lane beside [m]."""
 NEAR = 0.2
 """A driven vehicle that is this near to its place in the new lane has arrived [m]."""
 LOOKOUT = 100.0
@@ -86,6 +88,7 @@ class LaneChangeAction(ActionBehaviour):
         else:
             self._transition = ValueTransition(shape, start, target, value)
         self._offset = start
+        self._followed_lane = moved.road, self._lane
         if follows(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
             self._tracker = Tracker(start, sideways, up=math.inf, down=math.inf)
@@ -100,6 +103,7 @@ class LaneChangeAction(ActionBehaviour):
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
             return Status.RUNNING
+        self._relate()
         wanted = self._next(way)
         rate: float | None = self._rate(way)
         if self._tracker is not None:
@@ -112,6 +116,21 @@ class LaneChangeAction(ActionBehaviour):
         arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
         self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
+
+    def _relate(self) -> None:
+        """Continue from the new offset after the target lane has ended and the lane beside it has become the target."""
+        here, transition = self.actor.motion.location, self._transition
+        if here is None or (here.road, here.lane) == self._followed_lane:
+            return
+        self._followed_lane = here.road, here.lane
+        offset = here.offset * self._roads.driving_direction(here.road, here.lane)
+        if abs(offset - self._offset) <= SHIFTED:
+            return
+        left = max(transition.extent - transition.progress, TINY)
+        self._transition = ValueTransition(transition.shape, offset, transition.target, left)
+        if self._tracker is not None:
+            self._tracker = Tracker(offset, self._tracker.rate, up=math.inf, down=math.inf)
+        self._offset = offset
 
     def _next(self, way: float) -> float:
         transition = self._transition

@@ -6,9 +6,21 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import STEEPEST, ActionBehaviour, Domain, LaneLocation, Steering, ValueTransition, model
+from eidrive_scenario.api import (
+    STEEPEST,
+    ActionBehaviour,
+    Domain,
+    LaneLocation,
+    Steering,
+    ValueTransition,
+    facing,
+    model,
+    same_way,
+)
 
 STANDING = 1e-6
+SHIFTED = 1e-3
+"""An offset that differs by more from the one before, in a lane that goes on there, counts from a lane beside [m]."""
 
 
 class LaneOffsetAction(ActionBehaviour):
@@ -30,7 +42,12 @@ class LaneOffsetAction(ActionBehaviour):
             motion.land()
         if motion.location is None:
             raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
-        here, way = motion.location, self._way(motion.location)
+        self._lane = motion.location.road, motion.location.lane
+        self._lay(motion.location)
+
+    def _lay(self, here: LaneLocation) -> None:
+        """Lay the transition from a place, whose offset counts from its lane's centre."""
+        way = self._way(here)
         start, target = here.offset * way, self._target(here) * way
         limit, shape = self.action.lane_offset_action_dynamics.max_lateral_acc, self._shape()
         if limit is None:
@@ -44,6 +61,10 @@ class LaneOffsetAction(ActionBehaviour):
         here = self.actor.motion.location
         if self.actor.driven or here is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
+        if (here.road, here.lane) != self._lane:
+            self._lane = here.road, here.lane
+            if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
+                self._lay(here)
         transition, speed, dt = self._transition, self.actor.motion.speed, self.stage.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING
@@ -79,8 +100,8 @@ class LaneOffsetAction(ActionBehaviour):
         found = roads.distance(here, other)
         if found is None:
             raise self.problem(f"counts from {name}, to which no road leads")
-        lane = roads.pose(other).h
-        left = target.relative_target_lane_offset.value * (1 if math.cos(lane - self.stage.pose(name).h) >= 0.0 else -1)
+        along = facing(self.stage, self.actor.name, here) * same_way(self.stage, self.actor.name, name, "lane")
+        left = target.relative_target_lane_offset.value * along
         return here.offset + (found[1] + left) * self._way(here)
 
     def describe(self) -> str:
