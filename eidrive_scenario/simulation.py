@@ -81,6 +81,7 @@ class Simulation:
     ) -> None:
         self._observers: tuple[Observer, ...] = ()
         self._unclosed: list[Observer] = []
+        self._is_closed = False
         self.seed = seed = checked_seed(seed)
         self.settings = settings or RunSettings()
         for observer in observers:
@@ -112,7 +113,6 @@ class Simulation:
         self._last: tuple[Frame, str, float] | None = None
         """The last frame, the reason for the end, and the wall time until then [s]."""
         self._started = time.perf_counter()
-        self._is_closed = False
 
     def __enter__(self) -> Self:
         return self
@@ -121,7 +121,12 @@ class Simulation:
         self.close()
 
     def add_observer(self, observer: Observer) -> None:
-        """Show the frames of all ticks from now on to this observer too, and close it with the run."""
+        """Show the frames of all ticks from now on to this observer too, and close it with the run.
+
+        Raises SimulationError if the simulation is closed.
+        """
+        if self._is_closed:
+            raise SimulationError("the simulation is closed; an observer of it would see no frame")
         self._observers = (*self._observers, checked_observer(observer))
         self._unclosed.append(observer)
 

@@ -48,8 +48,9 @@ class RunFolder:
         return partial(self.path / PICTURES)
 
     def prepare(self) -> None:
-        """Remove what an earlier run has left that did not end."""
+        """Remove what an earlier run has left that did not end, with the page that `eidrive view` made of it."""
         self.recording.unlink(missing_ok=True)
+        self.recording.with_suffix(".html").unlink(missing_ok=True)
         shutil.rmtree(self.pictures, ignore_errors=True)
 
     def commit(self, result: bytes) -> None:

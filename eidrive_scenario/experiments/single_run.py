@@ -49,10 +49,10 @@ def play(
     *,
     seed: int = DEFAULT_SEED,
     settings: RunSettings | None = None,
-    out: Path | None = None,
-    below: Path | None = None,
+    out: str | Path | None = None,
+    below: str | Path | None = None,
     record: bool = True,
-    csv: Path | None = None,
+    csv: str | Path | None = None,
     log: str | Path | None = None,
     explanations: Sequence[Explanation] = (),
     wall_limit: float | None = None,
@@ -91,13 +91,13 @@ def play(
             place = out if out is not None else below
             folder = None
             if place is not None:
-                folder = stack.enter_context(run_folder(place, simulation.resolved, own=out is None))
+                folder = stack.enter_context(run_folder(Path(place), simulation.resolved, own=out is None))
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
                     stack.enter_context(exclusive(Path(log)))
                 simulation.add_observer(RunLog(log))
             if csv is not None:
-                simulation.add_observer(CsvWriter(stack.enter_context(whole(csv))))
+                simulation.add_observer(CsvWriter(stack.enter_context(whole(Path(csv)))))
             if folder is not None and record:
                 recording = folder.recording
                 if limit is not None:

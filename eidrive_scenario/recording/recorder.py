@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
+from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.output import create
@@ -58,7 +59,9 @@ class Recorder:
         self._channel = self._writer.register_channel(TOPIC, "json", schema_id)
 
     def observe(self, frame: Frame) -> None:
-        """Append one frame."""
+        """Append one frame. Raise SimulationError if the file is closed: a second run needs a second recorder."""
+        if self._file.closed:
+            raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
         text = json.dumps(self._codec.encode(frame), separators=(",", ":"), ensure_ascii=False, allow_nan=False)
         data, instant = text.encode(), round(frame.view.time * 1e9)
         self._writer.add_message(self._channel, instant, data, instant, sequence=frame.view.tick)

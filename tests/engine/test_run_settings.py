@@ -27,6 +27,14 @@ def test_seed_of_an_array_is_the_same_seed(tmp_path: Path) -> None:
     assert type(again.seed) is int
 
 
+def test_places_to_write_may_be_texts(tmp_path: Path) -> None:
+    settings = RunSettings(time_limit=0.2)
+    result = play(ONE, settings=settings, below=str(tmp_path), csv=f"{tmp_path}/motion.csv")
+    assert result.recording is not None
+    assert result.recording.is_relative_to(tmp_path)
+    assert (tmp_path / "motion.csv").read_text().startswith("time,name,")
+
+
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
 def test_seed_that_is_no_integer_is_refused(tmp_path: Path, seed: Any) -> None:
     for run in (Simulation, run_file, play):

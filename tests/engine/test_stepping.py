@@ -63,6 +63,8 @@ def test_tick_of_closed_simulation_is_an_error() -> None:
     for step in (simulation.tick, simulation.run):
         with pytest.raises(SimulationError, match="the simulation is closed; a second run needs a second Simulation"):
             step()
+    with pytest.raises(SimulationError, match="the simulation is closed; an observer of it would see no frame"):
+        simulation.add_observer(Closings())
 
 
 def test_tick_after_the_end_is_an_error() -> None:

@@ -282,6 +282,15 @@ def test_a_page_of_a_replaced_recording_is_removed(tmp_path: Path) -> None:
     assert not (folder / "recording.html").exists()
 
 
+def test_page_of_an_unfinished_recording_is_removed_by_the_next_run(tmp_path: Path) -> None:
+    folder = play(PASSING_BY, below=tmp_path).folder
+    assert folder is not None
+    for name in ("recording.partial.mcap", "recording.partial.html"):
+        (folder / name).touch()
+    play(PASSING_BY, below=tmp_path)
+    assert sorted(path.name for path in folder.iterdir()) == ["recording.mcap", "result.json"]
+
+
 def test_a_loaded_scenario_leaves_the_same_run_as_its_file(tmp_path: Path) -> None:
     loaded = load_scenario(PASSING_BY, {"OtherY": "6"})
     first = run(tmp_path, loaded)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from eidrive_scenario.errors import InputError, SettingError
+from eidrive_scenario.errors import InputError, SettingError, SimulationError
 from eidrive_scenario.recording import Recorder, TraceHash, read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
@@ -92,6 +92,15 @@ def test_recorder_that_is_never_closed_leaves_all_but_the_last_second(tmp_path: 
     recording = read_recording(tmp_path / "left.mcap")
     assert [frame.view.tick for frame in recording.frames()] == list(range(41))
     assert recording.scenario == "cut_in"
+
+
+def test_closed_recorder_refuses_the_frames_of_a_second_run(tmp_path: Path, make_frame: MakeFrame) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", metadata={})
+    recorder.observe(make_frame(0))
+    recorder.close()
+    with pytest.raises(SimulationError, match=r"run\.mcap: the recording is closed; a second run needs"):
+        recorder.observe(make_frame(0))
+    assert read_recording(tmp_path / "run.mcap").damage == ()
 
 
 @pytest.mark.parametrize("step", [0.3, 1.0, 7.0])
