@@ -42,6 +42,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
         ("--time-limit", settings.time_limit, usual.time_limit),
     ):
         words += [] if number == default else [option, repr(float(number))]
+    words += ["--allow-torchscript"] if settings.allow_torchscript else []
     return shlex.join(words)
 
 

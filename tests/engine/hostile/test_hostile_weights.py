@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -54,11 +55,49 @@ with open(report, "w") as stream:
 """Runs `eidrive` with the arguments from the third on, and writes what an audit hook noticed to the second."""
 
 
+HOSTILE_MODULE = """
+import sys
+from typing import Tuple
+import torch
+
+class Hostile(torch.nn.Module):
+    def __init__(self):
+        super().__init__()
+        self.target = "{folder}/computed"
+
+    @torch.jit.export
+    def __getstate__(self) -> Tuple[str, bool]:
+        return self.target, self.training
+
+    @torch.jit.export
+    def __setstate__(self, state: Tuple[str, bool]) -> None:
+        self.target = state[0]
+        self.training = state[1]
+        torch.save(torch.ones(1), "{folder}/loaded")
+
+    def forward(self, pixels: torch.Tensor) -> torch.Tensor:
+        torch.save(pixels.sum(), self.target)
+        return pixels.new_zeros((1, 3, 7))
+
+torch.jit.script(Hostile()).save(sys.argv[1])
+"""
+"""A program that saves a TorchScript module which writes files."""
+
+
 @pytest.fixture
 def torchscript(tmp_path: Path) -> Path:
-    """A module whose code writes a file when it is run; it does not have to be one for a run that refuses it."""
+    """TorchScript that writes `loaded` beside itself when it is loaded, and `computed` when it is run.
+
+    TorchScript cannot start a process by itself: its compiler refuses imports. Where torch is not installed, the file
+    is none, which nothing that refuses it may notice.
+    """
     path = tmp_path / "weights.pt"
     path.write_bytes(b"PK\x03\x04 code that nobody shall run")
+    if importlib.util.find_spec("torch") is not None:
+        module = tmp_path / "hostile_module.py"
+        module.write_text(HOSTILE_MODULE.format(folder=tmp_path))
+        subprocess.run([sys.executable, "-B", "-W", "ignore", str(module), str(path)], check=True)
+        module.unlink()
     return path
 
 
@@ -78,6 +117,11 @@ def watched(folder: Path, *arguments: str, **environment: str) -> dict[str, obje
     found: dict[str, object] = json.loads(report.read_text())
     found["output"] = done.stdout + done.stderr
     return found
+
+
+def written(folder: Path) -> set[str]:
+    """Names of the files that the code of the weights has written."""
+    return {name for name in ("loaded", "computed") if (folder / name).exists()}
 
 
 def outside(found: dict[str, object], folder: Path | None) -> list[list[str]]:
@@ -101,6 +145,7 @@ def test_check_with_torchscript_writes_nothing_starts_nothing_and_imports_no_tor
         assert found["code"] == 0
         assert outside(found, None) == []
         assert found["torch"] is False
+        assert written(tmp_path) == set()
         assert "the run is refused: its TorchScript weights can execute any code" in str(found["output"])
 
 
@@ -115,6 +160,23 @@ def test_run_with_torchscript_is_refused_and_writes_only_to_its_output_folder(
     assert "which can execute any code with your rights" in str(found["output"])
     assert outside(found, out) == []
     assert found["torch"] is False
+    assert written(tmp_path) == set()
+
+
+@pytest.mark.parametrize("by", ["option", "environment"])
+def test_run_with_permission_executes_torchscript(write: Write, torchscript: Path, tmp_path: Path, by: str) -> None:
+    """Torch writes without Python, so that an audit hook cannot see it: the files prove what is refused above."""
+    pytest.importorskip("torch", reason="needs the extra 'learned'")
+    path = with_weights(write, torchscript)
+    option = ["--allow-torchscript"] if by == "option" else []
+    allowed = {"EIDRIVE_ALLOW_TORCHSCRIPT": "1"} if by == "environment" else {}
+    command = ["run", str(path), "--no-record", "--time-limit", "0.2", *option]
+    found = watched(tmp_path, *command, **allowed)
+    assert found["code"] == 3  # out of time
+    assert written(tmp_path) == {"loaded", "computed"}
+    assert "--allow-torchscript" in next(
+        line for line in str(found["output"]).splitlines() if line.startswith("reproduce: ")
+    )
 
 
 def test_run_without_weights_writes_only_to_its_output_folder(write: Write, tmp_path: Path) -> None:
