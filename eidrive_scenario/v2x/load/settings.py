@@ -17,6 +17,8 @@ FARTHEST, STEP = 1000.0, 10.0
 """Tables reach this far, in these steps [m]; beyond, nothing of either model gets through."""
 
 Density = Annotated[float, Field(gt=0.0, le=1.0)]
+Power = Annotated[float, Field(ge=-30.0, le=50.0)]
+"""Transmission power in the range of `tx_power_dbm` of the radio [dBm]."""
 
 
 class Ieee80211pLoss(Settings):
@@ -31,7 +33,7 @@ class Ieee80211pLoss(Settings):
     density: Density
     rate: PositiveFloat = 10.0
     size: PositiveInt = 300
-    power_dbm: float = 23.0
+    power_dbm: Power = 23.0
     data_rate_mbps: PositiveFloat = 6.0
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.5
 
@@ -56,15 +58,16 @@ class Cv2xMode4Loss(Settings):
     """The losses of C-V2X Mode 4 among other vehicles that send 190 bytes, by distance (Gonzalez-Martín et al. 2019).
 
     density    vehicles per metre of road
-    rate, power_dbm   what all of them send: packets per second (published for 10 and 20), dBm
+    rate, power_dbm   what all of them send: packets per second (published for 10 and 20; at most
+                     one in each subframe), dBm
     subchannels   4 (QPSK, r = 0.7) or 2 (r = 0.5)
     environment_height   taken off the antennas' 1.5 m in the path loss [m]
     """
 
     kind: Literal["cv2x_mode4"]
     density: Density
-    rate: Annotated[float, Field(ge=1.0)] = 10.0
-    power_dbm: float = 20.0
+    rate: Annotated[float, Field(ge=1.0, le=1000.0)] = 10.0
+    power_dbm: Power = 20.0
     subchannels: Literal[2, 4] = 4
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.0
 

@@ -27,7 +27,12 @@ _TELEPORT = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Posit
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Writes a scenario and returns its path.
+    """Writes a scenario into the folder of the test."""
+    return scenario_writer(tmp_path)
+
+
+def scenario_writer(folder: Path) -> Write:
+    """A function that writes a scenario into a folder and returns its path.
 
     properties  of the ego's controller, as texts;  channel  text of a channel command
     before      elements behind the header, such as parameters;  catalogs  content of CatalogLocations
@@ -51,7 +56,7 @@ def write(tmp_path: Path) -> Write:
             command = f'<CustomCommandAction type="eidrive.channel">{channel}</CustomCommandAction>'
             actions = f"<UserDefinedAction>{command}</UserDefinedAction>{actions}"
         road = str(library_path() / "roads" / "coop_1.xodr") if road is None else road
-        path = tmp_path / "hostile.xosc"
+        path = folder / "hostile.xosc"
         path.write_text(
             f'{opening}\n<OpenSCENARIO>\n<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" '
             f'author="" description=""/>\n{before}\n<CatalogLocations>{catalogs}</CatalogLocations>\n'

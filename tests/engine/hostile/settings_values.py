@@ -1,29 +1,21 @@
-"""Immense, tiny and negative numbers in every setting of stations, sensors, trackers, fusion methods and channels."""
+"""Immense, tiny, negative and undefined numbers, and values of other types, in every setting.
+
+The settings are those of stations, sensors, detectors, trackers, fusion methods, channels, weather and criteria.
+"""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from typing import Any
 
-NUMBERS: tuple[float, ...] = (
-    0,
-    -1,
-    1e-300,
-    1e-9,
-    1e-4,
-    0.5,
-    3,
-    1000,
-    1e5,
-    1e7,
-    1e9,
-    1e12,
-    -1e12,
-    1e308,
-    2**63,
-    10**30,
+import yaml
+
+VALUES: tuple[Any, ...] = (
+    *(0, -0.0, -1, 1, 3, 0.5, 1000, 1e5, 1e7, 1e9, 1e12, -1e12, 2**31, 2**63, -(2**63), 10**30),
+    *(1e-320, -1e-320, 1e-300, 1e-9, 1e-4, 1e308, -1e308, math.nan, math.inf, -math.inf),
+    *(True, False, None, "", "text", "1e308", "nan", [], [1], [math.nan], {}, {"a": 1}, [1, [2]]),
 )
 
 STATIONS: Mapping[str, Mapping[str, Any]] = {
@@ -42,12 +34,36 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
         "conflict_area": [[100.0, 120.0, -10.0, 10.0]],
         "conflict_brake": 5.0,
         "conflict_hold": 1.0,
+        "min_existence": 0.4,
+    },
+    "fusion": {
+        "range": 50.0,
+        "tracker": {
+            "kind": "cv",
+            "confirm": [2, 3],
+            "confirm_existence": 0.5,
+            "delete_existence": 0.05,
+            "coast": 0.5,
+            "gate": 0.99,
+            "detection_probability": 0.8,
+            "birth_density": 1e-4,
+            "lifetime": 10.0,
+        },
+        "fusion": "covariance_intersection",
+        "fusion_settings": {"gate": 0.99, "gate_distance": 4.0, "max_age": 1.5, "existence": 0.5},
+    },
+    "early": {
+        "detector": "lidar",
+        "detector_settings": {"off_road": 0.5, "least_points": 3, "least_score": 0.05},
+        "fusion": "early",
+        "fusion_settings": {"cell": 0.1, "max_lateness": 0.5, "gate_distance": 4.0},
+        "sensors": {"lidar": {"elevations": [0.0, -5.0, -10.0], "channels": 3, "points_per_second": 6000}},
     },
     "etsi": {"generation": "etsi", "messages": "cpm, cam", "mtu": 400, "security_bytes": 100},
     "sensors": {
         "localization": "ekf",
         "sensors": {
-            "truth": {"range": 40.0, "rate": 10.0, "visibility": 0.2},
+            "truth": {"range": 40.0, "rate": 10.0, "visibility": 0.2, "field_of_view": 200.0},
             "gnss": {"rate": 10.0, "position_noise": 0.3, "height_noise": 0.6, "bias": 0.1, "bias_walk": 0.1},
             "imu": {
                 "accelerometer_noise": 0.02,
@@ -109,9 +125,14 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
 
 CHANNELS: Mapping[str, Mapping[str, Any]] = {
     "constant": {"delay": {"kind": "constant", "seconds": 0.1}, "loss": {"kind": "bernoulli", "probability": 0.1}},
+    "uniform": {"delay": {"kind": "uniform", "minimum": 0.02, "maximum": 0.1}},
+    "normal": {"delay": {"kind": "truncated_normal", "mean": 0.1, "sd": 0.02, "minimum": 0.01, "maximum": 0.3}},
     "gamma": {
         "delay": {"kind": "shifted_gamma", "minimum": 0.02, "mean": 0.1},
         "loss": {"kind": "gilbert_elliott", "probability": 0.3, "burst": 10},
+    },
+    "states": {
+        "loss": {"kind": "gilbert_elliott", "to_bad": 0.1, "to_good": 0.5, "good_loss": 0.01, "bad_loss": 0.9},
     },
     "lognormal": {"delay": {"kind": "lognormal", "minimum": 0.001, "mean": 0.01, "sd": 0.008}},
     "trace": {
@@ -136,39 +157,134 @@ CHANNELS: Mapping[str, Mapping[str, Any]] = {
         "congestion": {"kind": "limeric"},
         "background": {"kind": "80211p", "density": 0.06, "rate": 10, "size": 300, "power_dbm": 23},
     },
+    "80211p fading": {
+        "model": "radio",
+        "path_loss": {
+            "kind": "log_distance",
+            "exponent": 3.0,
+            "reference_distance": 1.0,
+            "reference_loss_db": 47.0,
+            "per_vehicle_db": 6.9,
+        },
+        "fading": {"kind": "nakagami", "m": [3.0, 1.0], "distances": [80.0]},
+        "congestion": {"kind": "reactive", "limits": [0.2, 1.0], "intervals": [0.1, 0.5]},
+    },
+    "80211p limeric": {
+        "model": "radio",
+        "path_loss": {"kind": "winner_b1", "environment_height": 1.0, "per_vehicle_db": 6.0},
+        "congestion": {
+            "kind": "limeric",
+            "alpha": 0.016,
+            "beta": 0.0012,
+            "target": 0.68,
+            "gain_down": -0.00025,
+            "gain_up": 0.0005,
+            "share_min": 0.0006,
+            "share_max": 0.03,
+            "interval_min": 0.025,
+            "interval_max": 1.0,
+        },
+        "background": {
+            "kind": "80211p",
+            "density": 0.06,
+            "rate": 10,
+            "size": 300,
+            "power_dbm": 23,
+            "data_rate_mbps": 6.0,
+            "environment_height": 0.5,
+        },
+    },
     "cv2x": {
         "model": "radio",
         "technology": "cv2x_mode4",
-        "sidelink": {"interval": 0.1, "subchannels": 4},
-        "background": {"kind": "cv2x_mode4", "density": 0.1, "rate": 10, "power_dbm": 23, "subchannels": 4},
+        "sidelink": {
+            "interval": 0.1,
+            "subchannels": 4,
+            "subchannel_bytes": 190,
+            "keep": 0.4,
+            "processing": 0.001,
+            "selection_window": 0.1,
+            "latency": 0.1,
+            "reselect_after": 3,
+            "pssch_rsrp_threshold_dbm": -110.0,
+            "cbr_threshold_dbm": -94.0,
+        },
+    },
+    "cv2x background": {
+        "model": "radio",
+        "technology": "cv2x_mode4",
+        "background": {
+            "kind": "cv2x_mode4",
+            "density": 0.1,
+            "rate": 10,
+            "power_dbm": 23,
+            "subchannels": 4,
+            "environment_height": 0.5,
+        },
     },
 }
 """Channel profiles that are right."""
 
 
+WEATHER: Mapping[str, Mapping[str, Any]] = {
+    "weather": {
+        "name": "all",
+        "sun_azimuth": 10.0,
+        "sun_elevation": 20.0,
+        "sun_illuminance": 1e4,
+        "sun_share": 0.5,
+        "cloud_cover": 0.3,
+        "visual_range": 500.0,
+        "precipitation": "rain",
+        "precipitation_intensity": 5.0,
+        "wetness": 0.4,
+        "friction": 0.8,
+        "wind_direction": 30.0,
+        "wind_speed": 4.0,
+        "street_lighting": 5.0,
+        "headlights": "auto",
+    },
+}
+"""Weather presets that are right."""
+
+CRITERIA: Mapping[str, Mapping[str, Any]] = {
+    "collision": {"of": "Ego", "with": "B", "fatal": True, "name": "crash"},
+    "driven_distance": {"of": "Ego", "at_least": 10.0, "by": 20.0},
+    "max_speed": {"of": "Ego", "at_most": 10.0},
+    "min_distance": {"of": "Ego", "to": "B", "at_least": 1.5, "measure": "box"},
+    "reach_position": {"of": "Ego", "x": 1.0, "y": 2.0, "within": 3.0, "by": 10.0},
+    "time_limit": {"within": 10.0},
+    "time_to_collision": {"of": "Ego", "to": "B", "at_least": 1.5},
+}
+"""Settings of criteria that are right."""
+
+
 def variants(settings: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield settings with one number replaced, and which one."""
-    for path in list(_numbers(settings, ())):
-        for number in NUMBERS:
+    """Yield settings with one value replaced, and which one."""
+    for path in _paths(settings, ()):
+        for value in VALUES:
             changed = deepcopy(dict(settings))
             place: Any = changed
             for key in path[:-1]:
                 place = place[key]
-            place[path[-1]] = number
-            yield f"{'.'.join(map(str, path))}={number!r}", changed
+            place[path[-1]] = value
+            yield f"{'.'.join(map(str, path))}={value!r}", changed
 
 
-def as_property(value: Any) -> str:
-    """A value of a property as a scenario file has it: names as they are, all else as YAML."""
-    return value if isinstance(value, str) else json.dumps(value)
+def as_text(value: Any) -> str:
+    """A value as a scenario file has it: names as they are, all else as YAML in one line."""
+    if isinstance(value, str):
+        return value
+    text: str = yaml.safe_dump(value, default_flow_style=True, width=10**6, sort_keys=False)
+    return text.strip().removesuffix("...").strip()
 
 
-def _numbers(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+def _paths(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+    entries: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _numbers(inner, (*path, key))
+        entries = value.items()
     elif isinstance(value, list):
-        for place, inner in enumerate(value):
-            yield from _numbers(inner, (*path, place))
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield path
+        entries = enumerate(value)
+    for key, inner in entries:
+        yield (*path, key)
+        yield from _paths(inner, (*path, key))

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from eidrive_scenario.errors import SettingError
+from eidrive_scenario.settings import parse_settings
 from eidrive_scenario.v2x.load.cv2x_mode4 import cv2x_mode4_errors
 from eidrive_scenario.v2x.load.ieee80211p import airtime, ieee80211p_errors
 from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
@@ -108,3 +110,16 @@ def test_causes_share_the_draw_in_their_order() -> None:
 def test_airtime_of_the_model() -> None:
     """40 µs and (B + 30) bytes at 6 Mbit/s: 220 · 8 / 6 = 293.33 µs."""
     assert airtime(190, 6e6) == pytest.approx(333.333e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("power", [-31.0, 51.0, 1000.0, 1e308])
+@pytest.mark.parametrize("kind", ["80211p", "cv2x_mode4"])
+def test_model_with_power_beyond_that_of_the_radio_is_refused(kind: str, power: float) -> None:
+    model = Ieee80211pLoss if kind == "80211p" else Cv2xMode4Loss
+    with pytest.raises(SettingError, match="'power_dbm'"):
+        parse_settings(model, {"kind": kind, "density": 0.06, "power_dbm": power})
+
+
+def test_model_of_cv2x_with_more_packets_than_subframes_is_refused() -> None:
+    with pytest.raises(SettingError, match="'rate' is 1001"):
+        parse_settings(Cv2xMode4Loss, {"kind": "cv2x_mode4", "density": 0.06, "rate": 1001})

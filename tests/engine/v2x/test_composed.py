@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.delay import Delay
+from eidrive_scenario.v2x.delay import Delay, LognormalDelay
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.size import cpm_size
 
@@ -130,6 +130,15 @@ def test_a_larger_mean_delays_every_single_message_more() -> None:
         assert first is not None
         assert second is not None
         assert first < second
+
+
+@pytest.mark.parametrize(("mean", "sd"), [(0.1, 0.05), (1e-3, 10.0), (1e-80, 1e80), (1e-300, 1e10), (1e-320, 0.008)])
+def test_lognormal_delay_of_any_mean_and_sd_has_its_median(mean: float, sd: float) -> None:
+    """The median of a lognormal distribution is mean / sqrt(1 + (sd / mean)²), here 0 beside the minimum or not."""
+    delay = LognormalDelay(kind="lognormal", mean=mean, sd=sd, minimum=0.02)
+    median = mean * (mean / math.hypot(mean, sd))
+    assert delay.quantile(0.5) - 0.02 == pytest.approx(median, rel=1e-9, abs=1e-15)
+    assert all(math.isfinite(delay.quantile(u)) for u in (1e-300, 1e-9, 0.1, 0.9, 1.0 - 1e-16))
 
 
 def test_size_of_a_message() -> None:
