@@ -73,7 +73,7 @@ def along_reference(
 ) -> LaneLocation | None:
     """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset.
 
-    At forks the route decides.
+    At forks the route decides. A lane that the road does not have at its end is replaced by that at the same t.
     """
     road = roads.roads[here.road]
     s = here.s + ds
@@ -81,6 +81,8 @@ def along_reference(
         return here._replace(s=s)
     rest = s - road.length if s > road.length else s
     edge = here._replace(s=road.length if s > road.length else 0.0)
+    if here.lane not in roads.lane_ids(here.road, edge.s):
+        edge = roads.road_location(here.road, edge.s, here.t)
     return roads.advance(edge, rest * roads.driving_direction(here.road, here.lane), route=route)
 
 

@@ -10,13 +10,33 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import Pose
+from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.distances import closing_speed, distance
 from eidrive_scenario.storyboard.motion import Place
 from eidrive_scenario.storyboard.positions import resolve
 from eidrive_scenario.storyboard.road_positions import count_lanes
 from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.world.view import WorldView
+
+JOINED = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+  <road name="" length="200" id="1" junction="-1"><link><successor elementType="road" elementId="2"
+    contactPoint="start"/></link>
+    <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
+    <lanes><laneSection s="0">{first}</laneSection><laneSection s="100">{second}</laneSection></lanes></road>
+  <road name="" length="200" id="2" junction="-1"><link><predecessor elementType="road" elementId="1"
+    contactPoint="end"/></link>
+    <planView><geometry s="0" x="200" y="0" hdg="0" length="200"><line/></geometry></planView>
+    <lanes><laneSection s="0">{third}</laneSection></lanes></road></OpenDRIVE>"""
+"""Two roads in a row; the first one has two lane sections."""
+
+
+def right(*widths: float, link: str = "") -> str:
+    lanes = "".join(
+        f'<lane id="{-number}" type="driving"><link>{link.format(-number)}</link>'
+        f'<width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane>'
+        for number, width in enumerate(widths, 1)
+    )
+    return f'<center><lane id="0" type="none"/></center><right>{lanes}</right>'
 
 
 @pytest.fixture
@@ -28,6 +48,28 @@ def on_street(stage: Any, street: Any) -> Any:
         here = street.location("1", lane, s)
         made.enter(name, Place(street.pose(here), here))
     return made
+
+
+@pytest.mark.element("RelativeRoadPosition", "RelativeLanePosition")
+@pytest.mark.parametrize(
+    ("frame", "y"),
+    [
+        (model.RelativeRoadPosition(entity_ref="A", ds=150, dt=0), -6.0),
+        (model.RelativeRoadPosition(entity_ref="A", ds=150, dt=1), -5.0),
+        (model.RelativeLanePosition(entity_ref="A", d_lane=0, ds=150), -5.0),
+    ],
+)
+def test_relative_position_beyond_a_lane_section_without_the_lane_keeps_its_t(stage: Any, frame: Any, y: float) -> None:
+    """Lanes of 4 m become one of 10 m before the road ends: A is in lane -2 at y = -6, the wide one is at -5."""
+    first, second = right(4.0, 4.0), right(10.0, link='<successor id="{}"/>')
+    text = JOINED.format(first=first, second=second, third=right(10.0, link='<predecessor id="{}"/>'))
+    roads = RoadNetwork.parse(text)
+    made = Stage(stage.scenario, roads, dt=0.1, seed=0, nobody=stage.view)
+    here = roads.location("1", -2, 80.0)
+    made.enter("A", Place(roads.pose(here), here))
+    key = {model.RelativeRoadPosition: "relative_road_position", model.RelativeLanePosition: "relative_lane_position"}
+    pose = resolve(model.Position(**{key[type(frame)]: frame}), made).pose
+    assert (pose.x, pose.y) == pytest.approx((230.0, y))
 
 
 def relative(h: Any) -> Any:
