@@ -33,7 +33,7 @@ class QueueSettings(Settings):
     """
 
     discipline: Literal["fifo", "lcfs"] = "fifo"
-    length: Annotated[int, Field(ge=1)] = 16
+    length: Annotated[int, Field(ge=1, le=10_000)] = 16
 
 
 @dataclass(eq=False)

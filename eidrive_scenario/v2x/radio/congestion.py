@@ -12,6 +12,9 @@ from eidrive_scenario.settings import Settings
 
 Array = NDArray[np.float64]
 
+LONGEST_INTERVAL = 10.0
+"""Largest time between two messages that a profile can ask for [s]; the standard has 1 s."""
+
 
 class NoControl(Settings):
     """Everybody sends when it likes."""
@@ -30,7 +33,7 @@ class ReactiveControl(Settings):
 
     kind: Literal["reactive"]
     limits: tuple[Annotated[float, Field(gt=0.0, le=1.0)], ...] = (0.20, 0.30, 0.40, 0.50, 1.0)
-    intervals: tuple[Annotated[float, Field(gt=0.0)], ...] = (0.1, 0.2, 0.4, 0.5, 1.0)
+    intervals: tuple[Annotated[float, Field(gt=0.0, le=LONGEST_INTERVAL)], ...] = (0.1, 0.2, 0.4, 0.5, 1.0)
 
     period: ClassVar[float] = 0.1
 
@@ -62,8 +65,8 @@ class Limeric(Settings):
     gain_up: Annotated[float, Field(gt=0.0)] = 0.0005
     share_min: Annotated[float, Field(gt=0.0)] = 0.0006
     share_max: Annotated[float, Field(gt=0.0)] = 0.03
-    interval_min: Annotated[float, Field(ge=0.0)] = 0.025
-    interval_max: Annotated[float, Field(gt=0.0)] = 1.0
+    interval_min: Annotated[float, Field(ge=0.0, le=LONGEST_INTERVAL)] = 0.025
+    interval_max: Annotated[float, Field(gt=0.0, le=LONGEST_INTERVAL)] = 1.0
 
     period: ClassVar[float] = 0.2
 

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat
+from pydantic import Field
 from scipy.special import ndtri
 
 from eidrive_scenario.settings import Settings
@@ -113,7 +113,7 @@ class _LossPerVehicle(Settings):
     Buildings have the NLOS of TR 37.885 where that loses more.
     """
 
-    per_vehicle_db: NonNegativeFloat = 6.9
+    per_vehicle_db: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.9
 
     spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
     """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
@@ -173,7 +173,7 @@ class LogDistance(_LossPerVehicle):
     kind: Literal["log_distance"]
     exponent: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
     reference_distance: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
-    reference_loss_db: float | None = None
+    reference_loss_db: Annotated[float, Field(ge=-200.0, le=1000.0)] | None = None
 
     def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
         """Return the path loss with LOS [dB] at distances [m]."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
@@ -25,6 +25,8 @@ from eidrive_scenario.v2x.surroundings import LOS
 Array = NDArray[np.float64]
 
 Technology = Literal["80211p", "cv2x_mode4"]
+Level = Annotated[float, Field(ge=-200.0, le=100.0)]
+"""Power at a receiver [dBm]."""
 Background = Annotated[Ieee80211pLoss | Cv2xMode4Loss, Field(discriminator="kind")]
 
 _SENSING = {"80211p": -85.0, "cv2x_mode4": -90.5}
@@ -74,18 +76,18 @@ class RadioProfile(ComposedProfile):
     technology: Technology = "80211p"
     frequency_ghz: Annotated[float, Field(ge=0.5, le=100.0)] = 5.9
     tx_power_dbm: Annotated[float, Field(ge=-30.0, le=50.0)] = 23.0
-    antenna_gain_dbi: float = 3.0
-    noise_dbm: float = -95.0
-    sensing_dbm: float | None = None
+    antenna_gain_dbi: Annotated[float, Field(ge=-100.0, le=100.0)] = 3.0
+    noise_dbm: Level = -95.0
+    sensing_dbm: Level | None = None
     path_loss: PathLoss = Tr37885()
     line_of_sight: Literal["rays", "random", "clear"] = "rays"
-    shadowing_db: NonNegativeFloat | None = None
+    shadowing_db: Annotated[float, Field(ge=0.0, le=30.0)] | None = None
     decorrelation: PositiveFloat | None = None
     fading: Fading = NoFading()
     packet_errors: PacketErrors | None = None
     data_rate_mbps: float = 6.0
     mtu: PositiveInt = 1400
-    jitter: NonNegativeFloat = 0.01
+    jitter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.01
     sidelink: SidelinkSettings = SidelinkSettings()
     queue: QueueSettings = QueueSettings()
     congestion: CongestionControl = NoControl()

@@ -280,3 +280,57 @@ def test_a_radio_that_is_replaced_hands_over_what_waits() -> None:
 def test_who_was_never_placed_cannot_send() -> None:
     with pytest.raises(ValueError, match="was not told where 'A' is"):
         radio().transmit([(message("A", 0, 0.0), ["B"])], 0.0)
+
+
+@pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"antenna_gain_dbi": 1e5},
+        {"noise_dbm": 1e308},
+        {"noise_dbm": -1e5},
+        {"sensing_dbm": -1e308},
+        {"shadowing_db": 1e5},
+        {"jitter": 1e308},
+        {"queue": {"length": 10**30}},
+        {"path_loss": {"kind": "log_distance", "reference_loss_db": -1e308}},
+        {"path_loss": {"kind": "log_distance", "per_vehicle_db": 1e308}},
+        {"congestion": {"kind": "reactive", "limits": [1.0], "intervals": [1e300]}},
+        {"congestion": {"kind": "limeric", "interval_max": 1e300}},
+    ],
+)
+def test_radio_profile_absurd_value_is_refused(technology: str, setting: dict[str, Any]) -> None:
+    """These overflowed, or kept the end of a run waiting for as long as they say."""
+    with pytest.raises(ValueError, match="less than or equal|greater than or equal"):
+        radio(technology=technology, **setting)
+
+
+@pytest.mark.parametrize("discipline", ["fifo", "lcfs"])
+@pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
+def test_radio_channel_each_message_has_one_outcome_per_receiver(technology: str, discipline: str) -> None:
+    """Stations come and go while they have more to say than the medium carries; what is received is told as such."""
+    everybody: dict[str, Place] = {f"S{n}": (30.0 * n, 0.0, 1.5) for n in range(8)}
+    carrier = radio(1, **QUIET, technology=technology, queue={"discipline": discipline, "length": 3})
+    said: list[tuple[str, int, str]] = []
+    heard: list[tuple[str, int, str]] = []
+    events: list[LinkEvent] = []
+    for tick in range(100):
+        now = DT * tick
+        places = {name: place for row, (name, place) in enumerate(everybody.items()) if (tick // 3) % (row + 2) != 1}
+        carrier.around(Surroundings(places))
+        for name in places:
+            heard += [(r.message.sender, r.message.number, name) for r in carrier.deliver(name, now)]
+        outbox = [
+            (message(name, 2 * tick + part, now, (190, 900, 2500)[tick % 3]), [n for n in places if n != name])
+            for name in places
+            for part in (0, 1)
+        ]
+        said += [(sent.sender, sent.number, receiver) for sent, receivers in outbox for receiver in receivers]
+        events += carrier.transmit(outbox, now)
+    carrier.settle()
+    events += carrier.untold()
+    assert sorted((event.sender, event.number, event.receiver) for event in events) == sorted(said)
+    delivered = {(e.sender, e.number, e.receiver) for e in events if e.outcome == "delivered"}
+    assert len(heard) == len(set(heard)) > 0
+    assert set(heard) <= delivered
+    assert {event.reason for event in events} >= {"", "absent", "half_duplex", "collision"}
