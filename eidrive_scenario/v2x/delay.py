@@ -109,8 +109,8 @@ class LognormalDelay(_RandomDelay):
     """A lognormal delay above an offset; `mean` and `sd` are those of the part above it [s]."""
 
     kind: Literal["lognormal"]
-    mean: PositiveFloat
-    sd: PositiveFloat
+    mean: Annotated[float, Field(ge=1e-9, le=1e6)]
+    sd: Annotated[float, Field(gt=0.0, le=1e6)]
     minimum: NonNegativeFloat = 0.0
 
     def quantile(self, u: float) -> float:

@@ -40,6 +40,12 @@ def test_every_profile_of_the_library_makes_a_channel() -> None:
             assert channel.own_perception == name.startswith("paper")
 
 
+@pytest.mark.parametrize("setting", ["mean: 1.0e-300, sd: 0.1", "mean: 0.1, sd: 1.0e+300"])
+def test_lognormal_delay_whose_ratio_overflows_is_refused(setting: str) -> None:
+    with pytest.raises(SettingError, match="delay"):
+        composed(f"{{delay: {{kind: lognormal, {setting}}}}}")
+
+
 def test_the_paper_s_settings() -> None:
     assert composed("latency_300ms").delay == ConstantDelay(seconds=0.3)
     assert composed("latency_300ms").loss == NoLoss()

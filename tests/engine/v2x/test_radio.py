@@ -301,7 +301,7 @@ def test_who_was_never_placed_cannot_send() -> None:
 )
 def test_radio_profile_absurd_value_is_refused(technology: str, setting: dict[str, Any]) -> None:
     """These overflowed, or kept the end of a run waiting for as long as they say."""
-    with pytest.raises(ValueError, match="less than or equal|greater than or equal"):
+    with pytest.raises(ValueError, match=r"(less|greater) than or equal"):
         radio(technology=technology, **setting)
 
 
