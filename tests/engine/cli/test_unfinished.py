@@ -57,7 +57,7 @@ def test_what_is_left_of_a_run_does_not_look_whole(
     assert f"warning: {partial}: the run did not end, it is not in the report" in report.stderr
 
     assert eidrive(*arguments).exit_code == 0
-    assert names(tmp_path) == ["motion.csv", "recording.mcap", "recording.partial.html", "result.json"]
+    assert names(tmp_path) == ["motion.csv", "recording.mcap", "result.json"]
     assert "did not end" not in eidrive("view", tmp_path).stderr
 
 
