@@ -10,9 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.errors import Problem, SettingError
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.camera import Pinhole, Radiance
 
+Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 
@@ -59,7 +61,10 @@ class Optics:
 
 @lru_cache(maxsize=32)
 def _bend(settings: CameraSettings) -> _Bend:
-    """For each pixel centre, the direction that the lens shows there, found by iteration to 1e-9."""
+    """For each pixel centre, the direction that the lens shows there, found by iteration to 1e-9.
+
+    Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
+    """
     lens = lens_of(settings)
     columns, rows = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
@@ -67,8 +72,19 @@ def _bend(settings: CameraSettings) -> _Bend:
     same = np.eye(3)
     found = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
     rays = np.asarray(found, dtype=float)[:, 0]
+    _check_convergence(rays, pixels[:, 0], lens, settings)
     low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0
     (left, top), (right, bottom) = np.floor(low), np.ceil(high)
     straight = Pinhole(int(right - left), int(bottom - top), lens.focal, -left, -top, lens.near, lens.far)
     places = (rays * lens.focal - (left, top) - 0.5).astype(np.float32).reshape(lens.height, lens.width, 2)
     return _Bend(straight, np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1]))
+
+
+def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: CameraSettings) -> None:
+    """Raise SettingError unless the lens shows each direction (N, 2) within a tenth of a pixel of its place (N, 2)."""
+    along = np.column_stack([rays, np.ones(len(rays))])
+    none = np.zeros(3)
+    shown = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
+    if not np.abs(shown - pixels).max() < 0.1:
+        what = f"the distortion {list(settings.distortion)} of a camera cannot be inverted"
+        raise SettingError(Problem(what, "give smaller coefficients or a smaller fov"))

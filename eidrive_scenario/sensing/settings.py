@@ -126,25 +126,38 @@ class CameraSettings(SensorSettings):
 
     @model_validator(mode="after")
     def _lens_maps_one_to_one(self) -> CameraSettings:
-        """Every pixel must see one direction: the distorted radius grows with the true one as far as the corners."""
-        k1, k2, _, _, k3 = self.distortion
+        """Every pixel must see one direction: the distorted radius grows with the true one as far as the corners.
+
+        At radius r, p1 and p2 move a point by at most 3 |p| r², so that much less of the growth is certain.
+        """
+        k1, k2, p1, p2, k3 = self.distortion
         if not any(self.distortion):
             return self
+        decentring = 3.0 * math.hypot(p1, p2)
         half = math.tan(math.radians(self.fov) / 2.0)
         corner = 1.1 * half * math.hypot(1.0, self.height / self.width)
         radius = distorted = 0.0
         for step in range(1, 401):
             radius = 4.0 * corner * step / 400
             square = radius * radius
-            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3)))
+            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3))) - decentring * square
             if further <= distorted:
                 break
             distorted = further
             if distorted >= corner:
-                return self
+                return self._with_straight_picture(radius / corner)
         raise ValueError(
             f"this distortion folds the picture {math.degrees(math.atan(radius)):.0f} degrees off its axis"
         )
+
+    def _with_straight_picture(self, scale: float) -> CameraSettings:
+        """Bound the picture without distortion, which is `scale` times as wide and high, by as many pixels."""
+        if self.width * self.height * self.supersampling**2 * scale**2 > 1.1 * MAX_PIXELS:
+            raise ValueError(
+                f"the picture without this distortion has more than {MAX_PIXELS} pixels: lower width, height, "
+                "supersampling or fov"
+            )
+        return self
 
 
 class LidarSettings(SensorSettings):

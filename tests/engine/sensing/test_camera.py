@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from eidrive_scenario.errors import SettingError
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.camera import Camera, Photographer
 from eidrive_scenario.sensing.exposure import BASE_SPEED, LENS, SATURATION, Exposure, develop, metered, noise_of
@@ -77,6 +78,44 @@ def test_a_lens_that_folds_the_picture_is_refused() -> None:
         CameraSettings(fov=100, distortion=(-0.6, 0.0))
     with pytest.raises(ValidationError, match="up to five coefficients"):
         CameraSettings(distortion=(0.0,) * 6)
+
+
+@pytest.mark.parametrize("distortion", [(0, 0, 3), (0, 0, 0, 3), (0, 0, 1000), (0, 0, 0.3, 0.3), (0.2, 0, -1e3, 1e3)])
+def test_camera_settings_with_strong_tangential_distortion_are_refused(distortion: tuple[float, ...]) -> None:
+    """The picture without it would need up to 59 TiB."""
+    with pytest.raises(ValidationError, match="folds the picture"):
+        CameraSettings(fov=90, distortion=distortion)
+
+
+def test_camera_settings_with_a_large_straight_picture_are_refused() -> None:
+    """r (1 - 0.1 r²) is 1.03 at r = 1.16: the straight picture has 1.27 times as many pixels as the 30.7 million."""
+    CameraSettings(width=6000, height=4000, fov=73.7, distortion=(-0.1, 0.0))
+    with pytest.raises(ValidationError, match="the picture without this distortion has more than 32000000 pixels"):
+        CameraSettings(width=6400, height=4800, fov=73.7, distortion=(-0.1, 0.0))
+
+
+def test_optics_with_a_distortion_that_iteration_does_not_invert_is_refused() -> None:
+    settings = CameraSettings(width=64, height=48, fov=139.363, distortion=(0.0, 0.977637, 0.0, 0.271634, -0.110679))
+    with pytest.raises(SettingError, match="cannot be inverted"):
+        Optics(settings)
+
+
+def test_optics_of_random_distortions_show_each_pixel_or_refuse() -> None:
+    """By OpenCV's own projection of the directions that the pixels show; the straight picture stays bounded."""
+    draw = generator(7, "distortions")
+    refused = 0
+    for _ in range(300):
+        coefficients = draw.uniform(-1.0, 1.0, 5) * (1.0, 1.0, 0.1, 0.1, 1.0) * draw.integers(0, 2, 5)
+        try:
+            settings = CameraSettings(
+                width=32, height=24, fov=draw.uniform(10.0, 170.0), distortion=tuple(coefficients)
+            )
+            hole = Optics(settings).pinhole
+        except (ValidationError, SettingError):
+            refused += 1
+            continue
+        assert hole.width * hole.height < 20 * 32 * 24
+    assert 50 < refused < 200
 
 
 def test_supersampling_is_the_mean_of_finer_pixels() -> None:
