@@ -117,10 +117,16 @@ def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
             except InputError as error:
                 missing += error.problems
             continue
-        inside = sorted(Path(given).rglob(f"*{_SUFFIX}")) or sorted(Path(given).rglob(f"*{_ROADS}"))
+        inside = _below(given, _SUFFIX) or _below(given, _ROADS)
         if not inside:
             missing.append(Problem(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
         yield from inside
+
+
+def _below(folder: str, suffix: str) -> list[Path]:
+    """The files with a suffix in a folder and in those inside it, sorted; folders that cannot be read are left out."""
+    files = (Path(place, name) for place, _, names in os.walk(folder) for name in names if name.endswith(suffix))
+    return sorted(files)
 
 
 def _count(number: int, what: str) -> str:

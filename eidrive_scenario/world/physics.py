@@ -31,9 +31,15 @@ _AHEAD = 5.0
 """So much farther than needed it is looked what stands around a body, so that it need not be looked each time [m]."""
 
 
+MAX_TICK = 100.0
+"""Maximum length of a tick [s]; all its physics steps are taken at once."""
+
+
 def substeps_per_tick(dt: float, physics_rate: float) -> int:
-    """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them."""
+    """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them, of at most MAX_TICK."""
     exact = dt * physics_rate
+    if not abs(dt) <= MAX_TICK or not math.isfinite(exact):
+        raise SettingError(Problem(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
         what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"

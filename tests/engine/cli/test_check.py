@@ -237,3 +237,16 @@ def test_sound_catalog_has_no_problems(eidrive: Eidrive, tmp_path: Path) -> None
     path.write_text(CATALOG.format(entries=ENTRY.format(name="a", declared=declared, x="$Limit")), encoding="utf-8")
     result = eidrive("check", path)
     assert (result.exit_code, result.stdout) == (0, "1 file, 0 problems, 0 warnings\n")
+
+
+def test_check_of_folder_with_folders_named_like_files_checks_the_files_only(
+    eidrive: Eidrive, folder: Callable[..., Path]
+) -> None:
+    place = folder()
+    inner = place / "inner.xosc"
+    inner.mkdir()
+    (inner / "also.xosc").write_bytes((place / "right.xosc").read_bytes())
+    (place / "gone").symlink_to(place / "no-such-folder")
+    (place / "around").symlink_to(place)
+    result = eidrive("check", place)
+    assert (result.exit_code, result.stdout) == (0, "2 files, 0 problems, 0 warnings\n")

@@ -178,3 +178,10 @@ def test_looking_changes_nothing(car: CarFactory) -> None:
             return world.view().position.tobytes()
 
     assert play(True) == play(False)
+
+
+@pytest.mark.parametrize("dt", [100.005, 1e300, 1e308, math.inf, math.nan, -1e300])
+def test_substeps_per_tick_of_an_immense_tick_are_refused(dt: float) -> None:
+    """They are taken at once: a run would not return."""
+    with pytest.raises(SettingError, match="give a dt of at most 100 s"):
+        substeps_per_tick(dt, 200.0)
