@@ -6,9 +6,13 @@ import math
 from collections.abc import Iterator, Mapping
 
 from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.actor import Actor
+
+AT_PLACE = 0.5
+"""A vehicle that is further from its known place on the road does not follow the road [m]."""
 
 
 def declared_trailer(entity: model.Element) -> str | None:
@@ -56,7 +60,8 @@ def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
     """Where the back one stands once the front one is at its place.
 
     The coupler is at the hitch, and the trailer's axle follows the hitch like a wheel on a rod, as a single-track model
-    without slip has it: at the reference point, with several axles where `bar` ends. `straight` puts it in line.
+    without slip has it: at the reference point, with several axles where `bar` ends. `straight` puts it in line. Where
+    one of them is on a slope or bank, the back one lies in the road's surface.
     """
     pose = front.motion.pose
     hitch, reach = _hitch(front), _coupler(back)
@@ -67,7 +72,23 @@ def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
     if behind:
         rolling_x, rolling_y = before.x - behind * math.cos(before.h), before.y - behind * math.sin(before.h)
     heading = pose.h if straight else math.atan2(y - rolling_y, x - rolling_x)
-    return Pose(x - reach * math.cos(heading), y - reach * math.sin(heading), pose.z, heading, pose.p, pose.r)
+    x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
+    if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
+        return Pose(x, y, pose.z, heading, 0.0, 0.0)
+    return _in_the_surface(front, x, y, heading)
+
+
+def _in_the_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
+    """Return the pose on the road below, as high above it as the front one is; without a road, in the plane of that."""
+    roads, here, pose = front.motion.roads, front.motion.location, front.motion.pose
+    if roads is not None and here is not None:
+        below, there = roads.lane_pose_at(*here[:4]), roads.locate_at(x, y, here)
+        if there is not None and math.hypot(below.x - pose.x, below.y - pose.y) < AT_PLACE:
+            ground = roads.lane_pose_at(*there[:4])
+            _, p, r = ground.turned(wrap_angle(heading - ground.h))[3:]
+            return Pose(x, y, pose.z + ground.z - below.z, heading, p, r)
+    ahead = (x - pose.x) * math.cos(pose.h) + (y - pose.y) * math.sin(pose.h)
+    return Pose(x, y, pose.z - ahead * math.tan(pose.p), heading, pose.p, pose.r)
 
 
 def bar(entity: model.Element, reach: float) -> float:

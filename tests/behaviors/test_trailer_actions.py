@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from street_scene import after, everywhere, private
+from street_scene import STREET, after, everywhere, private
 
 from eidrive_scenario.errors import InputError
 
@@ -96,3 +96,29 @@ def test_what_two_draw_follows_the_first_of_them(run: Any) -> None:
     played = run(1, ("A", couple, after(0.5)), driven=False, ego=(1, 900.0, 0.0), more=train, globally=placed)
     assert played.x("A") == pytest.approx([196.0] * len(played.frames))
     assert played.x("Second") == pytest.approx([192.0] * len(played.frames))
+
+
+@pytest.mark.element("ConnectTrailerAction")
+@pytest.mark.parametrize(
+    ("elevation", "height"),
+    [
+        ('<elevation s="0" a="0" b="0.1" c="0" d="0"/>', lambda x: 0.1 * x),
+        ('<elevation s="0" a="0" b="0" c="0" d="0"/><elevation s="210" a="0" b="0" c="0.004" d="0"/>',
+         lambda x: 0.004 * max(x - 210.0, 0.0) ** 2),
+    ],
+)  # fmt: skip
+def test_trailer_on_a_slope_stands_on_the_road(run: Any, elevation: str, height: Any) -> None:
+    street = STREET.replace("<lanes>", f"<elevationProfile>{elevation}</elevationProfile><lanes>")
+    placed = everywhere(PLACE.format("Truck", 200)) + everywhere(PLACE.format("Trailer", 196))
+    played = run(
+        5, ("Truck", COUPLE), ("Truck", DRIVE), driven=False, ego=(1, 900.0, 0.0), more=TRAIN, globally=placed,
+        street=street,
+    )  # fmt: skip
+    for frame in played.frames:
+        for name in ("Truck", "Trailer"):
+            row = frame.view.row(name)
+            x, _, z = frame.view.position[row].tolist()
+            assert z == pytest.approx(height(x), abs=1e-6)
+            climb = (height(x + 1e-4) - height(x - 1e-4)) / 2e-4
+            assert frame.view.pitch[row] == pytest.approx(-math.atan(climb), abs=1e-4)
+    assert played.x("Trailer")[-1] > 240.0
