@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
 
 from eidrive_scenario.errors import MAX_DIAGNOSTICS, Problem, SettingError, quoted, suggestion
 from eidrive_scenario.yaml_text import key_lines as key_lines
@@ -43,32 +44,8 @@ def parse_settings(
     try:
         settings = model.model_validate(dict(data))
     except ValidationError as error:
-        problems = []
-        for finding in error.errors(include_url=False)[:MAX_DIAGNOSTICS]:
-            path = _typed_path(finding["loc"], data)
-            place = _line_of(finding["loc"], lines or {}, line)
-            if finding["type"] == "extra_forbidden":
-                known = _known_keys(model, finding["loc"][:-1])
-                message, remedy = f"unknown setting {quoted(path)}", suggestion(str(finding["loc"][-1]), known)
-            elif finding["type"] == "missing":
-                message, remedy = f"setting {path!r} is missing", "add it"
-            elif finding["type"] == "union_tag_invalid":
-                word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
-                message = f"setting {quoted(path + '.' + key)} is {quoted(word)}"
-                place = _line_of((*finding["loc"], key), lines or {}, line)
-                remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
-            elif finding["type"] == "union_tag_not_found":
-                key = finding["ctx"]["discriminator"].strip("'")
-                message = f"setting {path + '.' + key!r} is missing"
-                remedy = suggestion("", _tags(model, finding["loc"], key))
-            elif finding["type"] in _NO_MAPPING:
-                message = f"setting {path!r} is {quoted(finding['input'])}"
-                remedy = "a mapping is expected: {key: value, …}"
-            else:
-                own = finding["type"] == "value_error"
-                remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-                message = f"setting {path!r} is {quoted(finding['input'])}" if path else "settings do not fit together"
-            problems.append(Problem(message, remedy, source, place))
+        findings = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
+        problems = [_problem(model, data, finding, source, line, lines or {}) for finding in findings]
         raise SettingError(problems) from error
     immense = next(_immense(settings), None)
     if immense is not None:
@@ -77,6 +54,41 @@ def parse_settings(
         what = f"setting {quoted(path)} is {quoted(immense[1])}"
         raise SettingError(Problem(what, f"give a number within {MAX_NUMBER:g}", source, place))
     return settings
+
+
+def _problem(
+    model: type[BaseModel],
+    data: Mapping[str, Any],
+    finding: ErrorDetails,
+    source: str,
+    line: int | None,
+    lines: Mapping[str, int],
+) -> Problem:
+    """What pydantic has found, with the keys as they were typed and the line of the innermost one that is known."""
+    kind, loc = finding["type"], finding["loc"]
+    path = _typed_path(loc, data)
+    place = _line_of(loc, lines, line)
+    if kind == "extra_forbidden":
+        remedy = suggestion(str(loc[-1]), _known_keys(model, loc[:-1]))
+        return Problem(f"unknown setting {quoted(path)}", remedy, source, place)
+    if kind == "missing":
+        return Problem(f"setting {path!r} is missing", "add it", source, place)
+    if kind == "union_tag_invalid":
+        word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
+        remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
+        place = _line_of((*loc, key), lines, line)
+        return Problem(f"setting {quoted(path + '.' + key)} is {quoted(word)}", remedy, source, place)
+    if kind == "union_tag_not_found":
+        key = finding["ctx"]["discriminator"].strip("'")
+        return Problem(
+            f"setting {path + '.' + key!r} is missing", suggestion("", _tags(model, loc, key)), source, place
+        )
+    message = f"setting {path!r} is {quoted(finding['input'])}"
+    if kind in _NO_MAPPING:
+        return Problem(message, "a mapping is expected: {key: value, …}", source, place)
+    own = kind == "value_error"
+    remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
+    return Problem(message if path else "settings do not fit together", remedy, source, place)
 
 
 def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:

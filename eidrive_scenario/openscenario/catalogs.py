@@ -184,7 +184,7 @@ class CatalogLibrary:
             folder
             for place in self._places.values()
             if is_folder(place)
-            for folder in place.parent.iterdir()
+            for folder in _entries(place.parent)
             if is_folder(folder) and folder not in self._places.values()
         }
         for folder in sorted(folders):
@@ -216,6 +216,14 @@ class CatalogLibrary:
 
     def _wrong(self, reference: CatalogReference, message: str, remedy: str) -> None:
         self._findings.error(message, remedy, source=reference.source, line=reference.line)
+
+
+def _entries(folder: Path) -> list[Path]:
+    """The entries of a folder; none of one that may be passed through and not listed."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
 
 
 def catalog_place(directory: str, folder: Path) -> Path:

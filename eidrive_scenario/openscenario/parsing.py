@@ -57,12 +57,7 @@ def open_document(source: Source) -> Document:
         return Document(parse(source, "<bytes>"), "<bytes>", None, Path(), source, _digest(source))
     if not isinstance(source, str | Path):
         return _from_tree(source)
-    path = Path(source)
-    try:
-        content = read_regular_file(path, LIMITS.max_bytes)
-    except OSError as error:
-        problem = Problem(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(source)))
-        raise ScenarioError(problem) from error
+    path, content = Path(source), _content(source)
     return Document(parse(content, str(source)), str(source), path, path.parent, digest=_digest(content))
 
 
@@ -71,8 +66,16 @@ def text_of(source: Source) -> bytes:
     if isinstance(source, bytes):
         return source
     if isinstance(source, str | Path):
-        return read_regular_file(source, LIMITS.max_bytes)
+        return _content(source)
     return etree.tostring(open_document(source).root, encoding="utf-8", xml_declaration=True)
+
+
+def _content(path: str | Path) -> bytes:
+    try:
+        return read_regular_file(path, LIMITS.max_bytes)
+    except OSError as error:
+        problem = Problem(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
+        raise ScenarioError(problem) from error
 
 
 def _from_tree(source: Any) -> Document:

@@ -204,3 +204,18 @@ def test_a_scenario_that_has_the_name_of_a_catalog_is_none(
     shelf("Drivers.xosc", "", "").write_bytes(scenario_xml())
     with pytest.raises(ScenarioError, match=r"no catalog 'Drivers' in"):
         load_scenario(scene(reference("Drivers", "driver")))
+
+
+def test_catalog_in_none_of_the_places_beside_a_folder_that_cannot_be_listed_is_an_error(
+    scene: Callable[..., Path], shelf: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder may be passed through without the right to list it."""
+    shelf("other.xosc", "other", CONTROLLER.format(limit="3"))
+    path = scene('<CatalogReference catalogName="drivers" entryName="driver"/>')
+
+    def refused(folder: Path) -> None:
+        raise PermissionError(13, "Permission denied", str(folder))
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    with pytest.raises(ScenarioError, match="no catalog 'drivers'"):
+        load_scenario(path)

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.openscenario import load_scenario, model
+from eidrive_scenario.openscenario import load_scenario, model, text_of
 
 Build = Callable[..., bytes]
 Text = Callable[..., str]
@@ -166,3 +166,10 @@ class TestRoadFile:
 
     def test_none_is_named(self, scenario_xml: Build) -> None:
         assert load_scenario(scenario_xml()).road_file is None
+
+
+def test_text_of_a_file_that_is_gone_is_an_error_of_the_input(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"gone\.xosc: cannot be read: No such file"):
+        text_of(tmp_path / "gone.xosc")
+    with pytest.raises(ScenarioError, match="cannot be read: the path leads to a folder"):
+        text_of(tmp_path)
