@@ -134,6 +134,7 @@ def test_keyboard_interrupt_of_extension_interrupts_the_run(
     ("extensions", "problem"),
     [
         ({"detector": "returns_nan"}, "detect returned boxes with the value nan (expected finite numbers)"),
+        ({"detector": "negative_size"}, "detect returned a length, width or height with the value -4.5 (expected 0"),
         ({"detector": "returns_none"}, "detect returned None (expected Detections)"),
         ({"detector": "list_of_boxes"}, "detect returned an object of type list (expected Detections)"),
         ({"detector": "no_signals", "signals": True}, "signals returned None (expected SignalReadings)"),
@@ -141,6 +142,7 @@ def test_keyboard_interrupt_of_extension_interrupts_the_run(
         ({"fusion": "fusion_none"}, "fuse returned None (expected Detections)"),
         ({"planner": "planner_none"}, "plan returned None (expected Plan)"),
         ({"planner": "planner_nan"}, "plan returned speeds with the value nan (expected finite numbers)"),
+        ({"planner": "planner_absurd"}, "plan returned speeds with the value 1e+300 (expected -10000 to 10000)"),
         ({"planner": "planner_one_point"}, "plan returned points of shape (1, 2) and speeds of shape (1,) (expected"),
         ({"planner": "planner_stands"}, "plan returned points 0 and 1 at the same place [0.0, 0.0] (expected a line)"),
         ({"channel": "{model: faulty, fault: nan}"}, "ValueError: the delay of a message to 'Other' is nan"),

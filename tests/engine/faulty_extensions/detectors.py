@@ -118,6 +118,12 @@ class ReturnsNaN(Detector):
         return Detections(readings.time, boxes, np.ones(1), ("car",), np.zeros((1, 2)), np.zeros((1, 2, 2)))
 
 
+class NegativeSize(Detector):
+    def detect(self, readings):
+        boxes = np.array([[30.0, 0.0, 0.75, -4.5, 1.8, 1.5, 0.0]])
+        return Detections(readings.time, boxes, np.ones(1), ("car",), np.zeros((1, 2)), np.zeros((1, 2, 2)))
+
+
 class ReturnsNone(Detector):
     def detect(self, readings):
         return None

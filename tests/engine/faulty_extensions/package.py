@@ -45,6 +45,7 @@ POINTS = {
         "raises": "Raises",
         "raises_in_numpy": "RaisesInNumpy",
         "returns_nan": "ReturnsNaN",
+        "negative_size": "NegativeSize",
         "returns_none": "ReturnsNone",
         "wrong_shape": "WrongShape",
         "list_of_boxes": "ListOfBoxes",
@@ -63,6 +64,7 @@ POINTS = {
     "planners": {
         "planner_none": "PlannerNone",
         "planner_nan": "PlannerNaN",
+        "planner_absurd": "PlannerAbsurd",
         "planner_one_point": "PlannerOnePoint",
         "planner_stands": "PlannerStands",
         "planner_static_raises": "PlannerStaticRaises",

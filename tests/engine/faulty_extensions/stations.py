@@ -30,6 +30,12 @@ class PlannerNaN(RoutePlanner):
         return Plan(plan.points, plan.speeds * math.nan, "undefined")
 
 
+class PlannerAbsurd(RoutePlanner):
+    def plan(self, ego, objects, goal, now):
+        plan = super().plan(ego, objects, goal, now)
+        return Plan(plan.points, np.full(len(plan.speeds), 1e300), "absurd")
+
+
 class PlannerOnePoint(RoutePlanner):
     def plan(self, ego, objects, goal, now):
         plan = super().plan(ego, objects, goal, now)
