@@ -100,3 +100,24 @@ def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
     asks_for_more.write_text(TINY.read_text().replace("exteriorLights BIT", "gear INTEGER (0..7), exteriorLights BIT"))
     with pytest.raises(SettingError, match=r"no cam: .*member 'gear' not found …; docs/channels.md"):
         Asn1Encoder([asks_for_more], ["cam"])
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        "CAM ::= CAM",
+        "CAM ::= SEQUENCE { a CAM }",
+        f"CAM ::= INTEGER (0..{'9' * 5000})",
+        f"CAM ::= BIT STRING (SIZE({'9' * 400}))",
+        f"CAM ::= {'SEQUENCE { a ' * 200}NULL{'}' * 200}",
+        "CAM ::= SEQUENCE { a CLASS }",
+        "CAM{X} ::= NULL",
+    ],
+    ids=str,
+)
+def test_encoder_of_a_hostile_module_is_refused(tmp_path: Path, types: str) -> None:
+    path = tmp_path / "hostile.asn"
+    path.write_text(f"M DEFINITIONS AUTOMATIC TAGS ::= BEGIN\n{types}\nEND\n")
+    with pytest.raises(SettingError) as caught:
+        Asn1Encoder([path], ["cam"], source="scene.xosc", line=7)
+    assert all((problem.source, problem.line) == ("scene.xosc", 7) for problem in caught.value.problems)
