@@ -115,9 +115,7 @@ class LognormalDelay(_RandomDelay):
 
     def quantile(self, u: float) -> float:
         """The delay that a share `u` of all messages does not exceed [s]."""
-        ratio = self.sd / self.mean
-        # The square of a larger ratio may be infinite.
-        variance = math.log1p(ratio**2) if ratio < 1e150 else 2.0 * (math.log(self.sd) - math.log(self.mean))
+        variance = math.log1p((self.sd / self.mean) ** 2)
         exponent = math.log(self.mean) - variance / 2.0 + math.sqrt(variance) * float(ndtri(u))
         return self.minimum + math.exp(exponent)
 

@@ -132,7 +132,7 @@ def test_a_larger_mean_delays_every_single_message_more() -> None:
         assert first < second
 
 
-@pytest.mark.parametrize(("mean", "sd"), [(0.1, 0.05), (1e-3, 10.0), (1e-80, 1e80), (1e-300, 1e10), (1e-320, 0.008)])
+@pytest.mark.parametrize(("mean", "sd"), [(0.1, 0.05), (1e-3, 10.0), (1e-9, 1e6), (1e6, 1e6)])
 def test_lognormal_delay_of_any_mean_and_sd_has_its_median(mean: float, sd: float) -> None:
     """The median of a lognormal distribution is mean / sqrt(1 + (sd / mean)²), here 0 beside the minimum or not."""
     delay = LognormalDelay(kind="lognormal", mean=mean, sd=sd, minimum=0.02)
