@@ -177,7 +177,7 @@ def test_values_and_stand_ins_for_nobody_are_told(eidrive: Eidrive, passing_by: 
 
 
 def test_very_long_steps_take_no_memory(eidrive: Eidrive) -> None:
-    assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "1000", "--time-limit", "1000").exit_code == 0
+    assert eidrive("run", "coop/scenario_1", "--no-record", "--dt", "100", "--time-limit", "1000").exit_code == 0
 
 
 def test_what_is_slower_than_real_time_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
