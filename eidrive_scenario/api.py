@@ -8,10 +8,10 @@ from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import (
+    Diagnostic,
     EidriveError,
     ExtensionError,
     InputError,
-    Problem,
     ScenarioError,
     SettingError,
     SimulationError,
@@ -91,6 +91,7 @@ __all__ = [
     "CustomCommand",
     "Detections",
     "Detector",
+    "Diagnostic",
     "Domain",
     "EgoState",
     "EidriveError",
@@ -120,7 +121,6 @@ __all__ = [
     "Plan",
     "Planner",
     "Pose",
-    "Problem",
     "Progress",
     "QuantityCondition",
     "Readings",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from eidrive_scenario.errors import InputError, Problem, ScenarioError, suggestion
+from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, suggestion
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import CustomCommandAction
@@ -40,18 +40,18 @@ def check_commands(scenario: Scenario) -> None:
         ),
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for command in scenario.custom_commands:
         if not command.type.startswith(PREFIX):
             continue
         reader = readers.get(command.type)
         if reader is None:
             what = f"unknown command type {command.type!r}"
-            problems.append(Problem(what, suggestion(command.type, readers), command.source, command.line))
+            problems.append(Diagnostic(what, suggestion(command.type, readers), command.source, command.line))
             continue
         try:
             reader(command)
         except InputError as error:
-            problems += error.problems
+            problems += error.diagnostics
     if problems:
         raise ScenarioError(list(dict.fromkeys(problems)))

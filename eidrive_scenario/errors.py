@@ -30,25 +30,25 @@ _MAX_CANDIDATES = 2000
 
 
 @dataclass(frozen=True)
-class Problem:
+class Diagnostic:
     """One thing that is wrong with an input, where it stands, and what would be right."""
 
     message: str
-    remedy: str = ""
+    hint: str = ""
     source: str = ""
     line: int | None = None
     rule: str = ""
     """Which rule of `eidrive check` found it, where one did; docs/checks.md says more about it."""
 
     def __post_init__(self) -> None:
-        if len(self.message) > MAX_TEXT or len(self.remedy) > MAX_TEXT:
+        if len(self.message) > MAX_TEXT or len(self.hint) > MAX_TEXT:
             object.__setattr__(self, "message", shortened(self.message))
-            object.__setattr__(self, "remedy", shortened(self.remedy))
+            object.__setattr__(self, "hint", shortened(self.hint))
 
     def __str__(self) -> str:
         place = f"{self.source}:{self.line}" if self.line is not None else self.source
         head = f"{place}: {self.message}" if place else self.message
-        return f"{head}; {self.remedy}" if self.remedy else head
+        return f"{head}; {self.hint}" if self.hint else head
 
 
 class EidriveError(Exception):
@@ -56,14 +56,14 @@ class EidriveError(Exception):
 
 
 class InputError(EidriveError):
-    """The input is wrong. `problems` lists every finding, in the order of the file."""
+    """Invalid input. `diagnostics` holds all diagnostics in the order of the file."""
 
-    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
-        self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+    def __init__(self, problems: Diagnostic | Sequence[Diagnostic]) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = (problems,) if isinstance(problems, Diagnostic) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.diagnostics))
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Problem, ...]]]:
-        return type(self), (self.problems,)
+    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Diagnostic, ...]]]:
+        return type(self), (self.diagnostics,)
 
 
 class ScenarioError(InputError):
@@ -184,14 +184,14 @@ class InvalidResult(Exception):
         self.method = method
 
 
-class Together:
+class ErrorCollector:
     """Runs several checks to tell all that they find at once.
 
     Within `with together:` an InputError ends the block and is kept; `settle` raises one with all problems, if any.
     """
 
     def __init__(self) -> None:
-        self._problems: list[Problem] = []
+        self._problems: list[Diagnostic] = []
 
     def __enter__(self) -> None:
         return None
@@ -199,20 +199,20 @@ class Together:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
         if not isinstance(error, InputError):
             return False
-        self._problems += error.problems
+        self._problems += error.diagnostics
         return True
 
-    def settle(self) -> None:
+    def raise_if_any(self) -> None:
         """Raise InputError with every problem found, each once."""
         if self._problems:
             raise InputError(list(dict.fromkeys(self._problems)))
 
 
-def capped(problems: Sequence[Problem]) -> list[Problem]:
+def capped(problems: Sequence[Diagnostic]) -> list[Diagnostic]:
     """The first MAX_DIAGNOSTICS of several diagnostics, and one that counts the others."""
     shown = list(problems[:MAX_DIAGNOSTICS])
     if len(problems) > MAX_DIAGNOSTICS:
-        shown.append(Problem(f"{len(problems) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
+        shown.append(Diagnostic(f"{len(problems) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
     return shown
 
 

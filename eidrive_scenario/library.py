@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal
 
-from eidrive_scenario.errors import Problem, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.files import MIB, absolute, is_folder, is_regular_file, read_regular_file
 from eidrive_scenario.untrusted_xml import first_elements
 
@@ -28,7 +28,7 @@ def library_path() -> Path:
     for folder in (package / "library", package.parent / "xosc"):
         if folder.is_dir():
             return folder
-    raise SettingError(Problem("the scenario library is missing", "install the package again", str(package)))
+    raise SettingError(Diagnostic("the scenario library is missing", "install the package again", str(package)))
 
 
 def scenarios() -> list[str]:
@@ -54,9 +54,9 @@ def resolve_scenario(name: str | Path) -> Path:
     if inside is not None:
         return inside
     if str(name) and is_folder(path):
-        raise SettingError(Problem(f"{quoted(str(name))} is a folder", "give one .xosc file"))
+        raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
     remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
-    raise SettingError(Problem(f"no scenario {quoted(str(name))}: neither a file nor in the library", remedy))
+    raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", remedy))
 
 
 def from_library(name: str | Path) -> Path:
@@ -112,7 +112,7 @@ def resolve(kind: Kind, name: str | Path) -> Path:
         return inside
     singular = "channel profile" if kind == "channels" else "weather preset"
     remedy = suggestion(str(name), names(kind))
-    raise SettingError(Problem(f"no {singular} {quoted(str(name))}: neither a file nor in the library", remedy))
+    raise SettingError(Diagnostic(f"no {singular} {quoted(str(name))}: neither a file nor in the library", remedy))
 
 
 def _check_letters(path: Path) -> None:
@@ -122,7 +122,7 @@ def _check_letters(path: Path) -> None:
     except UnicodeEncodeError:
         shown = os.fsencode(path).decode(errors="backslashreplace")
         remedy = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
-        raise SettingError(Problem("the name has bytes that are no letters here", remedy, shown)) from None
+        raise SettingError(Diagnostic("the name has bytes that are no letters here", remedy, shown)) from None
 
 
 def definition(path: Path) -> Definition:

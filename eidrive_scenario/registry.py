@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from eidrive_scenario.errors import InvalidResult, Problem, RegistryError, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError, suggestion
 
 GROUPS = ("actions", "conditions", "criteria", "detectors", "channels", "fusion", "planners", "controllers")
 _SINGULAR = {"criteria": "criterion", "fusion": "fusion method", "controllers": "controller model"}
@@ -63,7 +63,7 @@ class Registry:
         point = self._points.get(name)
         if point is None:
             what = self.kind.removesuffix("s")
-            raise SettingError(Problem(f"unknown {what} {name!r}", suggestion(name, self._points)))
+            raise SettingError(Diagnostic(f"unknown {what} {name!r}", suggestion(name, self._points)))
         found = self._import(point)
         if found in _checked.get((self.kind, name, base), ()):
             return found

@@ -8,7 +8,7 @@ from operator import index
 from pathlib import Path
 from typing import Any, Protocol, SupportsIndex
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
@@ -55,12 +55,12 @@ class RunSettings:
         """Raise SettingError for stations that are given as one text, and for a time limit that ends no run."""
         senders: Any = self.cooperate
         if isinstance(senders, str):
-            raise SettingError(Problem(f"cooperate is the text {senders!r}", "give a tuple of station names"))
+            raise SettingError(Diagnostic(f"cooperate is the text {senders!r}", "give a tuple of station names"))
         if senders is not None and not isinstance(senders, tuple):
             names = sorted(senders) if isinstance(senders, Set) else senders
             object.__setattr__(self, "cooperate", tuple(names))
         if not self.time_limit > 0.0:
-            raise SettingError(Problem(f"time_limit is {self.time_limit}", "give a positive number of seconds"))
+            raise SettingError(Diagnostic(f"time_limit is {self.time_limit}", "give a positive number of seconds"))
 
 
 def checked_seed(seed: SupportsIndex) -> int:
@@ -68,7 +68,7 @@ def checked_seed(seed: SupportsIndex) -> int:
     try:
         return index(seed)
     except TypeError:
-        raise SettingError(Problem(f"the seed is {seed!r}", "give an integer")) from None
+        raise SettingError(Diagnostic(f"the seed is {seed!r}", "give an integer")) from None
 
 
 @dataclass(frozen=True)
@@ -176,5 +176,7 @@ def checked_observer(observer: Observer) -> Observer:
     for method in ("observe", "close"):
         if not callable(getattr(observer, method, None)):
             name = type(observer).__name__
-            raise SettingError(Problem(f"observer {name} has no method {method}", "define observe(frame) and close()"))
+            raise SettingError(
+                Diagnostic(f"observer {name} has no method {method}", "define observe(frame) and close()")
+            )
     return observer

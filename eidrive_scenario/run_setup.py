@@ -9,7 +9,7 @@ from eidrive_scenario.commands import check_commands
 from eidrive_scenario.driving.area_checks import areas_off_road
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay, short_detector_latencies
-from eidrive_scenario.errors import Problem, Together
+from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.recording.criteria_text import stop_trigger_criteria, unbuilt_criteria
@@ -44,7 +44,7 @@ def set_up_run(
     source: Scenario | Source | ConcreteRun, seed: int, settings: RunSettings, *, load_weights: bool
 ) -> RunSetup:
     """Load a scenario for a seed and build all parts of its run. Raise InputError with everything that is wrong."""
-    together = Together()
+    together = ErrorCollector()
     scenario = load_for_run(source, seed, settings.parameters, together)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     criteria: tuple[Criterion, ...] = ()
@@ -70,7 +70,7 @@ def set_up_run(
     with together:
         if settings.weather is not None:
             weather = load_weather(settings.weather, origin="--weather")
-    together.settle()
+    together.raise_if_any()
     warnings = tuple(map(str, _warnings(scenario, roads, stations, settings)))
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
@@ -80,11 +80,11 @@ def set_up_run(
 
 def _warnings(
     scenario: Scenario, roads: RoadNetwork | None, stations: Stations, settings: RunSettings
-) -> Iterator[Problem]:
+) -> Iterator[Diagnostic]:
     """Everything that is doubtful about a run and known before it."""
     yield from scenario.warnings
     yield from unbuilt_criteria(scenario)
-    yield from roads.doubts if roads is not None else ()
+    yield from roads.map_warnings if roads is not None else ()
     yield from areas_off_road(scenario, stations.settings, roads)
     yield from short_detector_latencies(stations.settings, settings.dt)
     if settings.channel is not None:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from eidrive_scenario.errors import MAX_DIAGNOSTICS, Problem, SettingError, quoted, suggestion
+from eidrive_scenario.errors import MAX_DIAGNOSTICS, Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.yaml_text import key_lines as key_lines
 from eidrive_scenario.yaml_text import load_yaml as load_yaml
 from eidrive_scenario.yaml_text import load_yaml_file as load_yaml_file
@@ -52,7 +52,7 @@ def parse_settings(
         place = _line_of(immense[0], lines or {}, line)
         path = _typed_path(immense[0], data)
         what = f"setting {quoted(path)} is {quoted(immense[1])}"
-        raise SettingError(Problem(what, f"give a number within {MAX_NUMBER:g}", source, place))
+        raise SettingError(Diagnostic(what, f"give a number within {MAX_NUMBER:g}", source, place))
     return settings
 
 
@@ -63,32 +63,32 @@ def _problem(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
-) -> Problem:
+) -> Diagnostic:
     """What pydantic has found, with the keys as they were typed and the line of the innermost one that is known."""
     kind, loc = finding["type"], finding["loc"]
     path = _typed_path(loc, data)
     place = _line_of(loc, lines, line)
     if kind == "extra_forbidden":
         remedy = suggestion(str(loc[-1]), _known_keys(model, loc[:-1]))
-        return Problem(f"unknown setting {quoted(path)}", remedy, source, place)
+        return Diagnostic(f"unknown setting {quoted(path)}", remedy, source, place)
     if kind == "missing":
-        return Problem(f"setting {path!r} is missing", "add it", source, place)
+        return Diagnostic(f"setting {path!r} is missing", "add it", source, place)
     if kind == "union_tag_invalid":
         word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
         remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
         place = _line_of((*loc, key), lines, line)
-        return Problem(f"setting {quoted(path + '.' + key)} is {quoted(word)}", remedy, source, place)
+        return Diagnostic(f"setting {quoted(path + '.' + key)} is {quoted(word)}", remedy, source, place)
     if kind == "union_tag_not_found":
         key = finding["ctx"]["discriminator"].strip("'")
-        return Problem(
+        return Diagnostic(
             f"setting {path + '.' + key!r} is missing", suggestion("", _tags(model, loc, key)), source, place
         )
     message = f"setting {path!r} is {quoted(finding['input'])}"
     if kind in _NO_MAPPING:
-        return Problem(message, "a mapping is expected: {key: value, …}", source, place)
+        return Diagnostic(message, "a mapping is expected: {key: value, …}", source, place)
     own = kind == "value_error"
     remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-    return Problem(message if path else "settings do not fit together", remedy, source, place)
+    return Diagnostic(message if path else "settings do not fit together", remedy, source, place)
 
 
 def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 from lxml import etree
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.xml_lines import parse_numbered
 
 MAX_DEPTH = 100
@@ -47,7 +47,7 @@ def parse_untrusted(
     content: bytes,
     source: str,
     limits: XmlLimits,
-    error: Callable[[Problem], InputError],
+    error: Callable[[Diagnostic], InputError],
     *,
     remove_comments: bool = False,
 ) -> etree._Element:
@@ -57,7 +57,7 @@ def parse_untrusted(
     """
 
     def refuse(message: str, remedy: str, line: int | None) -> NoReturn:
-        raise error(Problem(message, remedy, source, line))
+        raise error(Diagnostic(message, remedy, source, line))
 
     if len(content) > limits.max_bytes:
         refuse(f"the file is larger than {limits.max_bytes // 2**20} MiB", "split it", None)

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from types import FrameType, TracebackType
 from typing import IO, Any
 
-from eidrive_scenario.errors import Problem, SettingError, WallLimitError
+from eidrive_scenario.errors import Diagnostic, SettingError, WallLimitError
 
 REPEAT = 1.0
 """Time from one interruption to the next [s]."""
@@ -87,7 +87,7 @@ def set_last_resort(resort: LastResort | None) -> LastResort | None:
 def check_wall_limit(seconds: float | None, origin: str = "wall_limit") -> None:
     """Raise SettingError unless the limit is None or a positive number of seconds."""
     if seconds is not None and not 0.0 < seconds < math.inf:
-        raise SettingError(Problem(f"{origin} is {seconds}", "give a positive number of seconds"))
+        raise SettingError(Diagnostic(f"{origin} is {seconds}", "give a positive number of seconds"))
 
 
 @contextmanager

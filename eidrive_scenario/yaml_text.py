@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files import read_regular_file, reason_of
 
 MAX_YAML = 2**17
@@ -119,7 +119,7 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
     mistake, counted from `line` if given.
     """
     if len(text) > MAX_YAML:
-        problem = Problem(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
+        problem = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
         raise SettingError(problem)
     try:
         return yaml.load(text, _Loader)
@@ -129,10 +129,10 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
         what = getattr(error, "problem", None) or "a character is not allowed"
         what = what if quote else _QUOTED.sub("…", what)
         hint = "write the value out in each place" if what in (_ALIAS, _MERGE) else "check the syntax there"
-        raise SettingError(Problem(f"not valid YAML: {what}", hint, source, place)) from error
+        raise SettingError(Diagnostic(f"not valid YAML: {what}", hint, source, place)) from error
     except (ValueError, ArithmeticError) as error:  # what looks like a date or a number and is none
         what = f"not valid YAML: {_QUOTED.sub('…', str(error))}"
-        raise SettingError(Problem(what, "put it in quotes", source, line)) from error
+        raise SettingError(Diagnostic(what, "put it in quotes", source, line)) from error
 
 
 def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
@@ -141,7 +141,7 @@ def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
         text = read_regular_file(path, 4 * MAX_YAML).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = "it is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
-        raise SettingError(Problem(f"cannot read: {reason}", "give the path of a YAML file", str(path))) from error
+        raise SettingError(Diagnostic(f"cannot read: {reason}", "give the path of a YAML file", str(path))) from error
     return load_yaml(text, source=str(path), quote=False), key_lines(text)
 
 

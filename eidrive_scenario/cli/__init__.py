@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.check import check
-from eidrive_scenario.cli.failures import BROKEN, Guarded, tell
+from eidrive_scenario.cli.error_output import BROKEN, Guarded, print_error
 from eidrive_scenario.cli.run import run
 from eidrive_scenario.cli.show import list_names, report, tree, view
 from eidrive_scenario.cli.streams import make_writable
@@ -60,5 +60,5 @@ def main() -> None:
         app()
     except OSError as error:
         # Help and usage errors are printed before a command runs.
-        tell(error)
+        print_error(error)
         raise SystemExit(BROKEN) from error

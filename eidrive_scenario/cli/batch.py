@@ -7,8 +7,8 @@ from pathlib import Path
 
 import typer
 
-from eidrive_scenario.cli.failures import WRONG_INPUT
-from eidrive_scenario.errors import ConstraintError, InputError, Problem, ScenarioError, SettingError
+from eidrive_scenario.cli.error_output import WRONG_INPUT
+from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
 from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution
 
 Play = Callable[[ConcreteRun], int]
@@ -50,7 +50,7 @@ def play_all(path: Path, play: Play, *, seed: int, most: int | None, parameters:
         counts["not passed" if result else "passed"] += 1
         code = max(code, result)
     if last is not None and counts["ruled out by constraints"] == len(numbers):
-        raise ScenarioError(last.problems)
+        raise ScenarioError(last.diagnostics)
     counts["not asked for"] = len(unfolding) - len(numbers)
     told = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
     typer.echo(f"{len(unfolding)} runs in {path}: {told}", err=True)
@@ -64,7 +64,9 @@ def _runs(unfolding: Unfolding, numbers: Sequence[int]) -> Iterator[ConcreteRun]
 def _refuse_varied(unfolding: Unfolding, parameters: Mapping[str, object]) -> None:
     varied = unfolding.varied.names
     problems = [
-        Problem(f"--param {name!r} would undo what the distribution varies", "leave it out", origin.source, origin.line)
+        Diagnostic(
+            f"--param {name!r} would undo what the distribution varies", "leave it out", origin.source, origin.line
+        )
         for name, origin in varied.items()
         if name in parameters
     ]

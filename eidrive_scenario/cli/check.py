@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.failures import BROKEN, WRONG_INPUT, tell
+from eidrive_scenario.cli.error_output import BROKEN, WRONG_INPUT, print_error
 from eidrive_scenario.cli.hung_check import HungCheck
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.library import definition, resolve_scenario
 from eidrive_scenario.wall_limit import LimitReached, check_wall_limit, limit_wall_time
 
 if TYPE_CHECKING:
-    from eidrive_scenario.experiments.inspection import Findings
+    from eidrive_scenario.experiments.scenario_checks import CheckReport
 
 _SUFFIX = ".xosc"
 _ROADS = ".xodr"
@@ -40,16 +40,16 @@ def check(
 
     Findings end with the rule that made them: `eidrive list checks` names all rules.
     """
-    from eidrive_scenario.experiments.distribution_inspection import DistributionFindings
+    from eidrive_scenario.experiments.distribution_checks import DistributionCheckReport
 
     hung = HungCheck()
     if wall_limit is not None:
         check_wall_limit(wall_limit, "--wall-limit")
         supervise(hung.end, partial(hung.report_dump, wall_limit), "check")
-    missing: list[Problem] = []
+    missing: list[Diagnostic] = []
     broken: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
-    told: dict[str, dict[Problem, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
+    told: dict[str, dict[Diagnostic, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
     for problem in missing:
         typer.echo(str(problem))
     for path in files:
@@ -61,7 +61,7 @@ def check(
         except (Exception, SystemExit) as error:
             if context.find_root().params.get("traceback"):
                 raise
-            tell(error, path)
+            print_error(error, path)
             broken.append(error)
             continue
         for level, found in zip(told, (findings.problems, findings.warnings, findings.notes), strict=True):
@@ -69,7 +69,7 @@ def check(
                 if problem not in told[level]:
                     typer.echo(f"{problem}{_mark(level, problem.rule)}")
             told[level].update(dict.fromkeys(found))
-        if isinstance(findings, DistributionFindings) and findings.runs:
+        if isinstance(findings, DistributionCheckReport) and findings.runs:
             typer.echo(f"{path}: {_count(findings.runs, 'run')}")
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in told.items())]
     typer.echo(", ".join(counts if told["note"] else counts[:-1]))
@@ -78,11 +78,11 @@ def check(
     raise typer.Exit(WRONG_INPUT if told["problem"] or (strict and told["warning"]) else 0)
 
 
-def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> Findings:
+def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
     """What is wrong with a file of any kind. Raises WallLimitError if that takes longer than the limit [s]."""
     from eidrive_scenario.attribution import report_extension
-    from eidrive_scenario.experiments.distribution_inspection import inspect_distribution
-    from eidrive_scenario.experiments.inspection import inspect_catalog, inspect_roads, inspect_scenario
+    from eidrive_scenario.experiments.distribution_checks import check_distribution
+    from eidrive_scenario.experiments.scenario_checks import check_road_file, check_scenario, inspect_catalog
 
     with limit_wall_time(wall_limit):
         try:
@@ -90,8 +90,8 @@ def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> 
             if kind == "catalog":
                 return inspect_catalog(path, ignored)
             if kind == "roads" or path.suffix == _ROADS:
-                return inspect_roads(path, ignored)
-            return (inspect_distribution if kind == "distribution" else inspect_scenario)(path, ignored)
+                return check_road_file(path, ignored)
+            return (check_distribution if kind == "distribution" else check_scenario)(path, ignored)
         except LimitReached as error:
             report_extension(error)  # names the extension that was running, if one was
             raise
@@ -105,7 +105,7 @@ def _mark(level: str, rule: str) -> str:
     return "" if level == "problem" else f" ({word})"
 
 
-def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
+def _files(paths: list[str], missing: list[Diagnostic]) -> Iterator[Path]:
     """The files that are meant; what is not there goes to `missing` and keeps no other from being checked.
 
     A folder stands for its scenarios, which are checked with their roads; one without any for its road files.
@@ -115,11 +115,11 @@ def _files(paths: list[str], missing: list[Problem]) -> Iterator[Path]:
             try:
                 yield resolve_scenario(given)
             except InputError as error:
-                missing += error.problems
+                missing += error.diagnostics
             continue
         inside = _below(given, _SUFFIX) or _below(given, _ROADS)
         if not inside:
-            missing.append(Problem(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
+            missing.append(Diagnostic(f"no {_SUFFIX} or {_ROADS} file in {given!r}", "give another folder"))
         yield from inside
 
 

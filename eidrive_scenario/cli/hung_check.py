@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from eidrive_scenario.cli.failures import BROKEN, tell
+from eidrive_scenario.cli.error_output import BROKEN, print_error
 
 if TYPE_CHECKING:
     from eidrive_scenario.wall_limit import Limit
@@ -25,7 +25,7 @@ class HungCheck:
         from eidrive_scenario.attribution import wall_limit_error
 
         try:
-            tell(wall_limit_error(frame, limit.seconds), self.file)
+            print_error(wall_limit_error(frame, limit.seconds), self.file)
             sys.stdout.flush()
             sys.stderr.flush()
         finally:
@@ -38,4 +38,4 @@ class HungCheck:
         """
         from eidrive_scenario.hung_runs import describe_dump
 
-        tell(describe_dump(limit, dump))
+        print_error(describe_dump(limit, dump))

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 def check_places(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
@@ -24,7 +24,7 @@ def check_places(written: Mapping[str, str | Path | None], read: Iterable[str | 
             continue
         real = os.path.realpath(place)
         if real in inputs:
-            raise SettingError(Problem(f"{option} would overwrite what is read", "choose another place", str(place)))
+            raise SettingError(Diagnostic(f"{option} would overwrite what is read", "choose another place", str(place)))
         if real in taken:
-            raise SettingError(Problem(f"{taken[real]} and {option} name one file", "give each its own", str(place)))
+            raise SettingError(Diagnostic(f"{taken[real]} and {option} name one file", "give each its own", str(place)))
         taken[real] = option

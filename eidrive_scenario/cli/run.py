@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from eidrive_scenario.cli.failures import BROKEN
+from eidrive_scenario.cli.error_output import BROKEN
 from eidrive_scenario.cli.places import check_places
 from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import EidriveError, InputError, Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError
 
 PRINTED = "-"
 """Instead of a file: standard output."""
@@ -98,7 +98,7 @@ def run(
     from eidrive_scenario.simulation import RunSettings
 
     if json and log == PRINTED:
-        raise SettingError(Problem("--log - and --json would both print", "give the log a file"))
+        raise SettingError(Diagnostic("--log - and --json would both print", "give the log a file"))
 
     failures = RunFailures(scenario, json=json, traceback=bool(ctx.find_root().params.get("traceback")))
     if wall_limit is not None:
@@ -162,7 +162,9 @@ def run(
     if definition(path) == "distribution":
         raise typer.Exit(play_all(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
     if max_runs is not None:
-        raise SettingError(Problem(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path)))
+        raise SettingError(
+            Diagnostic(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path))
+        )
     raise typer.Exit(play_seeds(path))
 
 
@@ -176,7 +178,7 @@ def _senders(text: str | None) -> tuple[str, ...] | None:
         return None
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names:
-        raise SettingError(Problem(f"--cooperate {text!r} names nobody", "write none for no cooperation"))
+        raise SettingError(Diagnostic(f"--cooperate {text!r} names nobody", "write none for no cooperation"))
     return () if names == ("none",) else names
 
 
@@ -185,12 +187,12 @@ def _assigned(option: str, assignments: list[str]) -> dict[str, str]:
     for assignment in assignments:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
-            raise SettingError(Problem(f"{option} {assignment!r} assigns nothing", f"write {option} NAME=VALUE"))
+            raise SettingError(Diagnostic(f"{option} {assignment!r} assigns nothing", f"write {option} NAME=VALUE"))
         values[name] = value
     return values
 
 
 def _positive(option: str, value: float) -> float:
     if not 0 < value < float("inf"):
-        raise SettingError(Problem(f"{option} is {value}", "give a positive number of seconds"))
+        raise SettingError(Diagnostic(f"{option} is {value}", "give a positive number of seconds"))
     return value

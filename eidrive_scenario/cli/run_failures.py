@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from eidrive_scenario.cli.failures import BROKEN, show_traceback, tell
+from eidrive_scenario.cli.error_output import BROKEN, print_error, show_traceback
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.errors import EidriveError, SimulationError
 
@@ -48,7 +48,7 @@ class RunFailures:
     def report(self, error: EidriveError) -> None:
         """Report the error of the present run, with its traceback where that is wanted."""
         self._print_json(error)
-        (show_traceback if self._traceback else tell)(error)
+        (show_traceback if self._traceback else print_error)(error)
 
     def end_hung_run(self, limit: Limit, frame: FrameType | None) -> None:
         """Report a run that executes this frame and cannot be interrupted, and end the process."""
@@ -59,7 +59,7 @@ class RunFailures:
             error.add_note(note)
         try:
             self._print_json(error)
-            tell(error)
+            print_error(error)
             sys.stdout.flush()
             sys.stderr.flush()
         finally:
@@ -83,7 +83,7 @@ class RunFailures:
             for note in notes:
                 error.add_note(note)
         self._print_json(error)
-        tell(error)
+        print_error(error)
 
     def _print_json(self, error: EidriveError) -> None:
         """Print the run's object, where results are printed as such."""

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from eidrive_scenario.cli.places import check_places
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 class Names(StrEnum):
@@ -46,7 +46,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         from eidrive_scenario.experiments.rules import ALL_RULES
 
         width = max(len(rule.name) for rule in ALL_RULES)
-        lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.about}" for rule in ALL_RULES]
+        lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.summary}" for rule in ALL_RULES]
     else:
         known = registry(what.value)
         width = max(map(len, known), default=0)
@@ -141,7 +141,7 @@ def report(
         typer.secho(f"warning: {path}: the run did not end, it is not in the report", fg="yellow", err=True)
     if not results:
         places = ", ".join(map(str, runs))
-        raise SettingError(Problem(f"no result.json in {places}", "give folders that eidrive run --out has written"))
+        raise SettingError(Diagnostic(f"no result.json in {places}", "give folders that eidrive run --out has written"))
     if out is None:
         out = runs[0] if runs[0].is_dir() else runs[0].parent
     typer.echo(str(write_report(results, out, sources=files)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.driving.conflict_area import inside
 from eidrive_scenario.driving.settings import AgentSettings, Polygon, is_agent
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 
@@ -21,7 +21,7 @@ _CELLS = 12
 
 def areas_off_road(
     scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
-) -> Iterator[Problem]:
+) -> Iterator[Diagnostic]:
     """Yield a warning for each conflict area of a station of which no part lies on a road."""
     if roads is None:
         return
@@ -31,7 +31,7 @@ def areas_off_road(
             if gap > MARGIN:
                 which = "the conflict area" if len(station.conflict_area or ()) == 1 else f"conflict area {number}"
                 source, line = _place(scenario, name)
-                yield Problem(
+                yield Diagnostic(
                     f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
                     "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
                     source,

@@ -10,7 +10,7 @@ from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
 from eidrive_scenario.driving.shared_points import SharedPoints
 from eidrive_scenario.driving.speaker import Speaker
-from eidrive_scenario.errors import Problem, RegistryError, SettingError
+from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, Installation
@@ -61,7 +61,7 @@ def build_detector(settings: AgentSettings, *, source: str = "", line: int | Non
         return construct(kind, own)  # type: ignore[no-any-return]
     if given:
         message = f"detector {settings.detector!r} has no settings of its own"
-        raise SettingError(Problem(message, "remove the property 'detector_settings'", source, line))
+        raise SettingError(Diagnostic(message, "remove the property 'detector_settings'", source, line))
     return construct(kind)  # type: ignore[no-any-return]
 
 
@@ -75,10 +75,10 @@ def build_fusion(
     given = settings.fusion_settings
     if given and kind.settings_type is None:
         message = f"fusion {settings.fusion!r} has no settings of its own"
-        raise SettingError(Problem(message, "remove the property 'fusion_settings'", source, line))
+        raise SettingError(Diagnostic(message, "remove the property 'fusion_settings'", source, line))
     if issubclass(kind, EarlyFusion) and "lidar" not in detector.needs:
         message = f"fusion {settings.fusion!r} joins points, and detector {settings.detector!r} looks at none"
-        raise SettingError(Problem(message, "give it a detector for LiDAR: lidar", source, line))
+        raise SettingError(Diagnostic(message, "give it a detector for LiDAR: lidar", source, line))
     if kind.settings_type is None:
         return construct(kind)  # type: ignore[no-any-return]
     own = parse_settings(kind.settings_type, given, source=source, line=line)
@@ -107,7 +107,7 @@ def build_agent(
     wheels = spec.wheelbase > 0.0
     planner = settings.planner or ("route" if wheels else NO_PLANNER)
     if planner != NO_PLANNER and not wheels:
-        raise SettingError(Problem(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
+        raise SettingError(Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
     detector = detector or build_detector(settings)
     sensors = settings.rig_sensors(detector.needs, detector.usual_sensors)
     installation = Installation(spec, sensors, roads, seed)

@@ -8,7 +8,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings, Polygon
 from eidrive_scenario.driving.step import Goal, Plan
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.records import replaced
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
@@ -29,7 +29,7 @@ class ConflictAreaPlanner(RoutePlanner):
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         if not settings.conflict_area:
-            raise SettingError(Problem("planner 'conflict_area' has no area", "add the property 'conflict_area'"))
+            raise SettingError(Diagnostic("planner 'conflict_area' has no area", "add the property 'conflict_area'"))
         self.areas = settings.conflict_area
         self._last_sighting = -math.inf
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from eidrive_scenario.driving.building import build_detector, build_fusion
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings, agent_settings, is_agent
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
 from eidrive_scenario.perception.detector import Detector
@@ -26,8 +26,8 @@ def declared_settings(
     """The settings of every entity with a controller of ours, options applied; all that is wrong in one error."""
     if detector is not None and detector not in registry("detectors"):
         remedy = suggestion(detector, registry("detectors"))
-        raise SettingError(Problem(f"unknown detector {detector!r}", remedy, "--detector"))
-    problems: list[Problem] = []
+        raise SettingError(Diagnostic(f"unknown detector {detector!r}", remedy, "--detector"))
+    problems: list[Diagnostic] = []
     found: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
     for name, assigned in scenario.controllers.items():
@@ -35,17 +35,17 @@ def declared_settings(
             try:
                 found[name] = agent_settings(controller)
             except SettingError as error:
-                problems.extend(error.problems)
+                problems.extend(error.diagnostics)
             controllers[name] = controller
     for name, settings in found.items():
         problems.extend(_unknown_senders(name, settings, controllers))
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = _line(controllers[name], "planner")
-            problems.append(Problem(message, "remove the property 'planner'", controllers[name].source, line))
+            problems.append(Diagnostic(message, "remove the property 'planner'", controllers[name].source, line))
     for sender in cooperate or ():
         if sender not in controllers:
-            problems.append(Problem(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
+            problems.append(Diagnostic(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
     if problems:
         raise SettingError(problems)
     updated = {}
@@ -87,7 +87,7 @@ def declared_detectors(
 ) -> dict[str, Detector]:
     """The detector of every station, with its weights unless `load_weights` is False. Raises SettingError with all that
     is wrong with any of them, their sensors or their methods of fusion."""
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
         controller = list(filter(is_agent, scenario.controllers[name]))[-1]
@@ -104,14 +104,15 @@ def declared_detectors(
             build_fusion(station, found[name], source=controller.source, line=line)
         except SettingError as error:
             problems += [
-                problem if problem.source else replace(problem, source=source, line=line) for problem in error.problems
+                problem if problem.source else replace(problem, source=source, line=line)
+                for problem in error.diagnostics
             ]
     if problems:
         raise SettingError(list(dict.fromkeys(problems)))
     return found
 
 
-def torchscript_warnings(scenario: Scenario) -> list[Problem]:
+def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
     """A warning for each controller whose detector names TorchScript weights, which a run may refuse."""
     warnings = []
     for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
@@ -124,7 +125,7 @@ def torchscript_warnings(scenario: Scenario) -> list[Problem]:
             if isinstance(weights, str) and Path(weights).suffix == TORCHSCRIPT_SUFFIX:
                 message = "the run is refused: its TorchScript weights can execute any code"
                 remedy = f"export the model to ONNX, or allow it by --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
-                warnings.append(Problem(message, remedy, controller.source, entry.line))
+                warnings.append(Diagnostic(message, remedy, controller.source, entry.line))
     return warnings
 
 
@@ -149,11 +150,11 @@ def _line(controller: Controller, *properties: str) -> int:
     return next((lines[name] for name in properties if name in lines), controller.line)
 
 
-def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Problem]:
+def _unknown_senders(name: str, settings: AgentSettings, controllers: Mapping[str, Controller]) -> list[Diagnostic]:
     line = _line(controllers[name], "cooperates_with")
     others = [other for other in controllers if other != name]
     return [
-        Problem(
+        Diagnostic(
             f"{name!r} cooperates with {sender!r}, which is no station",
             suggestion(sender, others),
             controllers[name].source,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.world.view import WorldView
 
@@ -45,13 +45,13 @@ class MotionlessStations:
                 del self._starts[name]
                 self.watching = bool(self._starts)
 
-    def warnings(self, scenario: Scenario, time: float) -> Iterator[Problem]:
+    def warnings(self, scenario: Scenario, time: float) -> Iterator[Diagnostic]:
         """Yield a warning for each station that drove and did not leave its place until the end of the run [s]."""
         entities = scenario.document.entities
         lines = {one.name: one.line for one in entities.scenario_object} if entities is not None else {}
         for name in self._starts:
             if name in self._reached and time - self._since[name] >= PATIENCE:
-                yield Problem(
+                yield Diagnostic(
                     f"station {name!r} covered only {self._reached[name]:.2f} m in {time:.2f} s",
                     "check its target speed, its route and what it brakes for",
                     str(scenario.path or ""),

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.references import resolve_references
 from eidrive_scenario.perception.tracker_settings import TrackerSettings, tracker_setting
@@ -236,7 +236,7 @@ class AgentSettings(Settings):
         missing = needs - present
         if missing:
             message = f"detector {self.detector!r} needs a sensor of kind {', '.join(sorted(missing))}"
-            raise SettingError(Problem(message, "add it to the property 'sensors'"))
+            raise SettingError(Diagnostic(message, "add it to the property 'sensors'"))
         sensors |= {kind: USUAL[kind]() for kind in LOCALIZING if self.localization == "ekf" and kind not in present}
         for name, sensor in sensors.items():
             if isinstance(sensor, TruthSettings):
@@ -264,33 +264,33 @@ def agent_settings(controller: Controller) -> AgentSettings:
     for entry in entries:
         if entry.name in data:
             message = f"property {entry.name!r} is given twice, first in line {lines[entry.name]}"
-            problems.append(Problem(message, "keep one", source, entry.line))
+            problems.append(Diagnostic(message, "keep one", source, entry.line))
             continue
         lines[entry.name] = entry.line
         try:
             value = entry.value if entry.name in _TEXTS else load_yaml(entry.value, source=source)
         except SettingError as error:
-            what = error.problems[0].message
+            what = error.diagnostics[0].message
             message = f"property {entry.name!r} is {entry.value!r}, which is {what}"
-            problems.append(Problem(message, "check brackets, commas and quotes", source, entry.line))
+            problems.append(Diagnostic(message, "check brackets, commas and quotes", source, entry.line))
             continue
         try:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
-            problems += error.problems
+            problems += error.diagnostics
     for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
         known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
         if name in data and data[name] not in known:
             message = f"unknown {name} {data[name]!r}"
-            problems.append(Problem(message, suggestion(data[name], known), source, lines[name]))
+            problems.append(Diagnostic(message, suggestion(data[name], known), source, lines[name]))
     lacks_area = data.get("conflict_area") is None and ("conflict_area" in data or "conflict_area" not in lines)
     if data.get("planner") == "conflict_area" and lacks_area:
         message = "planner 'conflict_area' has no area"
-        problems.append(Problem(message, "add the property 'conflict_area'", source, lines["planner"]))
+        problems.append(Diagnostic(message, "add the property 'conflict_area'", source, lines["planner"]))
     try:
         settings = parse_settings(AgentSettings, data, source=source, line=controller.line, lines=lines)
     except SettingError as error:
-        raise SettingError([*problems, *error.problems]) from error
+        raise SettingError([*problems, *error.diagnostics]) from error
     if problems:
         raise SettingError(problems)
     return settings

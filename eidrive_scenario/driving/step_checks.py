@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.v2x.profile import ChannelProfile
 
 _TOLERANCE = 1e-9
@@ -14,7 +14,7 @@ _TOLERANCE = 1e-9
 
 def short_channel_delay(
     profile: ChannelProfile | None, dt: float, source: str = "", line: int | None = None
-) -> Iterator[Problem]:
+) -> Iterator[Diagnostic]:
     """Yield a warning if most messages of a channel are delayed by less than one step `dt` [s], but by more than 0.
 
     Without a delay a message arrives in the next tick too; that is the channel's rule, and no warning.
@@ -25,7 +25,7 @@ def short_channel_delay(
     median = float(delay.quantile(0.5))
     if 0.0 < median < dt - _TOLERANCE:
         what = "the median delay" if delay.random else "the delay"
-        yield Problem(
+        yield Diagnostic(
             f"most messages take one step of {dt:g} s: {what} of the channel {profile.name!r} is only {median:.3g} s",
             "use a smaller step (--dt) to resolve it",
             source,
@@ -33,11 +33,11 @@ def short_channel_delay(
         )
 
 
-def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -> Iterator[Problem]:
+def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -> Iterator[Diagnostic]:
     """Yield a warning for each station whose detector takes less than one step `dt` [s], but more than 0."""
     for name, station in settings.items():
         if 0.0 < station.detector_latency < dt - _TOLERANCE:
-            yield Problem(
+            yield Diagnostic(
                 f"detections of {name!r} are known one step of {dt:g} s later: "
                 f"its detector_latency is only {station.detector_latency:g} s",
                 "use a smaller step (--dt) to resolve it",

@@ -36,13 +36,13 @@ class Arm:
     links: str
     own: str
 
-    def channel(self, rule: Rule) -> str:
+    def channel(self, rule: ModelVariant) -> str:
         """The name of the profile under a rule."""
         return self.own if rule.own_perception else self.links
 
 
 @dataclass(frozen=True)
-class Rule:
+class ModelVariant:
     """What the channel acts upon."""
 
     name: str
@@ -57,8 +57,8 @@ ARMS = (
     Arm("error", "error 30 %", "error_30pct", "paper_error_30pct"),
 )
 
-LINKS = Rule("links", "the channel acts on links only", False)
-OWN = Rule("own_perception", "the ego's own detections too, as the paper's code has it", True)
+LINKS = ModelVariant("links", "the channel acts on links only", False)
+OWN = ModelVariant("own_perception", "the ego's own detections too, as the paper's code has it", True)
 RULES = (LINKS, OWN)
 
 
@@ -117,7 +117,7 @@ class Cell:
 class Table:
     """The table under one rule; cells in the order of SCENARIOS, then ARMS."""
 
-    rule: Rule
+    rule: ModelVariant
     cells: tuple[Cell, ...]
 
     def cell(self, scenario: str, arm: str) -> Cell:
@@ -133,7 +133,7 @@ class Table:
         return tuple(dict.fromkeys(cell.scenario for cell in self.cells))
 
 
-def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: Rule) -> Table:
+def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: ModelVariant) -> Table:
     """The table under one rule. Raises SimulationError where a run lacks one of the metrics."""
     cells = []
     for scenario in dict.fromkeys(job.scenario for job, _ in runs):
@@ -169,7 +169,7 @@ def _metric(result: RunResult, name: str) -> float:
 
 
 @dataclass(frozen=True)
-class Check:
+class PublishedClaim:
     """One statement about the order of the arms, and whether these runs bear it out."""
 
     scenario: str
@@ -178,7 +178,7 @@ class Check:
     evidence: str
 
 
-def checks(table: Table) -> tuple[Check, ...]:
+def evaluate_claims(table: Table) -> tuple[PublishedClaim, ...]:
     """The order that the paper found, in each place."""
     found = []
     for scenario in table.scenarios:
@@ -189,16 +189,16 @@ def checks(table: Table) -> tuple[Check, ...]:
     return tuple(found)
 
 
-def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> Check:
+def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> PublishedClaim:
     difference = _paired(smaller, larger)
     evidence = (
         f"{larger.arm.name} {larger.centre.mean:.2f} m, {smaller.arm.name} {smaller.centre.mean:.2f} m; "
         f"difference per seed {difference.mean:+.2f} m, 95 % interval [{difference.low:+.2f}, {difference.high:+.2f}]"
     )
-    return Check(scenario, statement, difference.mean > 0, evidence)
+    return PublishedClaim(scenario, statement, difference.mean > 0, evidence)
 
 
-def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> Check:
+def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> PublishedClaim:
     """Lost frames leave some runs as good as cooperation and spoil others."""
     between = latency.centre.mean <= error.centre.mean <= cooperation.centre.mean
     wider = error.centre.population_sd > cooperation.centre.population_sd
@@ -209,7 +209,7 @@ def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> Ch
         f"{error.collision_free.successes} against {cooperation.collision_free.successes} of {len(error.seeds)}"
     )
     statement = "latency <= error <= cooperation, error with a larger sd or fewer collision-free runs than cooperation"
-    return Check(scenario, statement, between and (wider or fewer), evidence)
+    return PublishedClaim(scenario, statement, between and (wider or fewer), evidence)
 
 
 def _paired(first: Cell, second: Cell) -> PairedDifference:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from eidrive_scenario.errors import InputError, Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.recording.file_lock import FileLock
 from eidrive_scenario.recording.output import partial
 from eidrive_scenario.recording.run_files import PICTURES, RECORDING, RESULT, read_result
@@ -126,17 +126,17 @@ def _claim_below(place: Path, settings: ResolvedSettings) -> RunFolder:
             lock.release()
         if number == _MOST_COPIES:
             break
-    raise SettingError(Problem(f"{_MOST_COPIES} folders of this name are taken", "choose another folder", str(path)))
+    raise SettingError(Diagnostic(f"{_MOST_COPIES} folders of this name are taken", "choose another folder", str(path)))
 
 
 def _claim(path: Path, settings: ResolvedSettings) -> RunFolder:
     lock = _lock(path)
     if lock is None:
-        raise SettingError(Problem("another run writes into this folder", "choose another one", str(path)))
+        raise SettingError(Diagnostic("another run writes into this folder", "choose another one", str(path)))
     if not _is_free(path, settings):
         lock.release()
         what = "the folder holds the result of a run with other settings"
-        raise SettingError(Problem(what, "choose another one", str(path)))
+        raise SettingError(Diagnostic(what, "choose another one", str(path)))
     return RunFolder(path, lock)
 
 
@@ -147,7 +147,7 @@ def _lock(path: Path) -> FileLock | None:
             with suppress(FileNotFoundError):  # another process has removed the empty folder meanwhile
                 return FileLock.acquire(path / _LOCK)
     except OSError as error:
-        raise SettingError(Problem(f"cannot write: {error.strerror}", "choose another folder", str(path))) from error
+        raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another folder", str(path))) from error
 
 
 def _is_free(path: Path, settings: ResolvedSettings) -> bool:

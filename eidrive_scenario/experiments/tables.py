@@ -10,7 +10,7 @@ from rich.padding import Padding
 from rich.table import Table as Grid
 from rich.text import Text
 
-from eidrive_scenario.experiments.paper import SCENARIOS, Cell, Check, Table
+from eidrive_scenario.experiments.paper import SCENARIOS, Cell, PublishedClaim, Table
 
 HEADINGS = (
     "arm",
@@ -37,7 +37,7 @@ def row(cell: Cell) -> tuple[str, ...]:
     )
 
 
-def render(table: Table, found: Sequence[Check] = ()) -> RenderableType:
+def render(table: Table, found: Sequence[PublishedClaim] = ()) -> RenderableType:
     """One grid per place, and the checks of the order below it."""
     parts: list[RenderableType] = [Text(f"Table II, oracle; {table.rule.title}", style="bold"), Text("")]
     for scenario in table.scenarios:
@@ -59,6 +59,6 @@ def render(table: Table, found: Sequence[Check] = ()) -> RenderableType:
     return Group(*parts)
 
 
-def _lines(check: Check) -> RenderableType:
+def _lines(check: PublishedClaim) -> RenderableType:
     verdict = ("holds: ", "green") if check.holds else ("does not hold: ", "red")
     return Group(Text.assemble(verdict, check.statement), Padding(Text(check.evidence, style="dim"), (0, 0, 0, 4)))

@@ -9,19 +9,19 @@ from pathlib import Path
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, ScenarioError, quoted, shortened, suggestion
+from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
 from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import LIBRARY_FOLDER, library_path, place_of
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.document import VERSIONS, version_of
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
 from eidrive_scenario.openscenario.parameters import Assignment, Parameter, Scope
 from eidrive_scenario.openscenario.parsing import Document, line_of, open_document
 from eidrive_scenario.openscenario.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.scalars import Version
 from eidrive_scenario.openscenario.schema import rules
-from eidrive_scenario.openscenario.slips import without_slips
+from eidrive_scenario.openscenario.workarounds import apply_workarounds
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class CatalogFile:
     document: Document
     version: Version
     entries: dict[str, etree._Element]
-    twins: Mapping[str, Problem]
+    twins: Mapping[str, Diagnostic]
     """The error for each name that several entries have."""
 
 
@@ -47,7 +47,7 @@ class CatalogLibrary:
         locations: CatalogLocations | None,
         folder: Path,
         parameters: Mapping[str, Parameter],
-        findings: Findings,
+        findings: DiagnosticCollector,
     ) -> None:
         self.entries: dict[CatalogReference, Element] = {}
         self._parameters = parameters
@@ -60,7 +60,7 @@ class CatalogLibrary:
                 self._places[kind] = catalog_place(directory.path, folder)
         self._circular: set[CatalogReference] = set()
         self._files: dict[Path, CatalogFile | None] = {}
-        self._unreadable: dict[Path, tuple[Problem, ...]] = {}
+        self._unreadable: dict[Path, tuple[Diagnostic, ...]] = {}
 
     def resolve(self, found: Iterable[FoundReference], active: tuple[tuple[str, str], ...] = ()) -> None:
         """Reads the entries that the references name, and those that these refer to in turn."""
@@ -113,13 +113,13 @@ class CatalogLibrary:
         try:
             self._findings.budget.enter_catalog_element(sum(1 for _ in node.iter()))
         except BudgetError as error:
-            problem = Problem(str(error), "use fewer or smaller entries", reference.source, reference.line)
+            problem = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
             raise ScenarioError([*self._findings.problems, problem]) from error
         reader = Reader(catalog.document.name, catalog.version, self._findings)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._findings.budget)
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
         for name in sorted(lent.lent or ()):
-            self._findings.warn(
+            self._findings.warning(
                 f"the catalog entry {quoted(reference.entry_name)} uses the scenario's parameter {quoted(name)}",
                 "declare it in the entry and assign it where the entry is used",
                 source=entry.source,
@@ -147,7 +147,7 @@ class CatalogLibrary:
             self._wrong(found.reference, f"no place is given for the catalog {quoted(name)}", f"add {wanted}")
             return None
         catalogs: dict[Path, CatalogFile] = {}
-        unreadable: list[Problem] = []
+        unreadable: list[Diagnostic] = []
         for path in _candidates(places, name):
             catalog = self._file(path)
             if catalog is not None and catalog.name == name:
@@ -163,12 +163,12 @@ class CatalogLibrary:
             if path.stem == name:
                 message = f"the catalog in {path.name} is named {quoted(catalog.name)}"
                 line = line_of(catalog.document.root)
-                self._findings.warn(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
+                self._findings.warning(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
                 return catalog
         beside = self._beside(name)
         if beside is not None:
             place = Path(beside.document.name).parent
-            self._findings.warn(
+            self._findings.warning(
                 f"the catalog {quoted(name)} lies in none of the places given, but in {place}",
                 f"name that place, {place}",
                 source=found.reference.source,
@@ -203,11 +203,11 @@ class CatalogLibrary:
     def _file(self, path: Path) -> CatalogFile | None:
         """The catalog in a file, or None if it has none or cannot be read; `_unreadable` has what is wrong with it."""
         if path not in self._files:
-            findings = Findings()
+            findings = DiagnosticCollector()
             try:
                 self._files[path] = _read(path, findings)
             except ScenarioError as error:
-                findings.problems.extend(error.problems)
+                findings.problems.extend(error.diagnostics)
                 self._files[path] = None
             self._findings.warnings.extend(findings.warnings)
             if findings.problems:
@@ -231,7 +231,7 @@ def catalog_place(directory: str, folder: Path) -> Path:
     return place_of(directory.replace("\\", "/"), folder)
 
 
-def _read(path: Path, findings: Findings) -> CatalogFile | None:
+def _read(path: Path, findings: DiagnosticCollector) -> CatalogFile | None:
     document = open_document(path)
     catalog = document.root.find("Catalog")
     if catalog is None:
@@ -239,21 +239,21 @@ def _read(path: Path, findings: Findings) -> CatalogFile | None:
     version = version_of(document, findings, older=VERSIONS[0])
     if version is None:
         return None
-    catalog = without_slips(catalog, document.name, version, findings)
+    catalog = apply_workarounds(catalog, document.name, version, findings)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
     return CatalogFile(catalog.get("name", path.stem), document, version, entries, twins_in(catalog, document.name))
 
 
-def twins_in(catalog: etree._Element, source: str) -> dict[str, Problem]:
+def twins_in(catalog: etree._Element, source: str) -> dict[str, Diagnostic]:
     """Return an error for each name that several entries of a catalog have, at the second of them."""
     first: dict[str, etree._Element] = {}
-    found: dict[str, Problem] = {}
+    found: dict[str, Diagnostic] = {}
     for child in catalog.iterchildren(etree.Element):
         name = child.get("name")
         if name is None or first.setdefault(name, child) is child or name in found:
             continue
         message = f"the catalog has a second entry {name!r}; the first is at line {line_of(first[name])}"
-        found[name] = Problem(message, "give each entry its own name", source, line_of(child))
+        found[name] = Diagnostic(message, "give each entry its own name", source, line_of(child))
     return found
 
 
@@ -272,7 +272,7 @@ def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, s
 def _assignments(reference: CatalogReference) -> dict[str, Assignment]:
     given = reference.parameter_assignments
     return {
-        one.parameter_ref: Assignment(one.value, Problem("", "", one.source, one.line))
+        one.parameter_ref: Assignment(one.value, Diagnostic("", "", one.source, one.line))
         for one in (given.parameter_assignment if given else ())
         if isinstance(one.parameter_ref, str) and isinstance(one.value, str)
     }

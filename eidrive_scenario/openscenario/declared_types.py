@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Element,
     ParameterAction,
@@ -20,7 +20,7 @@ _TRUTH = ("true", "false")
 """Whatever their case: Python writes capitals."""
 
 
-def check_types(elements: Iterable[Element], findings: Findings) -> None:
+def check_types(elements: Iterable[Element], findings: DiagnosticCollector) -> None:
     """Warns of values that are declared, set or calculated with against the declared type."""
     elements = tuple(elements)
     types: dict[tuple[str, str], set[ParameterType]] = {}
@@ -30,7 +30,7 @@ def check_types(elements: Iterable[Element], findings: Findings) -> None:
             if _misfits(one.value, one.variable_type):
                 declared = one.variable_type.value
                 what = f"the variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                findings.warn(what, "it is taken as a text", source=one.source, line=one.line)
+                findings.warning(what, "it is taken as a text", source=one.source, line=one.line)
         elif isinstance(one, ParameterDeclaration):
             types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
     for one in elements:
@@ -41,7 +41,11 @@ def check_types(elements: Iterable[Element], findings: Findings) -> None:
 
 
 def _check_action(
-    action: VariableAction | ParameterAction, kind: str, name: str, types: set[ParameterType] | None, findings: Findings
+    action: VariableAction | ParameterAction,
+    kind: str,
+    name: str,
+    types: set[ParameterType] | None,
+    findings: DiagnosticCollector,
 ) -> None:
     """One action; several declarations of a name in different types leave open which one is meant."""
     if types is None or len(types) != 1:
@@ -50,10 +54,10 @@ def _check_action(
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
         what = f"the {kind} {name!r} is declared as {declared.value}, and here set to {setting.value!r}"
-        findings.warn(what, "it is taken as a text", source=setting.source, line=setting.line)
+        findings.warning(what, "it is taken as a text", source=setting.source, line=setting.line)
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
         what = f"the {kind} {name!r} is declared as {declared.value}, and here calculated with"
-        findings.warn(what, "declare it as double", source=action.source, line=action.line)
+        findings.warning(what, "declare it as double", source=action.source, line=action.line)
 
 
 def _misfits(text: object, declared: ParameterType) -> bool:

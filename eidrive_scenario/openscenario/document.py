@@ -8,13 +8,13 @@ from typing import cast
 
 from lxml import etree
 
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.parameters import Assignment, Parameter
 from eidrive_scenario.openscenario.parsing import Document, Source, line_of, open_document
 from eidrive_scenario.openscenario.reader import FoundReference, Reader
 from eidrive_scenario.openscenario.scalars import Version
-from eidrive_scenario.openscenario.slips import without_slips
+from eidrive_scenario.openscenario.workarounds import apply_workarounds
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 ROOTS = ("OpenSCENARIO", "OpenScenario")
@@ -36,28 +36,28 @@ def read_document(source: Source) -> OpenScenario:
 
     Checks the file itself, not what it refers to. Raises ScenarioError with all findings as file:line.
     """
-    findings = Findings()
+    findings = DiagnosticCollector()
     read = read_root(open_document(source), findings)
-    findings.settle()
+    findings.raise_on_error()
     assert read is not None
     return read.root
 
 
 def read_root(
-    document: Document, findings: Findings, assignments: Mapping[str, Assignment] | None = None
+    document: Document, findings: DiagnosticCollector, assignments: Mapping[str, Assignment] | None = None
 ) -> ReadDocument | None:
     """Reads a parsed file; None where it is not even recognisable as one of the versions known."""
     version = version_of(document, findings)
     if version is None:
         return None
     reader = Reader(document.name, version, findings)
-    tree = without_slips(document.root, document.name, version, findings)
+    tree = apply_workarounds(document.root, document.name, version, findings)
     root = cast(OpenScenario, reader.read(tree, OpenScenario, assignments))
     declared = reader.declared if root.parameter_declarations else None
     return ReadDocument(root, version, tuple(reader.references), declared.parameters if declared else {})
 
 
-def version_of(document: Document, findings: Findings, older: Version | None = None) -> Version | None:
+def version_of(document: Document, findings: DiagnosticCollector, older: Version | None = None) -> Version | None:
     """The version that the header names, if it is a known one; else that is a finding.
 
     older  what a file of revMajor 0 is taken for, with a warning
@@ -87,7 +87,9 @@ def version_of(document: Document, findings: Findings, older: Version | None = N
     return _revision(header, document, findings, older)
 
 
-def _revision(header: etree._Element, document: Document, findings: Findings, older: Version | None) -> Version | None:
+def _revision(
+    header: etree._Element, document: Document, findings: DiagnosticCollector, older: Version | None
+) -> Version | None:
     numbers = []
     for name in ("revMajor", "revMinor"):
         text = header.get(name)
@@ -100,7 +102,7 @@ def _revision(header: etree._Element, document: Document, findings: Findings, ol
     if version in VERSIONS:
         return version
     known = "known are " + ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
-    report = findings.warn if older and version < older else findings.error
+    report = findings.warning if older and version < older else findings.error
     message = f"the file is written for OpenSCENARIO {version[0]}.{version[1]}"
     report(message, known, source=document.name, line=line_of(header))
     return older if older and version < older else None

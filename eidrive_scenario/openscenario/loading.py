@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from eidrive_scenario.errors import Together
+from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.distributions import ConcreteRun
 from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
@@ -52,7 +52,7 @@ def load_for_run(
     source: Scenario | Source | ConcreteRun,
     seed: int,
     parameters: Mapping[str, str | Assignment],
-    together: Together,
+    together: ErrorCollector,
 ) -> Scenario:
     """As `load_for_seed`; a wrong variation is one of several mistakes that are reported at once."""
     scenario = _load(source, parameters)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from eidrive_scenario.errors import suggestion
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     CatalogReference,
     Condition,
@@ -46,7 +46,7 @@ def check_names(
     elements: Iterable[Element],
     version: Version,
     entries: Mapping[CatalogReference, Element],
-    findings: Findings,
+    findings: DiagnosticCollector,
 ) -> None:
     """Reports names given twice and references to nothing."""
     elements = list(elements)
@@ -103,7 +103,7 @@ def _draws_none(trailer: Trailer) -> bool:
 
 
 def _check_references(
-    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], findings: Findings
+    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], findings: DiagnosticCollector
 ) -> None:
     for spelling, rule in rules(type(element), version).attributes.items():
         kind = rule.points_to

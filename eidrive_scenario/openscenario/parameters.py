@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from eidrive_scenario.errors import Problem, quoted, shortened, suggestion
+from eidrive_scenario.errors import Diagnostic, quoted, shortened, suggestion
 from eidrive_scenario.openscenario import expressions
 from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.expressions import ExpressionError, Value
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.scalars import Limits
 from eidrive_scenario.openscenario.scalars import BOOLEAN, DATE_TIME, DOUBLE, INTEGER, STRING, Scalar, whole_number
@@ -64,7 +64,7 @@ class Assignment:
     """A parameter's value from outside the file, and where it was given if that is a file too."""
 
     text: str
-    origin: Problem | None = None
+    origin: Diagnostic | None = None
 
 
 def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
@@ -175,14 +175,16 @@ def written(value: Value) -> str:
     return value if isinstance(value, str) else repr(value)
 
 
-def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, findings: Findings) -> None:
+def declare(
+    scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, findings: DiagnosticCollector
+) -> None:
     """Puts a parameter into its scope, once its value fits its type and its constraints."""
     scalar = TYPES[declaration.parameter_type]
-    place = (assignment and assignment.origin) or Problem("", "", declaration.source, declaration.line)
+    place = (assignment and assignment.origin) or Diagnostic("", "", declaration.source, declaration.line)
     name, text = declaration.name, assignment.text if assignment else declaration.value
     text = _without_fraction(text, scalar)
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
-        findings.warn(
+        findings.warning(
             f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{quoted(declaration.value)}",
             "it is taken as a text",
@@ -215,7 +217,7 @@ def declare(scope: Scope, declaration: ParameterDeclaration, assignment: Assignm
         allowed = " or ".join(
             " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
         )
-        findings.rule_out(
+        findings.constraint_error(
             f"the parameter {name!r} is {quoted(text)}, outside its constraints",
             f"it has to be {allowed}",
             source=place.source,

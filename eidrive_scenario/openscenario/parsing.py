@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, ScenarioError, shortened
+from eidrive_scenario.errors import Diagnostic, ScenarioError, shortened
 from eidrive_scenario.files import MIB, read_regular_file, reason_of
 from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 
@@ -74,7 +74,7 @@ def _content(path: str | Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        problem = Problem(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
+        problem = Diagnostic(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
         raise ScenarioError(problem) from error
 
 
@@ -93,7 +93,7 @@ def _from_tree(source: Any) -> Document:
     if not isinstance(root, ElementTree.Element):
         what = "this is neither a path nor XML"
         remedy = "give a path, bytes, an XML tree, or an object with get_element()"
-        raise ScenarioError(Problem(what, remedy, name))
+        raise ScenarioError(Diagnostic(what, remedy, name))
     text = _as_written(root, name)
     return Document(parse(text, name), name, None, Path(), text, _digest(text))
 
@@ -104,7 +104,7 @@ def _element_of(source: WrittenInPython, name: str) -> Any:
         return source.get_element()
     except Exception as error:  # of whichever library that is: scenariogeneration raises what its versions do not have
         what = f"get_element() gives no XML: {error} ({type(error).__name__})"
-        raise ScenarioError(Problem(what, "write_xml would fail alike; mend what it names", name)) from error
+        raise ScenarioError(Diagnostic(what, "write_xml would fail alike; mend what it names", name)) from error
 
 
 def _as_written(root: ElementTree.Element, name: str) -> bytes:
@@ -120,7 +120,7 @@ def _as_written(root: ElementTree.Element, name: str) -> bytes:
         ElementTree.indent(indented)
         text: bytes = ElementTree.tostring(indented, "utf-8", xml_declaration=True)
     except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise ScenarioError(Problem(f"cannot be written as XML: {error}", "give texts only", name)) from error
+        raise ScenarioError(Diagnostic(f"cannot be written as XML: {error}", "give texts only", name)) from error
     return text
 
 
@@ -132,7 +132,7 @@ def _texts_only(node: ElementTree.Element, name: str) -> None:
             del node.attrib[attribute]
         elif not isinstance(value, str):
             what = f"{attribute} of {node.tag} is {value!r} of the type {type(value).__name__}"
-            raise ScenarioError(Problem(what, "give a text, as XML has nothing else", name))
+            raise ScenarioError(Diagnostic(what, "give a text, as XML has nothing else", name))
 
 
 def parse(content: bytes, name: str) -> etree._Element:

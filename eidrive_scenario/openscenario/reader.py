@@ -8,9 +8,9 @@ from typing import Any, cast
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, quoted, suggestion
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.expressions import ExpressionError
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
     Action,
     Catalog,
@@ -53,7 +53,7 @@ class Reader:
     was built only if `findings` has no problems.
     """
 
-    def __init__(self, source: str, version: Version, findings: Findings) -> None:
+    def __init__(self, source: str, version: Version, findings: DiagnosticCollector) -> None:
         self.source = source
         self.version = version
         self.findings = findings
@@ -166,7 +166,7 @@ class Reader:
         elif node in self._with_text:
             self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
         elif not known.children and node in self._with_space:
-            self.findings.warn(
+            self.findings.warning(
                 f"{node.tag} holds white space, where the schema wants nothing",
                 f"write <{node.tag} …/>",
                 source=self.source,
@@ -197,7 +197,7 @@ class Reader:
 
     def _chooses_nothing(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
         """Up to 1.2 the schema lets an element choose nothing. That is in use where _MAY_BE_EMPTY says so."""
-        report = self.findings.warn if cls in _MAY_BE_EMPTY else self.findings.error
+        report = self.findings.warning if cls in _MAY_BE_EMPTY else self.findings.error
         remedy = "it holds one of " + ", ".join(known.choice)
         report(f"{node.tag} is empty", remedy, source=self.source, line=line_of(node))
 
@@ -239,12 +239,12 @@ class Reader:
 
     def _declared_twice(self, declaration: ParameterDeclaration, other: Parameter) -> None:
         message = f"the parameter {declaration.name!r} is declared twice"
-        report = self.findings.warn if declaration.value == other.declared else self.findings.error
+        report = self.findings.warning if declaration.value == other.declared else self.findings.error
         report(message, "rename or remove one", source=self.source, line=declaration.line)
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
-            place = assignment.origin or Problem("", "", self.source)
+            place = assignment.origin or Diagnostic("", "", self.source)
             self.findings.error(
                 f"unknown parameter {name!r}", suggestion(name, declared), source=place.source, line=place.line
             )
@@ -258,10 +258,12 @@ class Reader:
     def _by_python(self, name: str, node: etree._Element, text: str, what: str, remedy: str) -> None:
         """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
         message = f"{name} of {node.tag} is {quoted(text)}, {what}"
-        self.findings.warn(message, remedy, source=self.source, line=line_of(node))
+        self.findings.warning(message, remedy, source=self.source, line=line_of(node))
 
     def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
-        self.findings.warn(f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node))
+        self.findings.warning(
+            f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
+        )
 
     def _error(self, message: str, remedy: str, node: etree._Element) -> None:
         self._flaws += 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.openscenario.expressions import ExpressionError
 from eidrive_scenario.openscenario.parameters import REFERENCE, Scope
 
@@ -39,7 +39,7 @@ def resolve_references(
     """
     if scope is None:
         return data
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     resolved = _resolve(data, scope, path, source, line, lines or {}, problems)
     if problems:
         raise SettingError(problems)
@@ -53,7 +53,7 @@ def _resolve(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
-    problems: list[Problem],
+    problems: list[Diagnostic],
 ) -> Any:
     line = lines.get(path, line)
     if isinstance(data, Mapping):
@@ -72,7 +72,7 @@ def _resolve(
     except ExpressionError as error:
         if error.message:
             what = f"setting {path!r}: {error.message}" if path else error.message
-            problems.append(Problem(what, error.remedy, source, line))
+            problems.append(Diagnostic(what, error.remedy, source, line))
         return data
 
 

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from eidrive_scenario.errors import shortened, suggestion
 from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import File, RoadNetwork
 
 MAPS = "EIDRIVE_MAPS"
@@ -17,7 +17,7 @@ MAPS = "EIDRIVE_MAPS"
 SUFFIX = ".xodr"
 
 
-def find_road_file(network: RoadNetwork | None, folder: Path, findings: Findings) -> Path | None:
+def find_road_file(network: RoadNetwork | None, folder: Path, findings: DiagnosticCollector) -> Path | None:
     """The road file that the scenario names, or None if it names none.
 
     It is looked for beside the scenario, then by its bare name in the folders of EIDRIVE_MAPS; a name without a

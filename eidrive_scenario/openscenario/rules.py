@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from eidrive_scenario.openscenario.declared_types import check_types
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     CatalogReference,
     Clothoid,
@@ -35,7 +35,7 @@ _NOTHING_SAID = Orientation()
 
 
 def check_rules(
-    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], findings: Findings
+    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], findings: DiagnosticCollector
 ) -> None:
     """Reports whatever breaks a rule in a scenario or in the catalog entries that it uses."""
     elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
@@ -44,7 +44,7 @@ def check_rules(
     check_names(root, elements, version, entries, findings)
 
 
-def check_values(elements: Sequence[Element], version: Version, findings: Findings) -> None:
+def check_values(elements: Sequence[Element], version: Version, findings: DiagnosticCollector) -> None:
     """Report elements whose values exclude each other, or cannot be calculated with."""
     flawed = {(problem.source, problem.line) for problem in findings.problems}
     for element in elements:
@@ -55,7 +55,7 @@ def check_values(elements: Sequence[Element], version: Version, findings: Findin
         if isinstance(element, Orientation) and element == _NOTHING_SAID:
             what = "Orientation says nothing, which by the standard means the heading 0 of the world"
             remedy = 'leave it out, or write type="relative", to look along the road'
-            findings.warn(what, remedy, source=element.source, line=element.line)
+            findings.warning(what, remedy, source=element.source, line=element.line)
 
 
 def _distance(action: LongitudinalDistanceAction) -> str:

@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import from_library
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.document import read_root
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
     BoundingBox,
     CatalogReference,
@@ -71,7 +71,7 @@ class Scenario:
     entities: Mapping[str, EntityObject]
     controllers: Mapping[str, tuple[Controller, ...]]
     road_file: Path | None
-    warnings: tuple[Problem, ...]
+    warnings: tuple[Diagnostic, ...]
     external: Mapping[str, ExternalObjectReference]
     entries: Mapping[CatalogReference, Element] = field(repr=False)
     text: bytes | None = field(repr=False, default=None)
@@ -111,18 +111,18 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     if isinstance(source, str | Path):
         source = from_library(source)
     document = open_document(source)
-    findings = Findings()
+    findings = DiagnosticCollector()
     assignments = as_assignments(parameters)
     read = read_root(document, findings, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
-        findings.settle()
+        findings.raise_on_error()
         raise ScenarioError(_other_kind(read.root if read else None, document.name))
     root = read.root
     library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, findings)
     library.resolve(read.references)
     road_file = find_road_file(root.road_network, document.folder, findings)
     check_rules(root, read.version, library.entries, findings)
-    warnings = findings.settle()
+    warnings = findings.raise_on_error()
     objects = list(scenario_objects(root.entities, library.entries))
     return Scenario(
         name=document.path.stem if document.path else " ".join(root.file_header.description.split()) or document.name,
@@ -176,15 +176,15 @@ def _controllers(one: ScenarioObject, entries: Mapping[CatalogReference, Element
     return tuple(controller for controller in found if isinstance(controller, Controller))
 
 
-def _other_kind(root: OpenScenario | None, name: str) -> Problem:
+def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
     if root is not None and root.catalog is not None:
-        return Problem(
+        return Diagnostic(
             "this is a catalog, not a scenario", "name a scenario that refers to it", name, root.catalog.line
         )
     distribution = root.parameter_value_distribution if root else None
     if distribution is None:
-        return Problem("this is no scenario", "", name)
-    return Problem(
+        return Diagnostic("this is no scenario", "", name)
+    return Diagnostic(
         "this is a distribution of parameter values, not a scenario",
         f"its scenario is {distribution.scenario_file.filepath!r}",
         name,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from eidrive_scenario.errors import suggestion
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Act,
     Action,
@@ -70,21 +70,21 @@ class StoryboardNames:
             elif type(child) in LEVELS:
                 yield from self._below(child, path)
 
-    def check_unique(self, findings: Findings) -> None:
+    def check_unique(self, findings: DiagnosticCollector) -> None:
         """Warns of elements of one kind that have the same name side by side: a reference could mean either."""
         seen: dict[tuple[StoryboardElementType, tuple[str, ...]], Element] = {}
         for named in self.named:
             key = (named.level, named.path)
             other = seen.setdefault(key, named.element)
             if other is not named.element:
-                findings.warn(
+                findings.warning(
                     f"two elements of the kind {named.level.value} are named {named.path[-1]!r}",
                     f"the other stands in line {other.line}",
                     source=named.element.source,
                     line=named.element.line,
                 )
 
-    def check_reference(self, condition: StoryboardElementStateCondition, findings: Findings) -> None:
+    def check_reference(self, condition: StoryboardElementStateCondition, findings: DiagnosticCollector) -> None:
         """Reports a condition on an element that is not there, or is of another kind."""
         reference: str | None = condition.storyboard_element_ref
         wanted: StoryboardElementType | None = condition.storyboard_element_type

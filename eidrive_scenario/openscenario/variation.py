@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.errors import Problem, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.references import resolve_references, without
 from eidrive_scenario.openscenario.scenario import Scenario
@@ -59,7 +59,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
         data = load_yaml(action.content, source=action.source, line=action.line)
         if not isinstance(data, dict):
             raise SettingError(
-                Problem(
+                Diagnostic(
                     f"{COMMAND} holds {quoted(data)}",
                     "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}",
                     action.source,
@@ -80,7 +80,7 @@ def drawn_parameters(scenario: Scenario, seed: int) -> dict[str, str]:
 def _distribution(scenario: Scenario, action: CustomCommandAction, name: str, spec: Any) -> Distribution:
     if name not in scenario.parameters:
         raise SettingError(
-            Problem(
+            Diagnostic(
                 f"{COMMAND} names the undeclared parameter {quoted(name)}",
                 suggestion(name, scenario.parameters),
                 action.source,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import EidriveError, ExtensionError, InputError, Problem, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
 from eidrive_scenario.pytest_plugin.options import Arm
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
@@ -80,7 +80,7 @@ def _play(
     known = [field.name for field in fields(RunSettings)]
     for keyword in overrides:
         if keyword not in known:
-            raise SettingError(Problem(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
+            raise SettingError(Diagnostic(f"run_scenario takes no {keyword!r}", suggestion(keyword, known)))
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
     below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None

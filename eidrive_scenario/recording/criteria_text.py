@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, Protocol
 
-from eidrive_scenario.errors import InvalidResult, Problem, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.parameters import Scope
@@ -51,10 +51,10 @@ def parse_criteria(
     data = load_yaml(text, source=source, line=line)
     entries = [data] if isinstance(data, dict) else data
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise SettingError(Problem(f"{text.strip()!r} declares no criterion", f"write {_EXAMPLE}", source, line))
+        raise SettingError(Diagnostic(f"{text.strip()!r} declares no criterion", f"write {_EXAMPLE}", source, line))
     names = set(taken)
     criteria = []
-    problems: list[Problem] = []
+    problems: list[Diagnostic] = []
     for kind, settings, lines in _items(entries, text, line):
         here = lines.get("", line)
         try:
@@ -63,7 +63,7 @@ def parse_criteria(
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
         except SettingError as error:
-            problems.extend(error.problems)
+            problems.extend(error.diagnostics)
             continue
         criterion.name = _free_name(criterion.name, names)
         names.add(criterion.name)
@@ -95,13 +95,13 @@ def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterat
 def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> Criterion:
     known = registry("criteria")
     if kind not in known:
-        raise SettingError(Problem(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
+        raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
     criterion_type = known.load(kind, Criterion)
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
         fields = criterion_type.settings_type.model_fields.items()
         remedy = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
-        raise SettingError(Problem(f"{kind} is given {settings!r}", remedy, source, line))
+        raise SettingError(Diagnostic(f"{kind} is given {settings!r}", remedy, source, line))
     parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
     criterion: Criterion = construct(criterion_type, parsed)
     name: object = getattr(criterion, "name", kind)
@@ -123,7 +123,7 @@ def _check_known(
     if unknown:
         raise SettingError(
             [
-                Problem(
+                Diagnostic(
                     f"{criterion.name} looks at {name!r}, which is no {what} of this scenario",
                     suggestion(name, known) if known else "it declares none",
                     source,
@@ -182,10 +182,10 @@ def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> li
     return criteria
 
 
-def unbuilt_criteria(scenario: Scenario) -> list[Problem]:
+def unbuilt_criteria(scenario: Scenario) -> list[Diagnostic]:
     """ScenarioRunner's criteria in this file that this engine does not judge: warnings, as the run goes on."""
     return [
-        Problem(
+        Diagnostic(
             f"criterion {condition.name.removeprefix(PREFIX)!r} is not judged",
             f"this engine reads {', '.join(sorted(_TRANSLATIONS))}",
             condition.source,
@@ -222,7 +222,7 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
         if name.lower() in ("ego", "hero", "ego_vehicle"):
             return name
     raise SettingError(
-        Problem(
+        Diagnostic(
             f"{condition.name} is about the ego vehicle, and no entity is one",
             'give a Vehicle the property type="ego_vehicle"',
             condition.source,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import Problem, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.storyboard_names import is_suffix
 from eidrive_scenario.recording.condition_words import told
 from eidrive_scenario.recording.frame import Frame
@@ -43,7 +43,7 @@ class Explanation:
         if not self._subjects:
             known = {element.name for element, _ in named} | {STORYBOARD}
             raise SettingError(
-                Problem(f"no event or act is named {self.reference!r}", suggestion(self.reference, known))
+                Diagnostic(f"no event or act is named {self.reference!r}", suggestion(self.reference, known))
             )
 
     def observe(self, frame: Frame) -> None:

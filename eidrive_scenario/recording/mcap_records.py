@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 
 import zstandard
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files import is_regular_file
 from eidrive_scenario.recording.damage import DamageReport
 
@@ -67,19 +67,21 @@ class McapFile:
     def __init__(self, path: Path, damage: DamageReport) -> None:
         self._damage = damage
         if os.path.exists(path) and not is_regular_file(path):
-            raise InputError(Problem("cannot read: not a regular file", "give an MCAP recording", str(path)))
+            raise InputError(Diagnostic("cannot read: not a regular file", "give an MCAP recording", str(path)))
         try:
             self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
             status = os.fstat(self._descriptor)
         except OSError as error:
-            raise InputError(Problem(f"cannot read: {error.strerror}", "give an MCAP recording", str(path))) from error
+            raise InputError(
+                Diagnostic(f"cannot read: {error.strerror}", "give an MCAP recording", str(path))
+            ) from error
         if not stat.S_ISREG(status.st_mode):
             self.close()
-            raise InputError(Problem("cannot read: not a regular file", "give an MCAP recording", str(path)))
+            raise InputError(Diagnostic("cannot read: not a regular file", "give an MCAP recording", str(path)))
         self._size = status.st_size
         if self.read(0, len(MAGIC)) != MAGIC:
             self.close()
-            raise InputError(Problem("not an MCAP file", "give an MCAP recording", str(path)))
+            raise InputError(Diagnostic("not an MCAP file", "give an MCAP recording", str(path)))
 
     def __enter__(self) -> Self:
         return self

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from eidrive_scenario.errors import InputError, Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.recording.file_lock import FileLock
 
 PARTIAL = ".partial"
@@ -22,7 +22,7 @@ def create(path: str | Path) -> BinaryIO:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         return Path(path).open("wb")
     except OSError as error:
-        raise SettingError(Problem(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
+        raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
 
 
 def partial(path: Path) -> Path:
@@ -39,7 +39,7 @@ def whole(path: Path) -> Iterator[Path]:
     such as /dev/stdout, is written as it is. Raises SettingError if the place is a folder, or another run writes there.
     """
     if os.path.isdir(path):
-        raise SettingError(Problem("cannot write: Is a directory", "choose another place", str(path)))
+        raise SettingError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
     if os.path.islink(path) or (os.path.exists(path) and not os.path.isfile(path)):
         yield path
         return
@@ -70,7 +70,7 @@ def exclusive(path: Path) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = FileLock.acquire(path.parent / f".{name}.lock")
         if lock is None:
-            raise SettingError(Problem("another run writes this file", "choose another file", str(path)))
+            raise SettingError(Diagnostic("another run writes this file", "choose another file", str(path)))
     try:
         yield
     finally:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording import mcap_records as mcap
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.codec import codec
@@ -88,7 +88,7 @@ class Recording:
         reason = f"frame {tick} does not read: {error}"
         if not self.damage:
             remedy = f"read it with the version that wrote it ({self.metadata.get('eidrive-scenario', 'unknown')})"
-            raise InputError(Problem(reason, remedy, str(self.path))) from error
+            raise InputError(Diagnostic(reason, remedy, str(self.path))) from error
         if skipped is not None:
             skipped(reason)
 
@@ -191,7 +191,7 @@ class _Reading:
         found = self._metadata.get("format")
         if found != FORMAT and (found is not None or not self._seal.frames):
             what = "not a recording of eidrive" if found is None else f"a recording of layout {found[:20]!r}"
-            raise InputError(Problem(what, "give a recording that this version of eidrive wrote", str(path)))
+            raise InputError(Diagnostic(what, "give a recording that this version of eidrive wrote", str(path)))
         self._check_seal()
         return Recording(
             path,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files import read_regular_file
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.output import PARTIAL, partial
@@ -35,8 +35,8 @@ def recording_in(place: Path) -> Path:
             listed = ", ".join(str(path.parent.relative_to(place)) for path in paths[:5])
             more = f" and {len(paths) - 5} more" if len(paths) > 5 else ""
             what = f"{len(paths)} recordings are below this folder"
-            raise InputError(Problem(what, f"give one of its folders: {listed}{more}", str(place)))
-    raise InputError(Problem(f"no {RECORDING} in this folder", "eidrive run … --out DIR records", str(place)))
+            raise InputError(Diagnostic(what, f"give one of its folders: {listed}{more}", str(place)))
+    raise InputError(Diagnostic(f"no {RECORDING} in this folder", "eidrive run … --out DIR records", str(place)))
 
 
 def _recordings_below(place: Path) -> list[Path]:
@@ -95,9 +95,9 @@ def read_result(path: Path) -> dict[str, Any]:
         data = read_regular_file(path, _LARGEST)
         result = load_json(data, max_depth=_DEEPEST)
     except OSError as error:
-        raise InputError(Problem(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
+        raise InputError(Diagnostic(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
     except ValueError as error:
-        raise InputError(Problem(f"not JSON: {error}", f"give a {RESULT}", str(path))) from error
+        raise InputError(Diagnostic(f"not JSON: {error}", f"give a {RESULT}", str(path))) from error
     if not isinstance(result, dict) or "trace_hash" not in result:
-        raise InputError(Problem("not the result of a run", "give a file that eidrive run --out wrote", str(path)))
+        raise InputError(Diagnostic("not the result of a run", "give a file that eidrive run --out wrote", str(path)))
     return result

@@ -27,8 +27,8 @@ from eidrive_scenario.experiments.paper import (
     OWN,
     SCENARIOS,
     Table,
-    checks,
     difference,
+    evaluate_claims,
     run_settings,
     tabulate,
 )
@@ -121,7 +121,7 @@ def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console)
     links, own = tabulate(runs, LINKS), tabulate(runs, OWN)
     console.print()
     for table in (links, own):
-        console.print(render(table, checks(table)))
+        console.print(render(table, evaluate_claims(table)))
     console.print(Text(difference(links, own)))
     places = {name: place_of(name, seeds[0], stories[name, "ideal"]) for name in SCENARIOS}
     footer = f"eidrive-scenario {version('eidrive-scenario')}, seeds {seeds[0]} to {seeds[-1]}"

@@ -11,7 +11,17 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from eidrive_scenario.experiments.paper import ARMS, LINKS, SCENARIOS, Arm, Cell, Check, Table, checks, difference
+from eidrive_scenario.experiments.paper import (
+    ARMS,
+    LINKS,
+    SCENARIOS,
+    Arm,
+    Cell,
+    PublishedClaim,
+    Table,
+    difference,
+    evaluate_claims,
+)
 from eidrive_scenario.reporting.chart import Line, line_chart
 from eidrive_scenario.reporting.key_frames import Moment, Story
 from eidrive_scenario.reporting.page import png_address, write_page
@@ -85,7 +95,7 @@ def _place(
     table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: Place, window: Window, watched: int
 ) -> dict[str, Any]:
     mine = {arm.name: stories[scenario, arm.channel(table.rule)] for arm in ARMS}
-    found: Sequence[Check] = [check for check in checks(table) if check.scenario == scenario]
+    found: Sequence[PublishedClaim] = [check for check in evaluate_claims(table) if check.scenario == scenario]
     return {
         "title": SCENARIOS.get(scenario, scenario),
         "cells": [cell for cell in table.cells if cell.scenario == scenario],

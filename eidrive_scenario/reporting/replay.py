@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
@@ -84,7 +84,7 @@ def make_replay(
     data = replay_data(_drawable(recording, report, trace), _recorded_roads(recording, report), report)
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
-        raise InputError(Problem("the recording holds no frame that can be read", reason, str(recording.path)))
+        raise InputError(Diagnostic("the recording holds no frame that can be read", reason, str(recording.path)))
     if result is not None and result.get("trace_hash") != trace.hexdigest():
         report.add("the result beside the recording has another trace hash: its verdicts may be those of another run")
     name = shortened(recording.scenario or recording.path.stem, 200)
@@ -124,7 +124,7 @@ def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
 
 def _described(error: Exception) -> str:
     """An error in a line; of an input error its first diagnostic."""
-    text = str(error.problems[0]) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+    text = str(error.diagnostics[0]) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
     return shortened(text, 300)
 
 

@@ -11,7 +11,7 @@ from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.reported_run import ReportedRun, reported
@@ -42,7 +42,7 @@ def write_report(
     files: Iterable[str | Path] = chain(sources, repeat(""))
     runs = [reported(result, file) for result, file in zip(results, files, strict=False)]
     if not runs:
-        raise InputError(Problem("there is no result to report", "give at least one run", str(out)))
+        raise InputError(Diagnostic("there is no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)
     metrics = _common_metrics(runs)
     return write_page(

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 
 
 class ReportedCriterion(BaseModel):
@@ -61,7 +61,7 @@ def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise InputError(
-            Problem(
+            Diagnostic(
                 f"a result's {where[:200]!r}: {first['msg'].lower()}",
                 "give what eidrive run --json prints",
                 str(source),

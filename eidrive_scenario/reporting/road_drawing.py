@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
@@ -109,7 +109,7 @@ def _spacing(roads: Sequence[Road]) -> float:
 
 
 def _too_large(source: str) -> InputError:
-    return InputError(Problem("the road network is too large to be drawn", "", source))
+    return InputError(Diagnostic("the road network is too large to be drawn", "", source))
 
 
 def _stations(start: float, end: float, spacing: float) -> list[float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import networkx as nx
 import numpy as np
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
@@ -128,7 +128,7 @@ def find_lanes(
             found = nx.dijkstra_path(graph, source, target, weight=cost)
     except (nx.NetworkXNoPath, nx.NodeNotFound) as error:
         raise RouteError(
-            Problem(
+            Diagnostic(
                 f"no way over the lanes from road {start.road!r} lane {start.lane} s {start.s:.1f} "
                 f"to road {end.road!r} lane {end.lane} s {end.s:.1f}",
                 "check the direction of the lanes and the links between them",

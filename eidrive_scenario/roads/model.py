@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Literal
 
 from eidrive_scenario.roads.curves import ReferenceLine
-from eidrive_scenario.roads.flaws import Flaw
+from eidrive_scenario.roads.map_warnings import MapWarning
 from eidrive_scenario.roads.polynomials import Polynomials
 
 Contact = Literal["start", "end"]
@@ -307,5 +307,5 @@ class RoadMap:
     signals: Mapping[str, Signal]
     controllers: Mapping[str, SignalController]
     objects: tuple[RoadObject, ...]
-    flaws: tuple[Flaw, ...] = ()
+    map_warnings: tuple[MapWarning, ...] = ()
     """What the file has against the standard, and is read all the same."""

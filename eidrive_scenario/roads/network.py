@@ -11,24 +11,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads import poses
 from eidrive_scenario.roads.attributes import Roads
 from eidrive_scenario.roads.distance import Chain, RoadDistances
-from eidrive_scenario.roads.flaws import told
 from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
 from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
 from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import Array, Integers, LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.locator import REACH, Locator
+from eidrive_scenario.roads.map_checks import check_road_map
+from eidrive_scenario.roads.map_warnings import group_map_warnings
 from eidrive_scenario.roads.model import RoadMap
 from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
 from eidrive_scenario.roads.nearby import locate_near
 from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.route import Route, joined
-from eidrive_scenario.roads.soundness import flaws
 from eidrive_scenario.roads.tables import RoadTables
 
 KEPT = 2
@@ -43,7 +43,7 @@ class RoadNetwork(Roads):
 
     def __init__(self, road_map: RoadMap) -> None:
         super().__init__(road_map)
-        self._flaws = road_map.flaws
+        self._flaws = road_map.map_warnings
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
         self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
@@ -63,9 +63,9 @@ class RoadNetwork(Roads):
         return cls(parse_road_map(text.encode() if isinstance(text, str) else text, source))
 
     @cached_property
-    def doubts(self) -> tuple[Problem, ...]:
+    def map_warnings(self) -> tuple[Diagnostic, ...]:
         """What is likely wrong with the file, though it can be read: one finding a kind, each with its rule."""
-        return told([*self._flaws, *flaws(self.roads, self.junctions, self.links)], self.source)
+        return group_map_warnings([*self._flaws, *check_road_map(self.roads, self.junctions, self.links)], self.source)
 
     @cached_property
     def tables(self) -> RoadTables:
@@ -83,13 +83,13 @@ class RoadNetwork(Roads):
         text = self.header.geo_reference
         if not text:
             raise PositionError(
-                Problem("the road network has no geoReference", "add <geoReference> to its <header>", self.source)
+                Diagnostic("the road network has no geoReference", "add <geoReference> to its <header>", self.source)
             )
         try:
             return parse_geo_reference(text)
         except ValueError as error:
             remedy = "write <geoReference> as a PROJ text, such as +proj=utm +zone=32 +datum=WGS84"
-            raise PositionError(Problem(str(error), remedy, self.source)) from error
+            raise PositionError(Diagnostic(str(error), remedy, self.source)) from error
 
     @cached_property
     def _locator(self) -> Locator:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.roads.location import Pose, PositionError
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 
@@ -146,7 +146,9 @@ def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
     lane = section.lanes.get(lane_id)
     if lane is None:
         known = ", ".join(str(number) for number in section.lanes)
-        raise PositionError(Problem(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {known}"))
+        raise PositionError(
+            Diagnostic(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {known}")
+        )
     return section, lane
 
 
@@ -201,10 +203,10 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
 def off_road(road: Road, s: float) -> PositionError:
     """The error for a place beyond the ends of a road."""
     return PositionError(
-        Problem(f"s = {s:g} m is not on road {road.id!r}", f"the road runs from 0 to {road.length:g} m")
+        Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road runs from 0 to {road.length:g} m")
     )
 
 
 def unknown_road(number: str, known: list[str]) -> PositionError:
     """The error for a road that does not exist."""
-    return PositionError(Problem(f"there is no road {number!r}", suggestion(number, known)))
+    return PositionError(Diagnostic(f"there is no road {number!r}", suggestion(number, known)))

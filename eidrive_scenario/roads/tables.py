@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.curves import CurveTable
 from eidrive_scenario.roads.location import Array, Integers, LaneKey, Poses, PositionError
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
@@ -87,7 +87,9 @@ class RoadTables:
             near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
             if not near.size:
                 raise PositionError(
-                    Problem(f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane")
+                    Diagnostic(
+                        f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane"
+                    )
                 )
             row[n] = self.first_lane[section[n]] + near[0]
         return np.asarray(row, dtype=np.int64)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.camera import Pinhole, Radiance
 
@@ -87,4 +87,4 @@ def _check_convergence(rays: Array, pixels: Array, lens: Pinhole, settings: Came
     shown = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0][:, 0]
     if not np.abs(shown - pixels).max() < 0.1:
         what = f"the distortion {list(settings.distortion)} of a camera cannot be inverted"
-        raise SettingError(Problem(what, "give smaller coefficients or a smaller fov"))
+        raise SettingError(Diagnostic(what, "give smaller coefficients or a smaller fov"))

@@ -9,7 +9,7 @@ import numpy as np
 import py_trees
 from py_trees.common import Status
 
-from eidrive_scenario.errors import InvalidResult, Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.actor import Actor
@@ -107,7 +107,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.stop(Status.INVALID)
         self.stage.release(self)
         why = f"{who} is not in the world"
-        self.stage.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").problems
+        self.stage.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").diagnostics
         return why
 
     def check_decision(self) -> None:
@@ -127,7 +127,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def problem(self, message: str, remedy: str = "") -> ScenarioError:
         """An error at the place of this action in the file."""
         where = self.action
-        return ScenarioError(Problem(f"{type(where).__name__} {message}", remedy, where.source, where.line))
+        return ScenarioError(Diagnostic(f"{type(where).__name__} {message}", remedy, where.source, where.line))
 
 
 def _is_finite(value: object) -> bool:

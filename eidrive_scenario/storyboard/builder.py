@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from eidrive_scenario.errors import Problem, RegistryError, ScenarioError, suggestion
+from eidrive_scenario.errors import Diagnostic, RegistryError, ScenarioError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
@@ -66,7 +66,7 @@ class Builder:
         self._stage = stage
         self._actions = actions
         self._conditions = conditions
-        self._problems: list[Problem] = []
+        self._problems: list[Diagnostic] = []
         self._made: list[Condition] = []
         self._selections = Selections(scenario)
 
@@ -81,7 +81,7 @@ class Builder:
             try:
                 condition.bind(self._stage)
             except ScenarioError as error:
-                self._problems += error.problems
+                self._problems += error.diagnostics
         self._problems += self._stage.signals.problems
         if self._problems:
             raise ScenarioError(sorted(dict.fromkeys(self._problems), key=lambda p: (p.source, p.line or 0)))
@@ -124,7 +124,7 @@ class Builder:
             try:
                 maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver, group))
             except ScenarioError as error:
-                self._problems += error.problems
+                self._problems += error.diagnostics
         children = [self._maneuver(maneuver, path, cast) for maneuver in maneuvers]
         return ManeuverGroupElement(self._stage, path, children, limit=group.maximum_execution_count)
 
@@ -173,7 +173,7 @@ class Builder:
                         raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
                     behaviours.append(made)
             except ScenarioError as error:
-                self._problems += error.problems
+                self._problems += error.diagnostics
         return behaviours
 
     def _wait(self, name: str, trigger: model.Trigger | None) -> WaitFor | None:
@@ -189,7 +189,7 @@ class Builder:
         try:
             condition = self._condition(entry)
         except ScenarioError as error:
-            self._problems += error.problems
+            self._problems += error.diagnostics
             return None
         if condition is None:
             return None
@@ -222,7 +222,7 @@ class Builder:
         if name in registry:
             return True
         remedy = f"take it out, or install a package that registers it; {suggestion(name, registry)}"
-        self._problems.append(Problem(otherwise, remedy, leaf.source, leaf.line))
+        self._problems.append(Diagnostic(otherwise, remedy, leaf.source, leaf.line))
         return False
 
     def _entities(self, name: str) -> list[str]:
@@ -230,7 +230,7 @@ class Builder:
         try:
             return self._selections.members(name)
         except ScenarioError as error:
-            self._problems += error.problems
+            self._problems += error.diagnostics
             return []
 
 

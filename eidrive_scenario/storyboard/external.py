@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import PlacedObject, RoadNetwork, placed_objects
 from eidrive_scenario.world.actor import ActorSpec
@@ -25,7 +25,7 @@ class ExternalObjects:
             name: _find(reference.name, roads) for name, reference in scenario.external.items()
         }
         self.warnings = tuple(
-            Problem(
+            Diagnostic(
                 f"entity {name!r} refers to the external object {scenario.external[name].name!r}, "
                 "of which nothing is known here: a box of half a metre stands for it",
                 "give it a Vehicle, Pedestrian or MiscObject",

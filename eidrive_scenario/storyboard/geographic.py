@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.errors import InputError, Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
@@ -38,8 +38,8 @@ def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, stage: Stage
     try:
         return roads.geographic(latitude, longitude)
     except InputError as error:
-        reason = error.problems[0]
-        told = Problem(f"GeoPosition has no place: {reason.message}", reason.remedy, frame.source, frame.line)
+        reason = error.diagnostics[0]
+        told = Diagnostic(f"GeoPosition has no place: {reason.message}", reason.hint, frame.source, frame.line)
         raise ScenarioError(told) from error
 
 
@@ -59,7 +59,7 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
     wanted = frame.vertical_road_selection or 0
     if not 0 <= wanted < len(levels):
         told = f"GeoPosition asks for road level {wanted}, and there are {len(levels)}"
-        raise ScenarioError(Problem(told, "levels count from the lowest, 0", frame.source, frame.line))
+        raise ScenarioError(Diagnostic(told, "levels count from the lowest, 0", frame.source, frame.line))
     return levels[wanted]
 
 
@@ -84,13 +84,13 @@ def _angles(frame: model.GeoPosition, stage: Stage) -> tuple[float, float]:
             told = (
                 f"GeoPosition has latitude {latitude:g}, longitude {longitude:g}: taken as degrees, as radians end at π"
             )
-            stage.warnings.append(Problem(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
+            stage.warnings.append(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
     else:
         remedy = "give latitudeDeg and longitudeDeg"
-        raise ScenarioError(Problem("GeoPosition lacks latitude or longitude", remedy, frame.source, frame.line))
+        raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", remedy, frame.source, frame.line))
     if in_degrees:
         latitude, longitude = math.radians(latitude), math.radians(longitude)
     if abs(latitude) > math.pi / 2.0 or abs(longitude) > 2.0 * math.pi:
         told = f"GeoPosition has latitude {math.degrees(latitude):g}°, longitude {math.degrees(longitude):g}°"
-        raise ScenarioError(Problem(told, "latitudes end at ±90°", frame.source, frame.line))
+        raise ScenarioError(Diagnostic(told, "latitudes end at ±90°", frame.source, frame.line))
     return latitude, longitude

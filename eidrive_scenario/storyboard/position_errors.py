@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.storyboard.stage import Stage
@@ -27,4 +27,4 @@ def road_origin(frame: Any, stage: Stage) -> LaneLocation:
 
 def position_error(frame: model.Element, message: str, remedy: str = "") -> ScenarioError:
     """Return the error for a position, with its file and line."""
-    return ScenarioError(Problem(f"{type(frame).__name__} {message}", remedy, frame.source, frame.line))
+    return ScenarioError(Diagnostic(f"{type(frame).__name__} {message}", remedy, frame.source, frame.line))

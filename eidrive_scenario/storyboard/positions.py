@@ -58,7 +58,9 @@ def resolve(position: model.Position, stage: Stage, actor: str | None = None) ->
             _enter(frame, stage)
         place = FRAMES[type(frame)](frame, stage, actor)
     except PositionError as error:
-        raise position_error(frame, f"means no place: {error.problems[0].message}", error.problems[0].remedy) from error
+        raise position_error(
+            frame, f"means no place: {error.diagnostics[0].message}", error.diagnostics[0].hint
+        ) from error
     finally:
         if nesting:
             stage.position_depth -= 1

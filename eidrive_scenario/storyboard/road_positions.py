@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
 from eidrive_scenario.storyboard.motion import Place
@@ -136,7 +136,7 @@ def _on_road(frame: model.RoadPosition | model.LanePosition, stage: Stage, roads
     on_road = min(max(s, 0.0), length)
     if abs(on_road - s) > 1e-3:
         message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
-        problem = Problem(message, f"that road is {length:.2f} m long", frame.source, frame.line)
+        problem = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
         if problem not in stage.warnings:
             stage.warnings.append(problem)
     return on_road

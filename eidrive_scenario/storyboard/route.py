@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import (
@@ -39,13 +39,13 @@ def route_of(
     a closed route comes back to its first waypoint; from `start` a way leads there, and the closed route is its lap.
     """
     if roads is None:
-        raise ScenarioError(Problem(f"route {route.name!r} needs a road network", "", route.source, route.line))
+        raise ScenarioError(Diagnostic(f"route {route.name!r} needs a road network", "", route.source, route.line))
     places = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
             raise ScenarioError(
-                Problem("the waypoint is not on a road", "move it onto a lane", waypoint.source, waypoint.line)
+                Diagnostic("the waypoint is not on a road", "move it onto a lane", waypoint.source, waypoint.line)
             )
         places.append(here)
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
@@ -53,9 +53,9 @@ def route_of(
         return _through(places, roads, costs, start, closed=again and route.closed)
     except RouteError as error:
         what = "round the closed" if again and route.closed else "along the"
-        message = f"no way leads {what} route {route.name!r}: {error.problems[0].message}"
+        message = f"no way leads {what} route {route.name!r}: {error.diagnostics[0].message}"
         remedy = "change its waypoints" + (', or say closed="false"' if again and route.closed else "")
-        raise ScenarioError(Problem(message, remedy, route.source, route.line)) from error
+        raise ScenarioError(Diagnostic(message, remedy, route.source, route.line)) from error
 
 
 def _through(

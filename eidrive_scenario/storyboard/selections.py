@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from itertools import product
 from typing import Any, TypeVar
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.storyboard.condition import EntityCondition, Measure
 from eidrive_scenario.storyboard.stage import Stage
@@ -59,7 +59,7 @@ class Selections:
             return found[0]
         group = sorted(self._named_in(element))[0]
         raise ScenarioError(
-            Problem(
+            Diagnostic(
                 f"{type(element).__name__} names the selection {group!r} of {len(self.members(group))} entities",
                 "one entity has to stand there",
                 element.source,
@@ -74,7 +74,7 @@ class Selections:
             return
         if name in above:
             told = f"the selection {name!r} is a member of itself"
-            raise ScenarioError(Problem(told, "take it out", group.source, group.line))
+            raise ScenarioError(Diagnostic(told, "take it out", group.source, group.line))
         for ref in group.members.entity_ref:
             yield from self._members(ref.entity_ref, (*above, name))
         for entry in group.members.by_type:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 
@@ -77,7 +77,7 @@ def signal_cycles(
     return cycles
 
 
-def wrong(cycles: Mapping[str, SignalCycle]) -> Iterator[Problem]:
+def wrong(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
     """What makes no sense in the declarations."""
     for cycle in cycles.values():
         if (cycle.element.delay or 0.0) < 0.0:
@@ -90,7 +90,7 @@ def wrong(cycles: Mapping[str, SignalCycle]) -> Iterator[Problem]:
             yield _problem(cycle, "is its own reference, directly or over others", "take a reference out")
 
 
-def odd(cycles: Mapping[str, SignalCycle]) -> Iterator[Problem]:
+def odd(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
     """What the standard does not allow in the declarations, and yet can be understood."""
     for cycle in cycles.values():
         leader, reference = cycle.leader, cycle.element.reference
@@ -128,6 +128,6 @@ def _group(name: str, roads: RoadNetwork | None) -> tuple[str, ...]:
     return found.signals if found is not None else ()
 
 
-def _problem(cycle: SignalCycle, message: str, remedy: str, at: model.Element | None = None) -> Problem:
+def _problem(cycle: SignalCycle, message: str, remedy: str, at: model.Element | None = None) -> Diagnostic:
     where = at or cycle.element
-    return Problem(f"TrafficSignalController {cycle.name!r} {message}", remedy, where.source, where.line)
+    return Diagnostic(f"TrafficSignalController {cycle.name!r} {message}", remedy, where.source, where.line)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.signal_states import USUAL, lamp_colours, must_stop
@@ -76,13 +76,13 @@ class Signals:
             self._spelled[name] = self._meant(name)
         return self._spelled[name]
 
-    def unknown(self, name: str, element: model.Element) -> Problem | None:
+    def unknown(self, name: str, element: model.Element) -> Diagnostic | None:
         """What is odd about the name of a signal; its state is kept by that name all the same."""
         if self.identify(name) in self._colours:
             return None
         remedy = suggestion(name, self._colours) if self._colours else "the road network has no signals"
         message = f"the road network has no signal {name!r}: its state is kept, and nowhere to be seen"
-        return Problem(message, remedy, element.source, element.line)
+        return Diagnostic(message, remedy, element.source, element.line)
 
     def _shown_in(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """A phase's states by signal; a group's is that of each of its signals, and of its own name without any."""

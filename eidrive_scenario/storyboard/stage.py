@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 from eidrive_scenario.driving.overrides import Override
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
@@ -92,7 +92,7 @@ class Stage:
         self.progress = Progress()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
-        self.warnings: list[Problem] = []
+        self.warnings: list[Diagnostic] = []
         network = scenario.document.road_network
         self.signals = Signals(network.traffic_signals if network is not None else None, roads)
         self.warnings += self.signals.warnings
@@ -214,12 +214,12 @@ class Stage:
         if reference is None:
             message = f"{type(within).__name__} has no {kind.__name__}"
             raise ScenarioError(
-                Problem(message, "give it in place or by a CatalogReference", within.source, within.line)
+                Diagnostic(message, "give it in place or by a CatalogReference", within.source, within.line)
             )
         entry = self.scenario.resolved(reference)
         if not isinstance(entry, kind):
             raise ScenarioError(
-                Problem(
+                Diagnostic(
                     f"{reference.catalog_name}/{reference.entry_name} is a {type(entry).__name__}",
                     f"a {kind.__name__} belongs here",
                     reference.source,

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, SupportsFloat
 
-from eidrive_scenario.errors import InvalidResult, Problem, RegistryError, suggestion
+from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry, construct
 from eidrive_scenario.storyboard.actor import Actor, is_ours
@@ -70,7 +70,7 @@ def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, st
     return found
 
 
-def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Problem]:
+def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Diagnostic]:
     """Warnings of controllers that name no module of ours and for which nothing stands in."""
     names = {controller.name for actor in actors.values() for controller in actor.controllers}
     astray = sorted(name for name in wanted if name not in names)
@@ -78,7 +78,7 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[P
     if astray:
         remedy += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
     alone = [
-        Problem(
+        Diagnostic(
             f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
             remedy,
             controller.source,
@@ -89,9 +89,11 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[P
         if not is_ours(controller) and controller.name not in wanted
     ]
     ours = {controller.name for actor in actors.values() for controller in actor.controllers if is_ours(controller)}
-    odd = [Problem(f"nothing stands in for {name!r}, which is a controller of ours") for name in wanted if name in ours]
+    odd = [
+        Diagnostic(f"nothing stands in for {name!r}, which is a controller of ours") for name in wanted if name in ours
+    ]
     if not alone:
         known = names - ours
         message = "the stand-in for {!r} found no controller of that name"
-        odd += [Problem(message.format(name), suggestion(name, known)) for name in astray]
+        odd += [Diagnostic(message.format(name), suggestion(name, known)) for name in astray]
     return [*odd, *alone]

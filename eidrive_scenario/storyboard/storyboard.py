@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eidrive_scenario.errors import Problem, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import Pose, RoadNetwork
@@ -75,7 +75,7 @@ class Storyboard:
         waiting = [stand_in.actor.name for stand_in in self._stand_ins if stand_in.takes_poses]
         if name not in waiting:
             what = f"nobody waits for poses of {name!r}"
-            raise SettingError(Problem(what, "let the stand-in `external` play its controller", "set_pose"))
+            raise SettingError(Diagnostic(what, "let the stand-in `external` play its controller", "set_pose"))
         self.stage.given_poses[name] = GivenPose(pose, speed)
 
     def initial(self) -> Commands:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
@@ -51,7 +51,7 @@ def refuse_circles(actors: Mapping[str, Actor]) -> None:
             actor = actors[actor.trailer]
         if name in train:
             where = actors[name].entity
-            problems.append(Problem(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
+            problems.append(Diagnostic(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
     if problems:
         raise ScenarioError(problems)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Element, Maneuver
 from eidrive_scenario.storyboard.elements import ActElement, StoryElement
@@ -15,7 +15,7 @@ _SHOWN = 5
 """Elements that are named; of more, the number is given."""
 
 
-def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> list[Problem]:
+def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> list[Diagnostic]:
     """Return a warning for each act that never started, and for each event that never did in an act that started.
 
     What may never be executed, as its maximumExecutionCount is 0, is left out.
@@ -35,7 +35,7 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
         if skipped:
             why = f"it was skipped {skipped} times by its priority" if skipped > 1 else "it was skipped by its priority"
         problems.append(
-            Problem(
+            Diagnostic(
                 f"{element.kind} {element.name!r} never started: {why} until the run ended at {time:.2f} s ({end})",
                 f"eidrive run --explain {element.name!r} states what its trigger lacked",
                 source,
@@ -45,7 +45,7 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     if len(found) > _SHOWN:
         more = len(found) - _SHOWN
         what = f"{more} more {'act or event' if more == 1 else 'acts and events'} never started"
-        problems.append(Problem(what, "eidrive run --log - shows those that did", str(scenario.path or "")))
+        problems.append(Diagnostic(what, "eidrive run --log - shows those that did", str(scenario.path or "")))
     return problems
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.geometry import points_in_polygon
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.location import PositionError
@@ -134,4 +134,4 @@ def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list
                 other = RoadEnd(entry.road, START if entry.end == END else END)
                 seen |= {entry, other}
                 queue.append([*chain, entry, other])
-    raise PositionError(Problem(f"no roads lead from road {start!r} to road {goal!r}", "correct the road cursors"))
+    raise PositionError(Diagnostic(f"no roads lead from road {start!r} to road {goal!r}", "correct the road cursors"))

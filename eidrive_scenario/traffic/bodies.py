@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from eidrive_scenario.errors import Problem, ScenarioError
+from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario, model, read_document
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
@@ -144,7 +144,7 @@ class Mixture:
             entity = self._scenario.resolved(entity)
         if not isinstance(entity, model.Vehicle | model.Pedestrian):
             what = f"traffic cannot be made of a {type(entity).__name__}"
-            raise ScenarioError(Problem(what, "give a Vehicle or a Pedestrian", template.source, template.line))
+            raise ScenarioError(Diagnostic(what, "give a Vehicle or a Pedestrian", template.source, template.line))
         settings = next((self._settings(one) for one in template.object_controller), DriverSettings())
         return _participant(actor_spec(entity.name, entity), settings)
 
@@ -166,7 +166,7 @@ class Mixture:
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
             what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are no shares"
-            raise ScenarioError(Problem(what, "give weights of at least 0, not all 0", where.source, where.line))
+            raise ScenarioError(Diagnostic(what, "give weights of at least 0, not all 0", where.source, where.line))
         return Weighted(things, weights)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files import MIB, is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.v2x.message import Message, StationState
 
@@ -58,30 +58,30 @@ class Asn1Encoder:
             import asn1tools
         except ImportError as error:
             remedy = "install it: pip install 'eidrive-scenario[asn1]'"
-            raise SettingError(Problem("asn1_files needs the package asn1tools", remedy, source, line)) from error
+            raise SettingError(Diagnostic("asn1_files needs the package asn1tools", remedy, source, line)) from error
         for file in files:
             if not is_regular_file(file):
-                problem = Problem(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
+                problem = Diagnostic(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
                 raise SettingError(problem)
         try:
             texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
             self._modules = asn1tools.compile_string("\n".join(texts), "uper")
         except OSError as error:
-            problem = Problem(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
+            problem = Diagnostic(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
             raise SettingError(problem) from error
         except Exception as error:  # asn1tools raises errors of many kinds for modules that are wrong
             names = ", ".join(str(file) for file in files)
             message = f"{names}: {_without_quotes(error)}"
-            raise SettingError(Problem(message, "correct the module", source, line)) from error
+            raise SettingError(Diagnostic(message, "correct the module", source, line)) from error
         for kind in kinds:
             if TYPES[kind] not in self._modules.types:
                 message = f"the ASN.1 modules have no type {TYPES[kind]!r}, which a {kind} needs"
-                raise SettingError(Problem(message, "add the file that defines it", source, line))
+                raise SettingError(Diagnostic(message, "add the file that defines it", source, line))
         try:
             for kind in kinds:
                 self._try(kind)
         except SettingError as error:
-            raise SettingError([replace(problem, source=source, line=line) for problem in error.problems]) from error
+            raise SettingError([replace(problem, source=source, line=line) for problem in error.diagnostics]) from error
 
     def _try(self, kind: str) -> None:
         """Encode messages of this kind with and without what is optional."""
@@ -104,7 +104,7 @@ class Asn1Encoder:
         except Exception as error:  # of many kinds, such as AttributeError for a type that refers to itself
             why = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without all that we wanted to say
             remedy = "docs/channels.md says after which standards messages are laid out"
-            raise SettingError(Problem(f"the ASN.1 modules take no {message.kind}: {why}", remedy)) from error
+            raise SettingError(Diagnostic(f"the ASN.1 modules take no {message.kind}: {why}", remedy)) from error
         return encoded
 
     def decode(self, kind: str, data: bytes) -> Any:

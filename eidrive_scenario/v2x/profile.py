@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import Problem, RegistryError, SettingError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError, quoted, suggestion
 from eidrive_scenario.files import is_regular_file
 from eidrive_scenario.openscenario.parameters import Scope
 from eidrive_scenario.openscenario.references import is_reference, resolve_references
@@ -65,7 +65,7 @@ def load_profile(
             lines = {} if line is None else key_lines(source, line)
             return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
         if not text:
-            raise SettingError(Problem("the channel has no name", "write `ideal`, or `none`", origin, line))
+            raise SettingError(Diagnostic("the channel has no name", "write `ideal`, or `none`", origin, line))
         source = Path(text)
     path = _find(source, folders)
     if path is None:
@@ -75,7 +75,7 @@ def load_profile(
         remedy = suggestion(source.stem, names)
         if is_regular_file(source):
             what, remedy = f"the file {quoted(str(source))} is no channel profile", "give one that ends in .yaml"
-        raise SettingError(Problem(what, remedy, origin, line))
+        raise SettingError(Diagnostic(what, remedy, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
 
@@ -124,7 +124,9 @@ def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
         found = f"found {type(data).__name__}" if data is not None else "it is empty"
-        raise SettingError(Problem(f"a channel profile is a mapping, {found}", "write `model: composed`", source, line))
+        raise SettingError(
+            Diagnostic(f"a channel profile is a mapping, {found}", "write `model: composed`", source, line)
+        )
     return data
 
 
@@ -142,7 +144,7 @@ def _parse(
     model = data.get("model", ChannelProfile.model_fields["model"].default)
     models = registry("channels")
     if not isinstance(model, str) or model not in models:
-        problem = Problem(
+        problem = Diagnostic(
             f"unknown channel model {quoted(model)}", suggestion(str(model), models), source, lines.get("model", line)
         )
         raise SettingError(problem)

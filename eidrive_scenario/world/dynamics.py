@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 GRAVITY = 9.81
@@ -100,7 +100,7 @@ class VehicleParameters:
         """The parameters in a vehicle's specification. Raises SettingError for a Property that makes no sense."""
         if spec.wheelbase <= 0.0:
             what = f"{spec.name!r} cannot be driven: its axles are not apart"
-            raise SettingError(Problem(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))
+            raise SettingError(Diagnostic(what, "give its Vehicle a FrontAxle whose positionX is above the RearAxle's"))
         axles = _axles(spec)
         front_group, rear_group = [axle.x for axle in axles if axle.front], [axle.x for axle in axles if not axle.front]
         wheelbase, rear, usual = spec.wheelbase, 0.0, 0.55
@@ -153,7 +153,7 @@ def _number(spec: ActorSpec, name: str, default: float, *, zero: bool = False, b
     if not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0)) and value < below):
         bound = "at least 0" if zero else "above 0"
         remedy = f"give a number {bound}" + (f" and at most {below:g}" if below < math.inf else "")
-        raise SettingError(Problem(f"{spec.name!r}: Property {name!r} is {text!r}", remedy))
+        raise SettingError(Diagnostic(f"{spec.name!r}: Property {name!r} is {text!r}", remedy))
     return value
 
 

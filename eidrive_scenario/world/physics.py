@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.world.actor import Control, Vector3
 from eidrive_scenario.world.bodies import Body, ScriptedBody
@@ -39,11 +39,11 @@ def substeps_per_tick(dt: float, physics_rate: float) -> int:
     """Physics steps in one tick. Raises SettingError unless the tick is a whole number of them, of at most MAX_TICK."""
     exact = dt * physics_rate
     if not abs(dt) <= MAX_TICK or not math.isfinite(exact):
-        raise SettingError(Problem(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
+        raise SettingError(Diagnostic(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
         what = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
-        raise SettingError(Problem(what, "choose dt and the rate so that this is a whole number, at least 1"))
+        raise SettingError(Diagnostic(what, "choose dt and the rate so that this is a whole number, at least 1"))
     return count
 
 

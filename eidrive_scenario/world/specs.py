@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 
-from eidrive_scenario.errors import Problem, ScenarioError, suggestion
+from eidrive_scenario.errors import Diagnostic, ScenarioError, suggestion
 from eidrive_scenario.openscenario.model import Axle, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 
@@ -78,7 +78,9 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     given = (dimensions.length, dimensions.width, dimensions.height)
     if min(given) < 0.0:
         what = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
-        raise ScenarioError(Problem(what, "give length, width and height above 0", dimensions.source, dimensions.line))
+        raise ScenarioError(
+            Diagnostic(what, "give length, width and height above 0", dimensions.source, dimensions.line)
+        )
     length, width, height = (own or usual for own, usual in zip(given, _USUAL_SIZE[shape], strict=True))
     lift = 0.0 if dimensions.height else height / 2
     common = ActorSpec(
@@ -123,7 +125,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
     if wanted is not None:
         if wanted not in SHAPES:
             line, source = _place(entity, SHAPE_PROPERTY)
-            raise ScenarioError(Problem(f"unknown shape {wanted!r}", suggestion(wanted, SHAPES), source, line))
+            raise ScenarioError(Diagnostic(f"unknown shape {wanted!r}", suggestion(wanted, SHAPES), source, line))
         return wanted
     if isinstance(entity, Pedestrian):
         return "pedestrian"
@@ -156,7 +158,7 @@ def _colour(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str
         return None
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
         line, source = _place(entity, COLOUR_PROPERTY)
-        raise ScenarioError(Problem(f"colour {text!r} is not understood", "write it as #rrggbb", source, line))
+        raise ScenarioError(Diagnostic(f"colour {text!r} is not understood", "write it as #rrggbb", source, line))
     red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from eidrive_scenario.errors import Problem, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.library import resolve
 from eidrive_scenario.settings import Settings, load_yaml_file, parse_settings
 
@@ -125,10 +125,12 @@ def load_weather(source: str | Path, *, origin: str = "") -> Weather:
     try:
         path = resolve("weather", source)
     except SettingError as error:
-        raise SettingError([replace(problem, source=origin) for problem in error.problems]) from error
+        raise SettingError([replace(problem, source=origin) for problem in error.diagnostics]) from error
     data, lines = load_yaml_file(path)
     if not isinstance(data, Mapping):
         found = "nothing" if data is None else type(data).__name__
-        raise SettingError(Problem(f"a weather is a mapping, found {found}", "write `cloud_cover: 0.5`", str(path), 1))
+        raise SettingError(
+            Diagnostic(f"a weather is a mapping, found {found}", "write `cloud_cover: 0.5`", str(path), 1)
+        )
     weather = parse_settings(Weather, data, source=str(path), line=1, lines=lines)
     return weather if weather.name else weather.model_copy(update={"name": path.stem})

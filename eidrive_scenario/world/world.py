@@ -9,7 +9,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eidrive_scenario.errors import Problem, SettingError, SimulationError, suggestion
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
@@ -137,7 +137,7 @@ class World:
     def set_friction(self, scale: float) -> None:
         """Scale the grip of all tyres: 1 on a dry road, less on a wet one."""
         if not scale > 0.0:
-            raise SettingError(Problem(f"the road's friction scale is {scale:g}", "give a number above 0"))
+            raise SettingError(Diagnostic(f"the road's friction scale is {scale:g}", "give a number above 0"))
         self._friction = scale
 
     @property

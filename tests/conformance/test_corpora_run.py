@@ -82,8 +82,8 @@ def _placed(private: object) -> bool:
 def test_a_broken_scenario_says_what_is_wrong_with_it(name: str, record_property: pytest.RecordProperty) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(Path(CORPORA) / name)
-    assert all(problem.line for problem in caught.value.problems)
-    record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.problems[0].line}")
+    assert all(problem.line for problem in caught.value.diagnostics)
+    record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.diagnostics[0].line}")
 
 
 def test_no_scenario_is_left_out() -> None:

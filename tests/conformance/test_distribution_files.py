@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import ConstraintError
-from eidrive_scenario.experiments.distribution_inspection import inspect_distribution
+from eidrive_scenario.experiments.distribution_checks import check_distribution
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -75,7 +75,7 @@ def test_a_cut_in_at_a_gap_of_less_than_nothing_never_begins() -> None:
 def test_check_tells_of_such_runs() -> None:
     """In the others the condition can hold."""
     path = next(path for path in distributions() if path.name == LARGEST)
-    (told,) = (one for one in inspect_distribution(path).warnings if one.rule == "impossible-condition")
+    (told,) = (one for one in check_distribution(path).warnings if one.rule == "impossible-condition")
     number, _, what = told.message.removeprefix("in run ").partition(": ")
     assert load_distribution(path)[int(number)].parameters[TRIGGER] == "0"
     assert what.startswith("condition 'CutInStartCondition' never counts as true: a distance is never negative")
@@ -84,7 +84,7 @@ def test_check_tells_of_such_runs() -> None:
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
 def test_every_value_makes_a_scenario(path: Path) -> None:
     """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""
-    findings = inspect_distribution(path)
+    findings = check_distribution(path)
     assert findings.problems == ()
     own = [warning for warning in findings.warnings if warning.source == str(path)]
     assert all("outside its constraints" in warning.message for warning in own)

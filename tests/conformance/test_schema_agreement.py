@@ -22,8 +22,8 @@ from lxml import etree
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_distribution, load_scenario
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.document import read_root
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.parsing import open_document
 
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
@@ -124,7 +124,7 @@ class Judge:
         schema = self._schemas[self.version_of(root) or otherwise]
         valid = schema.validate(root)
         complaints = () if valid else tuple(str(entry.message) for entry in schema.error_log)
-        findings = Findings()
+        findings = DiagnosticCollector()
         read_root(open_document(xml), findings)
         return Judged(what, complaints, tuple(problem.message for problem in findings.problems))
 

@@ -11,7 +11,7 @@ from lxml import etree
 from scenariogeneration import xodr, xosc
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.experiments.inspection import inspect_scenario
+from eidrive_scenario.experiments.scenario_checks import check_scenario
 from eidrive_scenario.experiments.single_run import play
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording import read_recording
@@ -128,7 +128,7 @@ def test_a_mistake_has_the_line_that_the_file_would_have(cut_in: Build, tmp_path
     for source in (path, wrong):
         with pytest.raises(ScenarioError) as caught:
             load_scenario(source)
-        problems += caught.value.problems
+        problems += caught.value.diagnostics
     in_file, in_python = problems
     assert "names the entity 'Taget', which is not there; did you mean 'Target'?" in str(in_python)
     assert in_python.source == "<Scenario>"
@@ -184,14 +184,14 @@ def test_what_is_no_scenario_is_refused() -> None:
 
 
 def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
-    findings = inspect_scenario(cut_in())
+    findings = check_scenario(cut_in())
     assert (findings.problems, findings.warnings) == ((), ())
     scenario = cut_in()
     scenario.parameters.add_parameter(xosc.Parameter("Speed", xosc.ParameterType.double, "3"))
-    (unused,) = inspect_scenario(scenario).warnings
+    (unused,) = check_scenario(scenario).warnings
     assert str(unused).startswith("<Scenario>:5: the parameter 'Speed' is never used")
-    (problem,) = inspect_scenario(cut_in(changing="Taget")).problems
-    assert "did you mean 'Target'?" in problem.remedy
+    (problem,) = check_scenario(cut_in(changing="Taget")).problems
+    assert "did you mean 'Target'?" in problem.hint
 
 
 def test_a_distribution_over_it(cut_in: Build) -> None:

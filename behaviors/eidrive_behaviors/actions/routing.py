@@ -75,7 +75,7 @@ class AcquirePositionAction(ActionBehaviour):
             try:
                 route = self.stage.roads.route(here, place.location)
             except RouteError as error:
-                raise self.problem(f"finds {error.problems[0].message}", error.problems[0].remedy) from None
+                raise self.problem(f"finds {error.diagnostics[0].message}", error.diagnostics[0].hint) from None
             follow(self, route)
         elif self.actor.driven:
             goal = self.actor.goal

@@ -8,9 +8,9 @@ from py_trees.common import Status
 
 from eidrive_scenario.api import (
     ActionBehaviour,
+    Diagnostic,
     InputError,
     Place,
-    Problem,
     ScenarioError,
     Stage,
     model,
@@ -258,7 +258,9 @@ class TrafficAreaAction(TrafficInstanceAction):
             try:
                 found += traffic.road_range(self.stage.roads, cursors, entry.length)
             except InputError as error:
-                found_problems = [Problem(one.message, one.remedy, entry.source, entry.line) for one in error.problems]
+                found_problems = [
+                    Diagnostic(one.message, one.hint, entry.source, entry.line) for one in error.diagnostics
+                ]
                 raise ScenarioError(found_problems) from error
         return found
 

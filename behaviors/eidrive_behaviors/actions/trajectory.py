@@ -79,7 +79,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
             )
             what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
-            stage.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").problems
+            stage.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").diagnostics
 
     @property
     def controls(self) -> Domain:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from eidrive_scenario.api import (
     Condition,
-    Problem,
+    Diagnostic,
     ScenarioError,
     Stage,
     State,
@@ -34,7 +34,7 @@ class StoryboardElementStateCondition(Condition):
         self._watch = stage.progress.watch(kind, name)
         if self._watch is None:
             raise ScenarioError(
-                Problem(
+                Diagnostic(
                     f"the storyboard has no {kind} named {name!r}",
                     suggestion(name, stage.progress.names(kind)),
                     self.element.source,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import Condition, Problem, ScenarioError, Stage, model, suggestion
+from eidrive_scenario.api import Condition, Diagnostic, ScenarioError, Stage, model, suggestion
 
 
 class TrafficSignalCondition(Condition):
@@ -45,7 +45,7 @@ class TrafficSignalControllerCondition(Condition):
         if element.phase not in phases:
             what = f"{element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
             raise ScenarioError(
-                Problem(
+                Diagnostic(
                     f"TrafficSignalControllerCondition can never hold: {what}",
                     suggestion(element.phase, phases),
                     element.source,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.api import Condition, Measure, Problem, Stage, compares, in_words, model, relation
+from eidrive_scenario.api import Condition, Diagnostic, Measure, Stage, compares, in_words, model, relation
 
 
 class SimulationTimeCondition(Condition):
@@ -48,7 +48,7 @@ class TimeOfDayCondition(Condition):
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
             what = "TimeOfDayCondition never holds: no environment of the scenario has a TimeOfDay"
             remedy = "give one by an EnvironmentAction in Init"
-            stage.warnings.append(Problem(what, remedy, self.element.source, self.element.line))
+            stage.warnings.append(Diagnostic(what, remedy, self.element.source, self.element.line))
 
     def holds(self, stage: Stage) -> bool:
         """Compare the clock."""

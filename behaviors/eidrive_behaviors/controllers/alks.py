@@ -8,7 +8,7 @@ from eidrive_behaviors.controllers.properties import number
 from eidrive_behaviors.controllers.reference_driver import DriverSettings, ReferenceDriver
 from eidrive_behaviors.controllers.road_ahead import Ahead, RoadAhead
 from eidrive_behaviors.controllers.safety_models import Fsm, Own, Regulation, Rss, SafetyModel
-from eidrive_scenario.api import Actor, Problem, ScenarioError, Stage, StandIn, model, suggestion
+from eidrive_scenario.api import Actor, Diagnostic, ScenarioError, Stage, StandIn, model, suggestion
 
 COMFORT = 2.0
 """Back to the set speed on a free road [m/s²]."""
@@ -102,7 +102,7 @@ class AlksDriver(StandIn):
 
     def _problem(self, message: str, remedy: str) -> ScenarioError:
         here = self._controller
-        return ScenarioError(Problem(f"the controller {here.name!r} {message}", remedy, here.source, here.line))
+        return ScenarioError(Diagnostic(f"the controller {here.name!r} {message}", remedy, here.source, here.line))
 
 
 _TRUTH: Mapping[str, bool] = {"true": True, "1": True, "false": False, "0": False}

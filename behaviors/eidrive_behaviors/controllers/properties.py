@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
-from eidrive_scenario.api import Problem, ScenarioError, model
+from eidrive_scenario.api import Diagnostic, ScenarioError, model
 
 Usual = TypeVar("Usual", float, float | None)
 
@@ -24,4 +24,4 @@ def number(controller: model.Controller, name: str, usual: Usual, *, least: floa
         return value
     remedy = "give it a number" if least == -math.inf else f"give it a number of at least {least:g}"
     message = f"the controller {controller.name!r} has the property {name} = {entry.value!r}"
-    raise ScenarioError(Problem(message, remedy, entry.source, entry.line))
+    raise ScenarioError(Diagnostic(message, remedy, entry.source, entry.line))

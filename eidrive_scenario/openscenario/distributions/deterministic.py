@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from eidrive_scenario.errors import Problem
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import (
     Deterministic,
     DeterministicMultiParameterDistribution,
@@ -35,7 +35,7 @@ class Choices(Protocol):
         """How many choices there are."""
 
     @property
-    def names(self) -> Mapping[str, Problem]:
+    def names(self) -> Mapping[str, Diagnostic]:
         """The parameters, and where the file gives them a value first."""
 
     def at(self, index: int) -> Assignments:
@@ -54,7 +54,7 @@ class Combinations:
         return math.prod(one.count for one in self.choices)
 
     @property
-    def names(self) -> Mapping[str, Problem]:
+    def names(self) -> Mapping[str, Diagnostic]:
         """The parameters, and where the file gives them a value first."""
         return {name: origin for one in reversed(self.choices) for name, origin in one.names.items()}
 
@@ -74,7 +74,7 @@ class Listed:
     choices: tuple[Assignments, ...]
 
     @property
-    def names(self) -> Mapping[str, Problem]:
+    def names(self) -> Mapping[str, Diagnostic]:
         """The parameters, and where the file gives them a value first."""
         return {name: given.origin or _NOWHERE for choice in reversed(self.choices) for name, given in choice.items()}
 
@@ -100,10 +100,10 @@ class Steps:
     lower: Fraction
     step: Fraction
     count: int
-    origin: Problem
+    origin: Diagnostic
 
     @property
-    def names(self) -> Mapping[str, Problem]:
+    def names(self) -> Mapping[str, Diagnostic]:
         """The parameter, and where its range stands."""
         return {self.name: self.origin}
 
@@ -112,10 +112,10 @@ class Steps:
         return {self.name: Assignment(written(float(self.lower + index * self.step)), self.origin)}
 
 
-_NOWHERE = Problem("")
+_NOWHERE = Diagnostic("")
 
 
-def combinations_of(deterministic: Deterministic, findings: Findings) -> Combinations:
+def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector) -> Combinations:
     """The distributions in the order of the file; what is wrong with them becomes a finding."""
     both: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
         *deterministic.deterministic_multi_parameter_distribution,
@@ -140,9 +140,9 @@ def combinations_of(deterministic: Deterministic, findings: Findings) -> Combina
     return Combinations(tuple(found))
 
 
-def varied_once(names: Iterable[tuple[str, Problem]], findings: Findings) -> None:
+def varied_once(names: Iterable[tuple[str, Diagnostic]], findings: DiagnosticCollector) -> None:
     """Reports every parameter that more than one distribution gives a value."""
-    seen: dict[str, Problem] = {}
+    seen: dict[str, Diagnostic] = {}
     for name, origin in names:
         if name in seen:
             message = f"the parameter {name!r} is varied by another distribution too"
@@ -150,7 +150,7 @@ def varied_once(names: Iterable[tuple[str, Problem]], findings: Findings) -> Non
         seen.setdefault(name, origin)
 
 
-def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: Findings) -> Listed:
+def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: DiagnosticCollector) -> Listed:
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
@@ -164,7 +164,7 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, findings:
     return Listed(tuple(choices))
 
 
-def _single(distribution: DeterministicSingleParameterDistribution, findings: Findings) -> Choices | None:
+def _single(distribution: DeterministicSingleParameterDistribution, findings: DiagnosticCollector) -> Choices | None:
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
         elements = distribution.distribution_set.element
@@ -175,7 +175,7 @@ def _single(distribution: DeterministicSingleParameterDistribution, findings: Fi
     return None
 
 
-def _steps(name: str, given: DistributionRange, findings: Findings) -> Steps | None:
+def _steps(name: str, given: DistributionRange, findings: DiagnosticCollector) -> Steps | None:
     """From the lower limit on, a step at a time, as long as the value is not above the upper limit."""
     if not sound_range(given.range, findings, finite=True):
         return None
@@ -197,7 +197,7 @@ def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def sound_range(given: Range, findings: Findings, *, finite: bool = False) -> bool:
+def sound_range(given: Range, findings: DiagnosticCollector, *, finite: bool = False) -> bool:
     """Whether the limits are numbers in order; if they are not, that is a finding."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
@@ -211,7 +211,7 @@ def sound_range(given: Range, findings: Findings, *, finite: bool = False) -> bo
     return True
 
 
-def refuse_user_defined(element: Element, name: str, instead: str, findings: Findings) -> None:
+def refuse_user_defined(element: Element, name: str, instead: str, findings: DiagnosticCollector) -> None:
     """What only another tool understands cannot be unfolded."""
     findings.error(
         f"the values of {name!r} come from a UserDefinedDistribution, whose meaning is left to a tool",
@@ -221,6 +221,6 @@ def refuse_user_defined(element: Element, name: str, instead: str, findings: Fin
     )
 
 
-def place(element: Element) -> Problem:
+def place(element: Element) -> Diagnostic:
     """Where a value was given."""
-    return Problem("", "", element.source, element.line)
+    return Diagnostic("", "", element.source, element.line)

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.special import log_ndtr, ndtri_exp, pdtr, pdtrc
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
     place,
@@ -26,7 +27,6 @@ from eidrive_scenario.openscenario.distributions.deterministic import (
     sound_range,
     varied_once,
 )
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import (
     Element,
     Histogram,
@@ -50,7 +50,7 @@ _MOST_EVENTS = 2.0**53
 """Whole numbers beyond have no neighbours among floating-point numbers."""
 
 
-def quantile_of(distribution: StochasticDistribution, findings: Findings) -> Quantile | None:
+def quantile_of(distribution: StochasticDistribution, findings: DiagnosticCollector) -> Quantile | None:
     """How the parameter's value follows from a share; None where the distribution is wrong, which is a finding."""
     chosen = distribution.chosen()
     build = _BUILD.get(type(chosen))
@@ -81,7 +81,7 @@ class Draws:
     count: int
     seed: float
     quantiles: Mapping[str, Quantile]
-    names: Mapping[str, Problem]
+    names: Mapping[str, Diagnostic]
 
     def at(self, index: int) -> Assignments:
         """The values in the run of that index."""
@@ -93,7 +93,7 @@ class Draws:
         return value if isinstance(value, str) else written(value)
 
 
-def draws_of(stochastic: Stochastic, seed: float, findings: Findings) -> Draws:
+def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector) -> Draws:
     """The distributions of the parameters; what is wrong with them becomes a finding.
 
     seed    for a file that names no randomSeed
@@ -112,7 +112,7 @@ def draws_of(stochastic: Stochastic, seed: float, findings: Findings) -> Draws:
     )
 
 
-def _uniform(given: UniformDistribution, findings: Findings) -> Quantile:
+def _uniform(given: UniformDistribution, findings: DiagnosticCollector) -> Quantile:
     sound_range(given.range, findings, finite=True)
     return partial(_from_range, given.range.lower_limit, given.range.upper_limit)
 
@@ -121,13 +121,13 @@ def _from_range(lower: float, upper: float, share: float) -> float:
     return min(max(lower * (1 - share) + upper * share, lower), upper)
 
 
-def _normal(given: NormalDistribution, findings: Findings) -> Quantile:
+def _normal(given: NormalDistribution, findings: DiagnosticCollector) -> Quantile:
     lower, upper = _limits(given.range, findings)
     _check_normal(given, findings)
     return partial(_from_normal, given.expected_value, math.sqrt(max(given.variance, 0)), lower, upper)
 
 
-def _log_normal(given: LogNormalDistribution, findings: Findings) -> Quantile:
+def _log_normal(given: LogNormalDistribution, findings: DiagnosticCollector) -> Quantile:
     """Expected value and variance are those of the logarithm: the standard lets the former be negative."""
     lower, upper = _limits(given.range, findings)
     _check_normal(given, findings)
@@ -138,7 +138,7 @@ def _log_normal(given: LogNormalDistribution, findings: Findings) -> Quantile:
     return partial(_from_log_normal, given.expected_value, math.sqrt(max(given.variance, 0)), max(lower, 0), upper)
 
 
-def _check_normal(given: NormalDistribution | LogNormalDistribution, findings: Findings) -> None:
+def _check_normal(given: NormalDistribution | LogNormalDistribution, findings: DiagnosticCollector) -> None:
     if not math.isfinite(given.expected_value):
         _wrong(given, f"has the expected value {written(given.expected_value)}", "give a finite number", findings)
     if not 0 < given.variance < math.inf:
@@ -171,7 +171,7 @@ def _standard_normal(low: float, high: float, share: float) -> float:
     return min(max(float(ndtri_exp(above + math.log(ratio + share * (1 - ratio)))), low), high)
 
 
-def _poisson(given: PoissonDistribution, findings: Findings) -> Quantile:
+def _poisson(given: PoissonDistribution, findings: DiagnosticCollector) -> Quantile:
     mean = given.expected_value
     lower, upper = _limits(given.range, findings)
     low = max(0, math.ceil(lower)) if math.isfinite(lower) else 0
@@ -214,14 +214,14 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
     return 1.0 if count is None else float(pdtr(count - 1, mean)) if count > 0 else 0.0
 
 
-def _histogram(given: Histogram, findings: Findings) -> Quantile:
+def _histogram(given: Histogram, findings: DiagnosticCollector) -> Quantile:
     if all([sound_range(one.range, findings, finite=True) for one in given.bin]):
         _check_overlap(given.bin, findings)
     limits = tuple((one.range.lower_limit, one.range.upper_limit) for one in given.bin)
     return partial(_from_histogram, limits, _accumulated(given, given.bin, findings))
 
 
-def _check_overlap(bins: tuple[HistogramBin, ...], findings: Findings) -> None:
+def _check_overlap(bins: tuple[HistogramBin, ...], findings: DiagnosticCollector) -> None:
     for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
             later = max(before, after, key=lambda one: one.line)
@@ -233,7 +233,7 @@ def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[
     return _from_range(*limits[index], within)
 
 
-def _value_set(given: ProbabilityDistributionSet, findings: Findings) -> Quantile:
+def _value_set(given: ProbabilityDistributionSet, findings: DiagnosticCollector) -> Quantile:
     values = tuple(one.value for one in given.element)
     return partial(_from_values, values, _accumulated(given, given.element, findings))
 
@@ -245,7 +245,7 @@ def _from_values(values: tuple[str, ...], accumulated: tuple[float, ...], share:
 def _accumulated(
     given: Element,
     parts: tuple[HistogramBin, ...] | tuple[ProbabilityDistributionSetElement, ...],
-    findings: Findings,
+    findings: DiagnosticCollector,
 ) -> tuple[float, ...]:
     """The weights added up from the first part on."""
     for one in parts:
@@ -265,19 +265,19 @@ def _weighed(accumulated: tuple[float, ...], share: float) -> tuple[int, float]:
     return index, (reached - start) / (accumulated[index] - start)
 
 
-def _limits(given: Range | None, findings: Findings) -> tuple[float, float]:
+def _limits(given: Range | None, findings: DiagnosticCollector) -> tuple[float, float]:
     if given is None:
         return -math.inf, math.inf
     sound_range(given, findings)
     return given.lower_limit, given.upper_limit
 
 
-def _wrong(element: Element, what: str, remedy: str, findings: Findings) -> None:
+def _wrong(element: Element, what: str, remedy: str, findings: DiagnosticCollector) -> None:
     kind = type(element).__name__
     findings.error(f"{kind} {what}", remedy, source=element.source, line=element.line)
 
 
-_BUILD: dict[type[Element], Callable[[Any, Findings], Quantile]] = {
+_BUILD: dict[type[Element], Callable[[Any, DiagnosticCollector], Quantile]] = {
     Histogram: _histogram,
     LogNormalDistribution: _log_normal,
     NormalDistribution: _normal,

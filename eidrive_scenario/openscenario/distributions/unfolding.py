@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import overload
 
-from eidrive_scenario.errors import Problem, ScenarioError, quoted, suggestion
+from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
 from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import Combinations, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import Draws, draws_of
 from eidrive_scenario.openscenario.document import read_root
-from eidrive_scenario.openscenario.findings import Findings
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.openscenario.parsing import Source, open_document
@@ -56,7 +56,7 @@ class Unfolding(Sequence[ConcreteRun]):
     """
 
     def __init__(
-        self, source: str, scenario: Path, varied: Combinations | Draws, warnings: tuple[Problem, ...] = ()
+        self, source: str, scenario: Path, varied: Combinations | Draws, warnings: tuple[Diagnostic, ...] = ()
     ) -> None:
         self.source = source
         self.scenario = scenario
@@ -103,19 +103,21 @@ def load_distribution(source: Source, *, seed: float = 1) -> Unfolding:
     Raises ScenarioError with everything that is wrong with the file, each as file:line.
     """
     document = open_document(source)
-    findings = Findings()
+    findings = DiagnosticCollector()
     read = read_root(document, findings)
     distribution = read.root.parameter_value_distribution if read is not None else None
     if read is None or distribution is None or findings.problems:
-        findings.settle()
+        findings.raise_on_error()
         raise ScenarioError(_other_kind(read.root if read else None, document.name))
     varied = _varied(distribution, seed, findings)
-    report = findings.error if document.path is not None else findings.warn
+    report = findings.error if document.path is not None else findings.warning
     scenario = _scenario_file(distribution.scenario_file, document.folder, report)
-    return Unfolding(document.name, scenario, varied, findings.settle())
+    return Unfolding(document.name, scenario, varied, findings.raise_on_error())
 
 
-def _varied(distribution: ParameterValueDistribution, seed: float, findings: Findings) -> Combinations | Draws:
+def _varied(
+    distribution: ParameterValueDistribution, seed: float, findings: DiagnosticCollector
+) -> Combinations | Draws:
     if distribution.stochastic is not None:
         return draws_of(distribution.stochastic, seed, findings)
     assert distribution.deterministic is not None
@@ -135,6 +137,8 @@ def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Pa
     return path
 
 
-def _other_kind(root: OpenScenario | None, name: str) -> Problem:
+def _other_kind(root: OpenScenario | None, name: str) -> Diagnostic:
     kind = "catalog" if root is not None and root.catalog is not None else "scenario"
-    return Problem(f"this is a {kind}, not a distribution of parameter values", "", name, root.line if root else None)
+    return Diagnostic(
+        f"this is a {kind}, not a distribution of parameter values", "", name, root.line if root else None
+    )

@@ -5,11 +5,11 @@ docs/checks.md says of each rule what it means, with an example that breaks it a
 
 from __future__ import annotations
 
-from eidrive_scenario.openscenario.lint import actions, declarations, entities, partners, triggers
+from eidrive_scenario.openscenario.lint import actions, counterparts, declarations, entities, triggers
+from eidrive_scenario.openscenario.lint.context import LintContext
 from eidrive_scenario.openscenario.lint.rule import Level, Rule, at
-from eidrive_scenario.openscenario.lint.survey import Survey
 
-RULES: tuple[Rule[Survey], ...] = (
+RULES: tuple[Rule[LintContext], ...] = (
     Rule("no-stop-trigger", Level.WARNING, "nothing says when the run ends", triggers.no_stop_trigger),
     Rule("unreachable", Level.WARNING, "it waits for what never comes", triggers.never_seen("unreachable")),
     Rule("swallowed-edge", Level.WARNING, "an edge that is never seen", triggers.never_seen("swallowed-edge")),
@@ -43,8 +43,8 @@ RULES: tuple[Rule[Survey], ...] = (
     Rule("above-max-speed", Level.WARNING, "a speed above the vehicle's maxSpeed", actions.too_fast),
     Rule("no-progress", Level.NOTE, "a transition at the rate 0", actions.no_progress),
     Rule("untimed-trajectory", Level.WARNING, "times that are missing or all the same", actions.untimed_trajectories),
-    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that nobody starts", partners.unknown_traffic),
-    Rule("loose-trailer", Level.WARNING, "a trailer that nothing holds", partners.loose_trailers),
+    Rule("unknown-traffic", Level.WARNING, "a stop of traffic that nobody starts", counterparts.unknown_traffic),
+    Rule("loose-trailer", Level.WARNING, "a trailer that nothing holds", counterparts.unconnected_trailers),
     Rule("unread-parameter", Level.WARNING, "a parameter set for nobody", declarations.unread_parameters),
     Rule("unused-parameter", Level.WARNING, "a parameter that nothing uses", declarations.unused_parameters),
     Rule("unused-variable", Level.WARNING, "a variable that nothing uses", declarations.unused_variables),
@@ -54,4 +54,4 @@ RULES: tuple[Rule[Survey], ...] = (
 )
 """The rules that need nothing but the file and its catalogs."""
 
-__all__ = ["RULES", "Level", "Rule", "Survey", "at"]
+__all__ = ["RULES", "Level", "LintContext", "Rule", "at"]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
-from eidrive_scenario.errors import Problem
-from eidrive_scenario.openscenario.lint.endless import at_once, stands_still
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario.lint.context import LintContext
 from eidrive_scenario.openscenario.lint.rule import at
-from eidrive_scenario.openscenario.lint.survey import Survey
+from eidrive_scenario.openscenario.lint.termination import at_once, has_zero_rate
 from eidrive_scenario.openscenario.model import (
     AbsoluteSpeed,
     AbsoluteTargetSpeed,
@@ -54,10 +54,10 @@ TIME_ATTRIBUTES: Mapping[type[Element], str] = {
 """By shape, the attributes that state its times."""
 
 
-def conflicting_actions(survey: Survey) -> Iterator[Problem]:
+def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Two actions of one event that control the same domain of the same entities: the second ends the first."""
-    for node in survey.nodes:
-        if not isinstance(node.element, Event) or not survey.actors(node):
+    for node in context.nodes:
+        if not isinstance(node.element, Event) or not context.actors(node):
             continue
         lasting = [(action, leaf) for action in node.element.action if (leaf := _lasting(action)) is not None]
         for (first, one), (second, other) in combinations(lasting, 2):
@@ -66,7 +66,7 @@ def conflicting_actions(survey: Survey) -> Iterator[Problem]:
                 yield at(
                     second,
                     f"action {second.name!r} ends action {first.name!r} of the same event at once: both control "
-                    f"the {' and '.join(sorted(shared))} domain of {', '.join(survey.actors(node))}",
+                    f"the {' and '.join(sorted(shared))} domain of {', '.join(context.actors(node))}",
                     "let an event of its own start it, when the other has ended",
                 )
 
@@ -88,15 +88,15 @@ def _controls(leaf: Element) -> set[str]:
     return domains
 
 
-def too_fast(survey: Survey) -> Iterator[Problem]:
+def too_fast(context: LintContext) -> Iterator[Diagnostic]:
     """A speed beyond the maxSpeed of the vehicle that shall drive it, forwards or backwards."""
-    for action, actors in survey.performances:
+    for action, actors in context.performances:
         for element in action.walk():
             speed = _speed(element)
             if speed is None:
                 continue
             for name in actors:
-                body = survey.scenario.entities.get(name)
+                body = context.scenario.entities.get(name)
                 limit = body.performance.max_speed if isinstance(body, Vehicle) else None
                 if limit is not None and abs(speed) > limit + 1e-9:
                     yield at(
@@ -112,19 +112,19 @@ def _speed(element: Element) -> float | None:
     return element.speed if isinstance(element, SpeedProfileEntry) else None
 
 
-def no_progress(survey: Survey) -> Iterator[Problem]:
+def no_progress(context: LintContext) -> Iterator[Diagnostic]:
     """A transition at the rate 0 never reaches its target."""
-    for element in survey.elements:
-        if isinstance(element, TransitionDynamics) and stands_still(element):
+    for element in context.elements:
+        if isinstance(element, TransitionDynamics) and has_zero_rate(element):
             yield at(element, "at a rate of 0 the action never reaches its target", "give a rate above 0")
 
 
-def untimed_trajectories(survey: Survey) -> Iterator[Problem]:
+def untimed_trajectories(context: LintContext) -> Iterator[Diagnostic]:
     """Times that count, and are not there or all the same."""
-    for element in survey.elements:
+    for element in context.elements:
         if not isinstance(element, FollowTrajectoryAction) or element.time_reference.timing is None:
             continue
-        trajectory = _trajectory(element, survey)
+        trajectory = _trajectory(element, context)
         shape = trajectory.shape.chosen() if trajectory is not None else None
         if isinstance(shape, Polyline):
             yield from _times(shape)
@@ -134,7 +134,7 @@ def untimed_trajectories(survey: Survey) -> Iterator[Problem]:
             yield at(shape, what, f"give {TIME_ATTRIBUTES[type(shape)]}, or write <None/> for the TimeReference")
 
 
-def _times(shape: Polyline) -> Iterator[Problem]:
+def _times(shape: Polyline) -> Iterator[Diagnostic]:
     for vertex in shape.vertex:
         if vertex.time is None:
             what = "the Timing has nothing to scale: this vertex has no time, so the actor keeps its own speed"
@@ -144,9 +144,9 @@ def _times(shape: Polyline) -> Iterator[Problem]:
         yield at(shape, f"all its vertices have the time {known[0]:g} s", "say when each vertex is passed")
 
 
-def _trajectory(action: FollowTrajectoryAction, survey: Survey) -> Trajectory | None:
+def _trajectory(action: FollowTrajectoryAction, context: LintContext) -> Trajectory | None:
     given = action.trajectory_ref or action
     if given.trajectory is not None or given.catalog_reference is None:
         return given.trajectory
-    entry = survey.scenario.entries.get(given.catalog_reference)
+    entry = context.scenario.entries.get(given.catalog_reference)
     return entry if isinstance(entry, Trajectory) else None

@@ -10,11 +10,11 @@ from typing import cast
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.files import absolute
 from eidrive_scenario.openscenario.catalogs import catalog_place
+from eidrive_scenario.openscenario.lint.context import LintContext
 from eidrive_scenario.openscenario.lint.rule import at
-from eidrive_scenario.openscenario.lint.survey import Survey
 from eidrive_scenario.openscenario.model import (
     CustomCommandAction,
     EntitySelection,
@@ -28,11 +28,11 @@ from eidrive_scenario.openscenario.parameters import REFERENCE
 _WORD = re.compile(r"\w+")
 
 
-def unused_parameters(survey: Survey) -> Iterator[Problem]:
+def unused_parameters(context: LintContext) -> Iterator[Diagnostic]:
     """A declared parameter to whose value nothing in its scope refers."""
-    if not survey.files:
+    if not context.files:
         return
-    scenario, *catalogs = survey.files
+    scenario, *catalogs = context.files
     for declarations in scenario.iter("ParameterDeclarations"):
         scope = declarations.getparent()
         if scope is None:
@@ -42,10 +42,10 @@ def unused_parameters(survey: Survey) -> Iterator[Problem]:
         for declaration in declarations.iter("ParameterDeclaration"):
             name = declaration.get("name", "").removeprefix("$")
             if name not in used:
-                yield Problem(
+                yield Diagnostic(
                     f"the parameter {name!r} is never used",
                     f"take it out, or write ${name} where its value belongs",
-                    survey.scenario.document.source,
+                    context.scenario.document.source,
                     cast("int | None", declaration.sourceline),
                 )
 
@@ -64,10 +64,10 @@ def _used(root: etree._Element) -> set[str]:
     return used
 
 
-def unread_parameters(survey: Survey) -> Iterator[Problem]:
+def unread_parameters(context: LintContext) -> Iterator[Diagnostic]:
     """A ParameterAction sets what no condition looks at: `$name` has got its value when the file was read."""
-    read = {one.parameter_ref for one in survey.elements if isinstance(one, ParameterCondition)}
-    for element in survey.elements:
+    read = {one.parameter_ref for one in context.elements if isinstance(one, ParameterCondition)}
+    for element in context.elements:
         if isinstance(element, ParameterAction) and element.parameter_ref not in read:
             yield at(
                 element,
@@ -76,36 +76,36 @@ def unread_parameters(survey: Survey) -> Iterator[Problem]:
             )
 
 
-def unused_variables(survey: Survey) -> Iterator[Problem]:
+def unused_variables(context: LintContext) -> Iterator[Diagnostic]:
     """A variable that no condition and no action names."""
-    named = survey.named.get("variable", set()) | _in_commands(survey)
-    for element in survey.elements:
+    named = context.named.get("variable", set()) | _in_commands(context)
+    for element in context.elements:
         if isinstance(element, VariableDeclaration) and element.name not in named:
             yield at(element, f"the variable {element.name!r} is never used", "take it out")
 
 
-def unused_monitors(survey: Survey) -> Iterator[Problem]:
+def unused_monitors(context: LintContext) -> Iterator[Diagnostic]:
     """A monitor that no action sets."""
-    for element in survey.elements:
-        if isinstance(element, MonitorDeclaration) and element.name not in survey.named.get("monitor", set()):
+    for element in context.elements:
+        if isinstance(element, MonitorDeclaration) and element.name not in context.named.get("monitor", set()):
             yield at(element, f"no SetMonitorAction sets the monitor {element.name!r}", "set it, or take it out")
 
 
-def unused_selections(survey: Survey) -> Iterator[Problem]:
+def unused_selections(context: LintContext) -> Iterator[Diagnostic]:
     """A selection of entities that nothing refers to."""
-    named = survey.named.get("entity", set()) | _in_commands(survey)
-    for element in survey.elements:
+    named = context.named.get("entity", set()) | _in_commands(context)
+    for element in context.elements:
         if isinstance(element, EntitySelection) and element.name not in named:
             yield at(element, f"the selection {element.name!r} is never used", "take it out")
 
 
-def unused_catalogs(survey: Survey) -> Iterator[Problem]:
+def unused_catalogs(context: LintContext) -> Iterator[Diagnostic]:
     """A place for catalogs from which no entry is taken."""
-    locations, path = survey.scenario.document.catalog_locations, survey.scenario.path
+    locations, path = context.scenario.document.catalog_locations, context.scenario.path
     if locations is None:
         return
     folder = path.parent if path is not None else Path()
-    used = {absolute(entry.source) for entry in survey.scenario.entries.values()}
+    used = {absolute(entry.source) for entry in context.scenario.entries.values()}
     for location in locations.children():
         kind = type(location).__name__.removesuffix("Location")
         directory = getattr(location, "directory", None)
@@ -117,7 +117,7 @@ def unused_catalogs(survey: Survey) -> Iterator[Problem]:
             yield at(location, f"nothing is taken from the {kind} {directory.path!r}{gone}".rstrip(","), "take it out")
 
 
-def _in_commands(survey: Survey) -> set[str]:
+def _in_commands(context: LintContext) -> set[str]:
     """All words in custom commands: whoever executes them may look a name up."""
-    texts = [one.content for one in survey.elements if isinstance(one, CustomCommandAction)]
+    texts = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
     return {word for text in texts for word in _WORD.findall(text)}

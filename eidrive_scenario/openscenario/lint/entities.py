@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario.lint.context import LintContext
 from eidrive_scenario.openscenario.lint.outline import Node
 from eidrive_scenario.openscenario.lint.rule import at
-from eidrive_scenario.openscenario.lint.survey import Survey
 from eidrive_scenario.openscenario.model import (
     Action,
     CustomCommandAction,
@@ -25,33 +25,33 @@ from eidrive_scenario.openscenario.participants import scenario_objects
 _WORD = re.compile(r"\w+")
 
 
-def _objects(survey: Survey) -> Iterator[ScenarioObject]:
+def _objects(context: LintContext) -> Iterator[ScenarioObject]:
     """The scenario objects that stand in the file for an entity of their own."""
-    entities = survey.scenario.document.entities
-    for one, _ in scenario_objects(entities, survey.scenario.entries):
-        if one.name in survey.scenario.entities and one.name not in survey.trailers:
+    entities = context.scenario.document.entities
+    for one, _ in scenario_objects(entities, context.scenario.entries):
+        if one.name in context.scenario.entities and one.name not in context.trailers:
             yield one
 
 
-def _spoken_of(survey: Survey) -> set[str]:
-    names = {one for name in survey.named.get("entity", set()) for one in survey.members(name)}
-    commands = [one.content for one in survey.elements if isinstance(one, CustomCommandAction)]
+def _spoken_of(context: LintContext) -> set[str]:
+    names = {one for name in context.named.get("entity", set()) for one in context.members(name)}
+    commands = [one.content for one in context.elements if isinstance(one, CustomCommandAction)]
     return names | {word for text in commands for word in _WORD.findall(text)}
 
 
-def unused_entities(survey: Survey) -> Iterator[Problem]:
+def unused_entities(context: LintContext) -> Iterator[Diagnostic]:
     """An entity that is declared, and then never spoken of; what has a controller may be known to that."""
-    spoken_of = _spoken_of(survey)
-    for one in _objects(survey):
-        if one.name not in spoken_of | survey.placed and not one.object_controller:
+    spoken_of = _spoken_of(context)
+    for one in _objects(context):
+        if one.name not in spoken_of | context.placed and not one.object_controller:
             yield at(one, f"the entity {one.name!r} is never used", "place it with a TeleportAction, or take it out")
 
 
-def never_placed(survey: Survey) -> Iterator[Problem]:
+def never_placed(context: LintContext) -> Iterator[Diagnostic]:
     """An entity that acts or is asked about, but is nowhere."""
-    spoken_of = _spoken_of(survey)
-    for one in _objects(survey):
-        if one.name in spoken_of and one.name not in survey.placed:
+    spoken_of = _spoken_of(context)
+    for one in _objects(context):
+        if one.name in spoken_of and one.name not in context.placed:
             yield at(
                 one,
                 f"the entity {one.name!r} is never placed, so it is not in the world",
@@ -59,11 +59,11 @@ def never_placed(survey: Survey) -> Iterator[Problem]:
             )
 
 
-def groups_without_actors(survey: Survey) -> Iterator[Problem]:
+def groups_without_actors(context: LintContext) -> Iterator[Diagnostic]:
     """Private actions for which there is nobody."""
-    for node in survey.nodes:
+    for node in context.nodes:
         group = node.element
-        if not isinstance(group, ManeuverGroup) or survey.actors(node):
+        if not isinstance(group, ManeuverGroup) or context.actors(node):
             continue
         acting = [event for event in node.walk() if _acts(event)]
         if not acting:
@@ -93,9 +93,9 @@ def _about_entities(node: Node) -> bool:
     return any(condition.by_entity_condition is not None for group in groups for condition in group.condition)
 
 
-def axles_not_apart(survey: Survey) -> Iterator[Problem]:
+def axles_not_apart(context: LintContext) -> Iterator[Diagnostic]:
     """A vehicle whose front axle is not ahead of the rear axle: it has no wheelbase to drive on."""
-    for name, body in survey.scenario.entities.items():
+    for name, body in context.scenario.entities.items():
         front = body.axles.front_axle if isinstance(body, Vehicle) else None
         if isinstance(body, Vehicle) and front is not None and front.position_x <= body.axles.rear_axle.position_x:
             yield at(
@@ -106,9 +106,9 @@ def axles_not_apart(survey: Survey) -> Iterator[Problem]:
             )
 
 
-def relations_to_oneself(survey: Survey) -> Iterator[Problem]:
+def relations_to_oneself(context: LintContext) -> Iterator[Diagnostic]:
     """An action that keeps an entity at a distance from itself, or synchronises it with itself."""
-    for action, actors in survey.performances:
+    for action, actors in context.performances:
         for element in action.walk():
             if isinstance(element, LateralDistanceAction | LongitudinalDistanceAction):
                 other = element.entity_ref

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Generic, TypeVar
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario.model import Element
 
 S = TypeVar("S", contravariant=True)
@@ -32,15 +32,15 @@ class Rule(Generic[S]):
 
     name: str
     level: Level
-    about: str
-    check: Callable[[S], Iterable[Problem]]
+    summary: str
+    check: Callable[[S], Iterable[Diagnostic]]
 
-    def findings(self, survey: S) -> Iterator[Problem]:
+    def run(self, context: S) -> Iterator[Diagnostic]:
         """What the rule finds, marked with its name."""
-        for problem in self.check(survey):
+        for problem in self.check(context):
             yield replace(problem, rule=self.name)
 
 
-def at(element: Element, message: str, remedy: str = "") -> Problem:
+def at(element: Element, message: str, remedy: str = "") -> Diagnostic:
     """A finding at the place of an element."""
-    return Problem(message, remedy, element.source, element.line)
+    return Diagnostic(message, remedy, element.source, element.line)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from eidrive_scenario.openscenario.lint.endless import never_ends
+from eidrive_scenario.openscenario.lint.intervals import ALWAYS
 from eidrive_scenario.openscenario.lint.outline import Node, Outline
-from eidrive_scenario.openscenario.lint.spans import ALWAYS
-from eidrive_scenario.openscenario.lint.truth import OPEN, STATE, WAITS, Truth, never
+from eidrive_scenario.openscenario.lint.termination import never_ends
+from eidrive_scenario.openscenario.lint.truth_intervals import OPEN, STATE, WAITS, TruthIntervals, never
 from eidrive_scenario.openscenario.model import (
     Action,
     Condition,
@@ -63,7 +63,7 @@ class States:
             rivalry = stops and event is not None and isinstance(event.element, Event)
             yield event.parent if rivalry and event is not None and event.parent is not None else node
 
-    def truth(self, condition: Condition, owner: Node, starts: bool) -> Truth:
+    def truth(self, condition: Condition, owner: Node, starts: bool) -> TruthIntervals:
         """When a condition on states can hold for a trigger that starts or stops its owner."""
         question = _question(condition)
         assert question is not None
@@ -76,7 +76,7 @@ class States:
             return _around(meant[0], state, owner)
         if meant == [owner] and owner.limit == 1:
             if state is StoryboardElementState.STANDBY_STATE:
-                return Truth(steady=f"{owner.title} stands by as long as it waits")
+                return TruthIntervals(steady=f"{owner.title} stands by as long as it waits")
             return never(f"{owner.title} waits for itself", WAITS)
         spoken = " or ".join(reason for node in meant if (reason := self._unreal(node, state)))
         if spoken and all(self._unreal(node, state) for node in meant):
@@ -84,7 +84,7 @@ class States:
         earliest = min(self._earliest(node, state) for node in meant)
         if earliest == math.inf:
             return never(self._missed(meant[0], state), WAITS)
-        return Truth(((earliest, math.inf),))
+        return TruthIntervals(((earliest, math.inf),))
 
     def _unreal(self, node: Node, state: StoryboardElementState) -> str:
         """Why an element of this make never is in a state, "" where it may be."""
@@ -152,13 +152,13 @@ class States:
         return f"{node.title} never ends, as {late.title} never starts" if late else f"{node.title} never ends"
 
 
-def _around(node: Node, state: StoryboardElementState, owner: Node) -> Truth:
+def _around(node: Node, state: StoryboardElementState, owner: Node) -> TruthIntervals:
     """Of an element that runs as long as the trigger is asked."""
     runs = f"{node.title} runs as long as {owner.title} waits" if node is not owner else f"{node.title} runs"
     if state is StoryboardElementState.RUNNING_STATE:
-        return Truth(ALWAYS, steady=runs)
+        return TruthIntervals(ALWAYS, steady=runs)
     if state is StoryboardElementState.START_TRANSITION:
-        return Truth(ALWAYS, risen=f"{node.title} has started before {owner.title} first looks")
+        return TruthIntervals(ALWAYS, risen=f"{node.title} has started before {owner.title} first looks")
     if state is StoryboardElementState.STANDBY_STATE:
         return never(f"{runs}, so it does not stand by", STATE)
     if state in _AFTER:

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from eidrive_scenario.errors import Problem
-from eidrive_scenario.openscenario.lint.reach import SWALLOWED, Seen, Watch
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario.lint.context import LintContext
+from eidrive_scenario.openscenario.lint.intervals import format_intervals
+from eidrive_scenario.openscenario.lint.reachability import UNOBSERVED_EDGE, ConditionAnalysis, TriggerAnalysis
 from eidrive_scenario.openscenario.lint.rule import at
-from eidrive_scenario.openscenario.lint.spans import in_words
-from eidrive_scenario.openscenario.lint.survey import Survey
-from eidrive_scenario.openscenario.lint.truth import IMPOSSIBLE, STATE, WAITS
+from eidrive_scenario.openscenario.lint.truth_intervals import IMPOSSIBLE, STATE, WAITS
 from eidrive_scenario.openscenario.model import Condition, ConditionEdge, Rule, SimulationTimeCondition
 
 _REMEDIES = {
-    SWALLOWED: 'an edge needs a change between two evaluations; write conditionEdge="none"',
+    UNOBSERVED_EDGE: 'an edge needs a change between two evaluations; write conditionEdge="none"',
     IMPOSSIBLE: "change the condition or take it out",
     STATE: "wait for another state",
     WAITS: "break the circle, or wait for something else",
 }
 
 
-def never_seen(name: str) -> Callable[[Survey], Iterator[Problem]]:
+def never_seen(name: str) -> Callable[[LintContext], Iterator[Diagnostic]]:
     """A rule on conditions that never count as true, for the reason that goes by this name."""
 
-    def check(survey: Survey) -> Iterator[Problem]:
-        for watch in survey.watches:
+    def check(context: LintContext) -> Iterator[Diagnostic]:
+        for watch in context.watches:
             for group in watch.groups:
                 for one in group.seen:
                     if one.rule == name:
@@ -34,9 +34,9 @@ def never_seen(name: str) -> Callable[[Survey], Iterator[Problem]]:
     return check
 
 
-def contradictory_groups(survey: Survey) -> Iterator[Problem]:
+def contradictory_groups(context: LintContext) -> Iterator[Diagnostic]:
     """Each condition of a group can be true, but never all of them together."""
-    for watch in survey.watches:
+    for watch in context.watches:
         for group in watch.groups:
             if not group.spans and all(one.spans for one in group.seen):
                 yield at(
@@ -47,9 +47,9 @@ def contradictory_groups(survey: Survey) -> Iterator[Problem]:
                 )
 
 
-def coinciding_edges(survey: Survey) -> Iterator[Problem]:
+def coinciding_edges(context: LintContext) -> Iterator[Diagnostic]:
     """Several edges in one group have to be seen at the very same evaluation."""
-    for watch in survey.watches:
+    for watch in context.watches:
         for group in watch.groups:
             edged = [one.condition for one in group.seen if one.condition.condition_edge is not ConditionEdge.NONE]
             if group.spans and len(edged) > 1:
@@ -61,9 +61,9 @@ def coinciding_edges(survey: Survey) -> Iterator[Problem]:
                 )
 
 
-def equal_times(survey: Survey) -> Iterator[Problem]:
+def equal_times(context: LintContext) -> Iterator[Diagnostic]:
     """A time that is met exactly, or not at all."""
-    for watch in survey.watches:
+    for watch in context.watches:
         for group in watch.groups:
             for one in group.seen:
                 time = _time(one.condition)
@@ -75,27 +75,27 @@ def equal_times(survey: Survey) -> Iterator[Problem]:
                     )
 
 
-def no_stop_trigger(survey: Survey) -> Iterator[Problem]:
+def no_stop_trigger(context: LintContext) -> Iterator[Diagnostic]:
     """Nothing in the file says when the run is over."""
-    trigger = survey.scenario.storyboard.stop_trigger
+    trigger = context.scenario.storyboard.stop_trigger
     if trigger is None or not trigger.condition_group:
         what = "has no stop trigger" if trigger is None else "has an empty stop trigger"
-        ends = "the run ends when every story has ended" if survey.root.children else "the run does not end by itself"
+        ends = "the run ends when every story has ended" if context.root.children else "the run does not end by itself"
         yield at(
-            trigger or survey.scenario.storyboard,
+            trigger or context.scenario.storyboard,
             f"the storyboard {what}; {ends}",
             "add a StopTrigger, such as a SimulationTimeCondition",
         )
 
 
-def zero_executions(survey: Survey) -> Iterator[Problem]:
+def zero_executions(context: LintContext) -> Iterator[Diagnostic]:
     """A count of 0 says that an element is never executed."""
-    for node in survey.nodes:
+    for node in context.nodes:
         if node.limit == 0:
             yield at(node.element, f"{node.title} has the maximumExecutionCount 0", "write 1 or more, or take it out")
 
 
-def _consequence(watch: Watch) -> str:
+def _consequence(watch: TriggerAnalysis) -> str:
     if watch.spans:
         return "this group never holds"
     return f"{watch.owner.title} never starts" if watch.starts else f"this never stops {watch.owner.title}"
@@ -108,8 +108,12 @@ def _called(condition: Condition) -> str:
     return f"condition {condition.name!r}"
 
 
-def _windows(seen: tuple[Seen, ...]) -> str:
-    told = [f"{_called(one.condition)} {in_words(one.spans)}" for one in seen if in_words(one.spans) != "at any time"]
+def _windows(seen: tuple[ConditionAnalysis, ...]) -> str:
+    told = [
+        f"{_called(one.condition)} {format_intervals(one.spans)}"
+        for one in seen
+        if format_intervals(one.spans) != "at any time"
+    ]
     return ", ".join(told)
 
 

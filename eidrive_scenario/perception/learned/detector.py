@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, Installation
 from eidrive_scenario.perception.learned.classes import misspelt, object_category
@@ -198,7 +198,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
         raise refused_torchscript(path)
     if path.suffix != ".onnx" and importlib.util.find_spec("torch") is None:
         message = f"detector {name!r} needs torch, which is not installed"
-        raise SettingError(Problem(message, "run: pip install eidrive-scenario[learned]"))
+        raise SettingError(Diagnostic(message, "run: pip install eidrive-scenario[learned]"))
     if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         confidence = settings.confidence or USUAL_CONFIDENCE
         return ForeignNetwork(
@@ -216,7 +216,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     network = TorchNetwork(path, settings.confidence, settings.threads)
     if network.name != name:
         message = f"weights {quoted(str(path))} do not fit: they are of {network.name!r}, not of {name!r}"
-        raise SettingError(Problem(message, f"take the detector {network.name!r}"))
+        raise SettingError(Diagnostic(message, f"take the detector {network.name!r}"))
     return network
 
 

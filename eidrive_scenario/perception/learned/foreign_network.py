@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights, refused_torchscript
 
@@ -74,7 +74,7 @@ class ForeignNetwork(ImageNetwork):
             given = ", ".join(str(output.shape) for output in outputs)
             fits = f"{self._layout!r} for {len(self.classes)} classes"
             message = f"weights {quoted(str(self._path))} give {given}, which is not {fits}: {error}"
-            raise SettingError(Problem(message, f"layouts: {LAYOUTS}")) from error
+            raise SettingError(Diagnostic(message, f"layouts: {LAYOUTS}")) from error
 
     def _outputs(self, picture: NDArray[np.uint8]) -> list[Floats]:
         pixels = np.ascontiguousarray(picture.transpose(2, 0, 1)[None], dtype=np.float32) / np.float32(255.0)
@@ -85,7 +85,7 @@ class ForeignNetwork(ImageNetwork):
             width, height = self.input_size
             reason = " ".join(str(error).split())[:160]
             message = f"weights {quoted(str(self._path))} do not take pictures of {width} x {height}: {reason}"
-            raise SettingError(Problem(message, "say the network's own with 'input_size'")) from error
+            raise SettingError(Diagnostic(message, "say the network's own with 'input_size'")) from error
 
     def _told_by_shape(self, outputs: list[Floats]) -> Layout:
         count = len(self.classes)
@@ -105,9 +105,9 @@ class ForeignNetwork(ImageNetwork):
         given = ", ".join(str(shape) for shape in shapes)
         if not fits:
             message = f"weights {quoted(str(self._path))} give {given}, which fits no layout for {count} classes"
-            raise SettingError(Problem(message, f"check 'classes'; layouts: {LAYOUTS}"))
+            raise SettingError(Diagnostic(message, f"check 'classes'; layouts: {LAYOUTS}"))
         message = f"weights {quoted(str(self._path))} give {given}, which could be {' or '.join(fits)}"
-        raise SettingError(Problem(message, "say which with 'layout'"))
+        raise SettingError(Diagnostic(message, "say which with 'layout'"))
 
     def _candidates(self, outputs: list[Floats]) -> Candidates:
         count = len(self.classes)
@@ -206,4 +206,4 @@ def _unreadable(path: Path, kind: str, error: Exception) -> SettingError:
     layer = _LAYER.search(str(error))
     message = f"weights {quoted(str(path))} are not {kind} that can be read"
     message += f": OpenCV has no such layer as {layer[1]}" if layer else ""
-    return SettingError(Problem(message, "export the model again"))
+    return SettingError(Diagnostic(message, "export the model again"))

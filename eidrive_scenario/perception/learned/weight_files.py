@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Problem, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.files import MIB, is_regular_file, read_regular_file, reason_of
 
 MAX_BYTES = 512 * MIB
@@ -32,14 +32,14 @@ def refused_torchscript(path: Path) -> SettingError:
     """The error for TorchScript weights without permission."""
     message = f"weights {quoted(str(path))} are TorchScript, which can execute any code with your rights"
     remedy = f"export the model to ONNX; or, if you trust it, run with --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
-    return SettingError(Problem(message, remedy))
+    return SettingError(Diagnostic(message, remedy))
 
 
 def check_weights_exist(path: Path) -> None:
     """Raise SettingError if the path does not lead to a regular file. Nothing of the file is read."""
     if not is_regular_file(path):
         remedy = "check `weights` of the detector's settings"
-        raise SettingError(Problem(f"no file {quoted(str(path))} with weights", remedy))
+        raise SettingError(Diagnostic(f"no file {quoted(str(path))} with weights", remedy))
 
 
 def read_weights(path: Path) -> bytes:
@@ -48,7 +48,7 @@ def read_weights(path: Path) -> bytes:
         return read_regular_file(path, MAX_BYTES)
     except OSError as error:
         message = f"weights {quoted(str(path))} cannot be read: {reason_of(error)}"
-        raise SettingError(Problem(message, "check `weights` of the detector's settings")) from error
+        raise SettingError(Diagnostic(message, "check `weights` of the detector's settings")) from error
 
 
 def read_arrays(content: bytes) -> Mapping[str, NDArray[Any]]:

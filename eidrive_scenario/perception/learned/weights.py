@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from eidrive_scenario.errors import Problem, SettingError, quoted, shortened
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.ssd import Ssd
 from eidrive_scenario.perception.learned.weight_files import read_arrays, read_weights
 from eidrive_scenario.perception.learned.yolov5 import Anchors, YoloV5
@@ -80,7 +80,7 @@ def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
     except _DAMAGED as error:
         reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
         remedy = "give a file that training/train.py has written, or an ONNX model (.onnx)"
-        raise SettingError(Problem(f"weights {quoted(str(path))} do not fit: {reason}", remedy)) from error
+        raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", remedy)) from error
     return description, network
 
 

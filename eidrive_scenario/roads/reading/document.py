@@ -8,9 +8,9 @@ from typing import Literal, cast
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, RoadError, suggestion
+from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files import MIB, read_regular_file, reason_of
-from eidrive_scenario.roads.flaws import Flaw
+from eidrive_scenario.roads.map_warnings import MapWarning
 from eidrive_scenario.roads.model import (
     Connection,
     Header,
@@ -23,8 +23,8 @@ from eidrive_scenario.roads.model import (
     RoadType,
 )
 from eidrive_scenario.roads.polynomials import Polynomials
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 from eidrive_scenario.roads.reading.extent import check_extent
-from eidrive_scenario.roads.reading.findings import Findings, line_of
 from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
@@ -39,24 +39,24 @@ def read_road_text(path: Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        problem = Problem(f"cannot read: {reason_of(error)}", "give the path of an OpenDRIVE file", str(path))
+        problem = Diagnostic(f"cannot read: {reason_of(error)}", "give the path of an OpenDRIVE file", str(path))
         raise RoadError(problem) from error
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
     """OpenDRIVE; `source` names it in errors. Raises RoadError with every finding, its line and what would be right."""
     root = _parse(text, source)
-    findings = Findings(source)
+    findings = AttributeReader(source)
     elements = [(findings.text(element, "id"), element) for element in root.iterfind("road")]
     roads: dict[str, Road] = {}
     objects: list[RoadObject] = []
     for number, element in elements:
         if number in roads:
-            findings.add(element, f"road {number!r} occurs twice", "give each road its own id")
+            findings.report_error(element, f"road {number!r} occurs twice", "give each road its own id")
         roads[number] = _read_road(number, element, findings)
         objects.extend(read_objects(number, element, findings))
     if not elements:
-        findings.add(root, "there is no <road>", "add at least one")
+        findings.report_error(root, "there is no <road>", "add at least one")
     junctions = {}
     for element in root.iterfind("junction"):
         junction = _read_junction(element, roads, findings)
@@ -69,7 +69,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
         check_extent(roads, findings)
     if findings.problems:
         raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
-    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects), tuple(findings.flaws))
+    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects), tuple(findings.map_warnings))
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
@@ -80,11 +80,11 @@ def _parse(text: bytes, source: str) -> etree._Element:
             element.tag = etree.QName(element).localname
     if root.tag != "OpenDRIVE":
         what = "the root element is not <OpenDRIVE>"
-        raise RoadError(Problem(what, "is this another kind of file?", source, line_of(root)))
+        raise RoadError(Diagnostic(what, "is this another kind of file?", source, line_of(root)))
     return root
 
 
-def _read_header(root: etree._Element, findings: Findings) -> Header:
+def _read_header(root: etree._Element, findings: AttributeReader) -> Header:
     header = root.find("header")
     if header is None:
         return Header()
@@ -101,30 +101,30 @@ def _read_header(root: etree._Element, findings: Findings) -> Header:
     )
 
 
-def _read_offset(element: etree._Element | None, findings: Findings) -> tuple[float, float, float, float]:
+def _read_offset(element: etree._Element | None, findings: AttributeReader) -> tuple[float, float, float, float]:
     if element is None:
         return 0.0, 0.0, 0.0, 0.0
     x, y, z, turn = (findings.number(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return x, y, z, turn
 
 
-def _read_road(number: str, element: etree._Element, findings: Findings) -> Road:
+def _read_road(number: str, element: etree._Element, findings: AttributeReader) -> Road:
     length = findings.number(element, "length")
     if length <= 0.0 and element.get("length") is not None:
-        findings.add(element, f"road {number!r} has length {length:g} m", "give a positive length")
+        findings.report_error(element, f"road {number!r} has length {length:g} m", "give a positive length")
     if length > LONGEST:
-        findings.add(element, f"road {number!r} has length {length:g} m", f"at most {LONGEST:g} m are read")
+        findings.report_error(element, f"road {number!r} has length {length:g} m", f"at most {LONGEST:g} m are read")
         length = 1.0
     rule = element.get("rule", "RHT")
     if rule not in ("RHT", "LHT"):
-        findings.add(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
+        findings.report_error(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
     reference = read_reference_line(element, length, findings)
     length = reference.length
     lanes = element.find("lanes")
     lane_offset = Polynomials()
     sections: tuple[LaneSection, ...] = ()
     if lanes is None:
-        findings.add(element, f"road {number!r} has no <lanes>", "add its lanes")
+        findings.report_error(element, f"road {number!r} has no <lanes>", "add its lanes")
     else:
         lane_offset = read_lane_offset(lanes, findings)
         sections = read_sections(lanes, length, lane_offset, findings)
@@ -134,7 +134,7 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
         if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
             message = f"road {number!r} has <{profile.tag}>, which is not read: its cross section is straight"
             remedy = "say the slope by <superelevation>"
-            findings.doubt(profile, "road-surface", "cross sections that are not read", message, remedy)
+            findings.report_warning(profile, "road-surface", "cross sections that are not read", message, remedy)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -154,11 +154,11 @@ def _read_road(number: str, element: etree._Element, findings: Findings) -> Road
     )
 
 
-def _profile(road: etree._Element, path: str, findings: Findings) -> Polynomials:
+def _profile(road: etree._Element, path: str, findings: AttributeReader) -> Polynomials:
     return Polynomials(findings.polynomial(element, "s") for element in road.iterfind(path))
 
 
-def _read_types(road: etree._Element, findings: Findings) -> list[RoadType]:
+def _read_types(road: etree._Element, findings: AttributeReader) -> list[RoadType]:
     types = []
     for element in road.iterfind("type"):
         speed = element.find("speed")
@@ -167,25 +167,27 @@ def _read_types(road: etree._Element, findings: Findings) -> list[RoadType]:
     return types
 
 
-def _read_link(element: etree._Element | None, findings: Findings) -> RoadLink | None:
+def _read_link(element: etree._Element | None, findings: AttributeReader) -> RoadLink | None:
     if element is None:
         return None
     kind = findings.text(element, "elementType", "road")
     if kind not in ("road", "junction"):
-        findings.add(element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction")))
+        findings.report_error(
+            element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction"))
+        )
         return None
     number = findings.text(element, "elementId")
     if kind == "road" and element.get("elementS") is not None:
         # Of virtual junctions (1.6 to 1.8): a way into or out of a road between its ends.
         message = f"a road leads to road {number!r} between its ends, and ends there instead"
         remedy = "split that road there, and join the parts by a junction"
-        findings.doubt(element, "road-link", "roads that lead to others between their ends", message, remedy)
+        findings.report_warning(element, "road-link", "roads that lead to others between their ends", message, remedy)
         return None
     contact = findings.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
 
 
-def _read_junction(element: etree._Element, roads: dict[str, Road], findings: Findings) -> Junction:
+def _read_junction(element: etree._Element, roads: dict[str, Road], findings: AttributeReader) -> Junction:
     connections = []
     for connection in element.iterfind("connection"):
         read = _read_connection(connection, roads, findings)
@@ -209,16 +211,18 @@ def _ends_at(road: Road, junction: str) -> bool:
     return any(link is not None and (link.element_type, link.element_id) == ("junction", junction) for link in ends)
 
 
-def _read_connection(element: etree._Element, roads: dict[str, Road], findings: Findings) -> Connection | None:
+def _read_connection(element: etree._Element, roads: dict[str, Road], findings: AttributeReader) -> Connection | None:
     incoming = element.get("incomingRoad")
     connecting = element.get("connectingRoad", element.get("linkedRoad"))
     if incoming is None or connecting is None:
         if element.get("type") != "virtual":
-            findings.add(element, "<connection> lacks incomingRoad or connectingRoad", "give both")
+            findings.report_error(element, "<connection> lacks incomingRoad or connectingRoad", "give both")
         return None
     missing = [number for number in (incoming, connecting) if number not in roads]
     for number in missing:
-        findings.add(element, f"<connection> names road {number!r}, which does not exist", suggestion(number, roads))
+        findings.report_error(
+            element, f"<connection> names road {number!r}, which does not exist", suggestion(number, roads)
+        )
     links = tuple(
         (findings.integer(link, "from"), findings.integer(link, "to")) for link in element.iterfind("laneLink")
     )
@@ -228,7 +232,9 @@ def _read_connection(element: etree._Element, roads: dict[str, Road], findings: 
     return Connection(element.get("id", ""), incoming, connecting, contact, links, line_of(element))
 
 
-def _with_sound_links(road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: Findings) -> Road:
+def _with_sound_links(
+    road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: AttributeReader
+) -> Road:
     """The road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
 
     def sound(link: RoadLink | None) -> RoadLink | None:
@@ -237,10 +243,14 @@ def _with_sound_links(road: Road, roads: dict[str, Road], junctions: dict[str, J
             return link
         message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
         if link.element_type == "road":
-            findings.tell(Problem(message, suggestion(link.element_id, known), findings.source, link.line))
+            findings.append_diagnostic(
+                Diagnostic(message, suggestion(link.element_id, known), findings.source, link.line)
+            )
             return link
         remedy = "take the link out, or add the junction with its connections"
-        findings.flaws.append(Flaw("road-link", "roads that lead to no junction", message, remedy, link.line))
+        findings.map_warnings.append(
+            MapWarning("road-link", "roads that lead to no junction", message, remedy, link.line)
+        )
         return None
 
     return replace(road, predecessor=sound(road.predecessor), successor=sound(road.successor))

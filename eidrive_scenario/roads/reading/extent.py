@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from eidrive_scenario.errors import Problem
+from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.curves import Cubic
 from eidrive_scenario.roads.model import Road
-from eidrive_scenario.roads.reading.findings import Findings
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MAX_SHAPE = 1e6
 """Largest distance of the points of one geometry from its start [m]."""
@@ -21,7 +21,7 @@ MAX_LANE_LENGTH = 2e7
 _SHARES = (0.0, 0.5, 1.0)
 
 
-def check_extent(roads: Mapping[str, Road], findings: Findings) -> None:
+def check_extent(roads: Mapping[str, Road], findings: AttributeReader) -> None:
     """Report roads whose size nothing can be calculated with."""
     lanes = 0.0
     for road in roads.values():
@@ -30,10 +30,10 @@ def check_extent(roads: Mapping[str, Road], findings: Findings) -> None:
         _check_cross_section(road, findings)
     if lanes > MAX_LANE_LENGTH:
         message = f"the lanes are {lanes:g} m long in total"
-        findings.tell(Problem(message, f"at most {MAX_LANE_LENGTH:g} m are read", findings.source, 1))
+        findings.append_diagnostic(Diagnostic(message, f"at most {MAX_LANE_LENGTH:g} m are read", findings.source, 1))
 
 
-def _check_geometries(road: Road, findings: Findings) -> None:
+def _check_geometries(road: Road, findings: AttributeReader) -> None:
     """A cubic may leave its start further than by its length, unlike all other geometries."""
     farthest: dict[int | None, float] = {}
     for curve in road.reference.curves:
@@ -47,10 +47,10 @@ def _check_geometries(road: Road, findings: Findings) -> None:
             farthest[line] = max(away, farthest.get(line, 0.0))
     for line, away in farthest.items():
         message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
-        findings.tell(Problem(message, f"at most {MAX_SHAPE:g} m are read", findings.source, line))
+        findings.append_diagnostic(Diagnostic(message, f"at most {MAX_SHAPE:g} m are read", findings.source, line))
 
 
-def _check_cross_section(road: Road, findings: Findings) -> None:
+def _check_cross_section(road: Road, findings: AttributeReader) -> None:
     for section in road.sections:
         for share in _SHARES:
             ds = share * section.length
@@ -59,10 +59,14 @@ def _check_cross_section(road: Road, findings: Findings) -> None:
             edges = [abs(offset + lane.side * lane.outer.value(ds)) for lane in outermost]
             if not max(edges) <= MAX_WIDTH:
                 message = f"a lane of road {road.id!r} reaches {max(edges):g} m from the reference line"
-                findings.tell(Problem(message, f"at most {MAX_WIDTH:g} m are read", findings.source, road.line))
+                findings.append_diagnostic(
+                    Diagnostic(message, f"at most {MAX_WIDTH:g} m are read", findings.source, road.line)
+                )
                 return
             height = abs(road.elevation.value(section.s + ds))
             if not height <= MAX_HEIGHT:
                 message = f"road {road.id!r} is {height:g} m high"
-                findings.tell(Problem(message, f"at most {MAX_HEIGHT:g} m are read", findings.source, road.line))
+                findings.append_diagnostic(
+                    Diagnostic(message, f"at most {MAX_HEIGHT:g} m are read", findings.source, road.line)
+                )
                 return

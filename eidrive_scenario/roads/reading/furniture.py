@@ -9,7 +9,7 @@ from lxml import etree
 
 from eidrive_scenario.roads.model import Corner, Repeat, Road, RoadObject, Signal, SignalController, SignalPlace
 from eidrive_scenario.roads.poses import BEYOND
-from eidrive_scenario.roads.reading.findings import Findings
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MOST_REPEATED = 100_000
 """How often an object may stand along its road."""
@@ -22,7 +22,7 @@ FURTHEST = 1e6
 
 
 def read_signals(
-    elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], findings: Findings
+    elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], findings: AttributeReader
 ) -> dict[str, Signal]:
     """The signals of all roads by id, with the references that other roads make to them.
 
@@ -46,18 +46,18 @@ def read_signals(
         if number in signals:
             signals[number] = replace(signals[number], references=(*signals[number].references, place))
         else:
-            findings.add(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
+            findings.report_error(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
     return signals
 
 
-def _read_place(road: Road, element: etree._Element, findings: Findings) -> SignalPlace:
+def _read_place(road: Road, element: etree._Element, findings: AttributeReader) -> SignalPlace:
     orientation = element.get("orientation", "none")
     s = findings.number(element, "s")
     held = min(max(s, 0.0), road.length)
     if abs(s - held) > BEYOND:
         message = f"a signal stands at s = {s:g} m of road {road.id!r}, and is put at s = {held:g} m"
         remedy = f"the road runs from 0 to {road.length:g} m"
-        findings.doubt(element, "signal-off-road", "signals beyond their roads", message, remedy)
+        findings.report_warning(element, "signal-off-road", "signals beyond their roads", message, remedy)
     return SignalPlace(
         road=road.id,
         s=held,
@@ -69,7 +69,7 @@ def _read_place(road: Road, element: etree._Element, findings: Findings) -> Sign
     )
 
 
-def _read_signal(road: Road, element: etree._Element, findings: Findings) -> Signal:
+def _read_signal(road: Road, element: etree._Element, findings: AttributeReader) -> Signal:
     return Signal(
         id=findings.text(element, "id"),
         name=element.get("name", ""),
@@ -89,7 +89,7 @@ def _read_signal(road: Road, element: etree._Element, findings: Findings) -> Sig
 
 
 def read_controllers(
-    root: etree._Element, signals: dict[str, Signal], findings: Findings
+    root: etree._Element, signals: dict[str, Signal], findings: AttributeReader
 ) -> dict[str, SignalController]:
     """Groups of signals by id."""
     controllers = {}
@@ -98,28 +98,30 @@ def read_controllers(
         for control in element.iterfind("control"):
             number = findings.text(control, "signalId")
             if number not in signals:
-                findings.add(control, f"control of signal {number!r}, which does not exist", "correct the id")
+                findings.report_error(control, f"control of signal {number!r}, which does not exist", "correct the id")
             members.append(number)
         number = findings.text(element, "id")
         controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
     return controllers
 
 
-def read_objects(road: str, element: etree._Element, findings: Findings) -> list[RoadObject]:
+def read_objects(road: str, element: etree._Element, findings: AttributeReader) -> list[RoadObject]:
     """The objects of one road."""
     return [_read_object(road, item, findings) for item in element.iterfind("objects/object")]
 
 
-def _read_object(road: str, element: etree._Element, findings: Findings) -> RoadObject:
+def _read_object(road: str, element: etree._Element, findings: AttributeReader) -> RoadObject:
     def number(name: str) -> float:
         return findings.number(element, name, 0.0)
 
     for name in ("length", "width", "height", "radius"):
         if abs(number(name)) > LARGEST_OBJECT:
-            findings.add(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
+            findings.report_error(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
     for name in ("t", "zOffset"):
         if abs(number(name)) > FURTHEST:
-            findings.add(element, f"<object> has {name}={number(name):g}", f"give a number within {FURTHEST:g}")
+            findings.report_error(
+                element, f"<object> has {name}={number(name):g}", f"give a number within {FURTHEST:g}"
+            )
     findings.spend(element, "objects", 1, MOST_PLACED)
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
     corners = [tuple(_read_corners(outline, findings)) for outline in outlines]
@@ -145,7 +147,7 @@ def _read_object(road: str, element: etree._Element, findings: Findings) -> Road
     )
 
 
-def _read_corners(outline: etree._Element, findings: Findings) -> list[Corner]:
+def _read_corners(outline: etree._Element, findings: AttributeReader) -> list[Corner]:
     corners = []
     for corner in outline:
         if corner.tag == "cornerRoad":
@@ -155,13 +157,13 @@ def _read_corners(outline: etree._Element, findings: Findings) -> list[Corner]:
         else:
             continue
         if max(abs(x), abs(y), abs(z)) > FURTHEST:
-            findings.add(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
+            findings.report_error(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
             continue
         corners.append(Corner(corner.tag == "cornerRoad", x, y, z, findings.number(corner, "height", 0.0)))
     return corners
 
 
-def _read_repeat(repeat: etree._Element, element: etree._Element, findings: Findings) -> Repeat:
+def _read_repeat(repeat: etree._Element, element: etree._Element, findings: AttributeReader) -> Repeat:
     def pair(name: str, own: str) -> tuple[float, float]:
         fallback = findings.number(element, own, 0.0)
         start = findings.number(repeat, f"{name}Start", fallback)
@@ -170,13 +172,13 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, findings: Find
     length, distance = findings.number(repeat, "length"), findings.number(repeat, "distance", 0.0)
     if length > MOST_REPEATED * (distance if distance > 0.0 else 1.0):
         message = f"<repeat> has length={length:g} and distance={distance:g}: the object stands there too often"
-        findings.add(repeat, message, f"at most {MOST_REPEATED} of it are read")
+        findings.report_error(repeat, message, f"at most {MOST_REPEATED} of it are read")
         length = 0.0
     step = distance if distance > 0.0 else 1.0
     findings.spend(repeat, "places of objects", max(length, 0.0) / step, MOST_PLACED)
     for name, own in (("width", "width"), ("height", "height"), ("t", "t"), ("zOffset", "zOffset")):
         if max(map(abs, pair(name, own))) > LARGEST_OBJECT:
-            findings.add(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
+            findings.report_error(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
     return Repeat(
         s=findings.number(repeat, "s", findings.number(element, "s", 0.0)),
         length=length,

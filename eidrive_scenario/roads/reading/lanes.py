@@ -12,7 +12,7 @@ from lxml import etree
 
 from eidrive_scenario.roads.model import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.polynomials import Polynomials, combine
-from eidrive_scenario.roads.reading.findings import Findings, line_of
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
@@ -22,24 +22,24 @@ ZERO = Polynomials()
 CENTRE = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, centre=ZERO)
 
 
-def read_speed(element: etree._Element, findings: Findings) -> float | None:
+def read_speed(element: etree._Element, findings: AttributeReader) -> float | None:
     """The limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
     text = findings.text(element, "max")
     if text in ("no limit", "undefined"):
         return math.inf if text == "no limit" else None
     unit = element.get("unit", "m/s")
     if unit not in UNITS:
-        findings.add(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
+        findings.report_error(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
     return findings.number(element, "max") * UNITS.get(unit, 1.0)
 
 
-def read_lane_offset(lanes: etree._Element, findings: Findings) -> Polynomials:
+def read_lane_offset(lanes: etree._Element, findings: AttributeReader) -> Polynomials:
     """The distance of lane 0 from the reference line."""
     return Polynomials(findings.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
 
 
 def read_sections(
-    lanes: etree._Element, length: float, lane_offset: Polynomials, findings: Findings
+    lanes: etree._Element, length: float, lane_offset: Polynomials, findings: AttributeReader
 ) -> tuple[LaneSection, ...]:
     """The lane sections of a road in the order of s; a section of no length is left out."""
     found = sorted(
@@ -47,7 +47,7 @@ def read_sections(
         key=lambda pair: pair[0],
     )
     if not found:
-        findings.add(lanes, "<lanes> has no <laneSection>", "add at least one")
+        findings.report_error(lanes, "<lanes> has no <laneSection>", "add at least one")
         return ()
     if any(findings.flag(element, "singleSide") for _, element in found):
         found = _join_sides(found)
@@ -67,7 +67,7 @@ def read_sections(
         left_out.clear()
         sections.append(LaneSection(len(sections), start, max(end - start, 0.0), read))
     if not sections:
-        findings.add(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
+        findings.report_error(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
     return tuple(sections)
 
 
@@ -127,7 +127,9 @@ def _continue_link(lane: etree._Element, name: str) -> None:
     etree.SubElement(link, name, id=lane.get("id", "0"))
 
 
-def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, findings: Findings) -> dict[int, Lane]:
+def _read_section(
+    section: etree._Element, s: float, lane_offset: Polynomials, findings: AttributeReader
+) -> dict[int, Lane]:
     found: dict[int, etree._Element] = {}
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         for element in section.iterfind(f"{side}/lane"):
@@ -138,12 +140,14 @@ def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, f
             if wrong and number and sign:
                 # Its id is what links and positions name it by.
                 kind = "lanes under the wrong side"
-                findings.doubt(element, "lane-side", kind, f"{message}, and is taken by its id", remedy)
+                findings.report_warning(element, "lane-side", kind, f"{message}, and is taken by its id", remedy)
             elif wrong:
-                findings.add(element, message, remedy)
+                findings.report_error(element, message, remedy)
                 continue
             if number in found:
-                findings.add(element, f"lane {number} occurs twice in its section", "give each lane its own id")
+                findings.report_error(
+                    element, f"lane {number} occurs twice in its section", "give each lane its own id"
+                )
             else:
                 found[number] = element
     centre = found.get(0)
@@ -156,12 +160,14 @@ def _read_section(section: etree._Element, s: float, lane_offset: Polynomials, f
             lanes[number] = lane
             edge = lane.outer
     if not any(lanes):
-        findings.add(section, "<laneSection> has no lane beside the centre", "add a lane under <left> or <right>")
+        findings.report_error(
+            section, "<laneSection> has no lane beside the centre", "add a lane under <left> or <right>"
+        )
     return {number: lanes[number] for number in sorted(lanes, reverse=True)}
 
 
 def _lane(
-    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: AttributeReader
 ) -> Lane:
     begin = float(element.get(ORIGIN, "0"))
     width, width_from = ZERO, 0.0
@@ -194,7 +200,7 @@ def _lane(
 
 
 def _read_width(
-    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: Findings
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: AttributeReader
 ) -> tuple[Polynomials, float]:
     """Width over ds, and the ds from which on the file gives it.
 
@@ -213,11 +219,11 @@ def _read_width(
     return combine([(side, given), (-side, lane_offset), (-1.0, inner)]), width_from
 
 
-def _linked(link: etree._Element | None, name: str, findings: Findings) -> tuple[int, ...]:
+def _linked(link: etree._Element | None, name: str, findings: AttributeReader) -> tuple[int, ...]:
     return () if link is None else tuple(findings.integer(element, "id") for element in link.iterfind(name))
 
 
-def _read_marks(element: etree._Element, begin: float, findings: Findings) -> Iterable[RoadMark]:
+def _read_marks(element: etree._Element, begin: float, findings: AttributeReader) -> Iterable[RoadMark]:
     for mark in element.iterfind("roadMark"):
         weight = mark.get("weight", "standard")
         width = findings.mark_number(mark, "width", None)
@@ -237,7 +243,7 @@ def _read_marks(element: etree._Element, begin: float, findings: Findings) -> It
         )
 
 
-def _read_line(line: etree._Element, usual: float, findings: Findings) -> RoadMarkLine | None:
+def _read_line(line: etree._Element, usual: float, findings: AttributeReader) -> RoadMarkLine | None:
     """A line of a road mark; None where its dashes are not given, as the type of the mark then says how it looks."""
     length, space = (findings.mark_number(line, name, None) for name in ("length", "space"))
     missing = [name for name in ("length", "space") if line.get(name) is None]

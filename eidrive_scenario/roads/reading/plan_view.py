@@ -9,7 +9,7 @@ from lxml import etree
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.roads import curves
 from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
-from eidrive_scenario.roads.reading.findings import Findings, line_of
+from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
@@ -20,20 +20,20 @@ SHORTEST = 1e-9
 """Geometries of no length occur in real maps and are left out [m]."""
 
 
-def read_reference_line(road: etree._Element, length: float, findings: Findings) -> ReferenceLine:
+def read_reference_line(road: etree._Element, length: float, findings: AttributeReader) -> ReferenceLine:
     """The reference line of a <road>.
 
     Its length is that of the geometry where the road states one that differs by more than 1 %.
     """
     plan = road.find("planView")
     if plan is None:
-        findings.add(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
+        findings.report_error(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     found: list[Curve] = []
     for geometry in plan.iterfind("geometry"):
         found.extend(_read_geometry(geometry, findings))
     if not found:
-        findings.add(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
+        findings.report_error(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     found.sort(key=lambda curve: curve.s)
     covered = found[-1].s + found[-1].length
@@ -41,23 +41,25 @@ def read_reference_line(road: etree._Element, length: float, findings: Findings)
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
         remedy = "correct the length or complete the geometry"
-        findings.doubt(road, "road-jump", "lengths that are not those of the geometry", what, remedy)
+        findings.report_warning(road, "road-jump", "lengths that are not those of the geometry", what, remedy)
         length = covered
     return ReferenceLine(found, length)
 
 
-def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Curve]:
+def _read_geometry(geometry: etree._Element, findings: AttributeReader) -> Sequence[Curve]:
     s, x, y, h, length = (findings.number(geometry, name) for name in ("s", "x", "y", "hdg", "length"))
     if length <= SHORTEST:
         if length < 0.0:
-            findings.add(geometry, f"<geometry> has length={length:g}", "give a positive length")
+            findings.report_error(geometry, f"<geometry> has length={length:g}", "give a positive length")
         return []
     if length > LONGEST:
-        findings.add(geometry, f"<geometry> has length={length:g}", f"at most {LONGEST:g} m are read")
+        findings.report_error(geometry, f"<geometry> has length={length:g}", f"at most {LONGEST:g} m are read")
         return []
     shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
     if shape is None:
-        findings.add(geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS))
+        findings.report_error(
+            geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
+        )
         return []
     line = line_of(geometry)
     if shape.tag == "line":
@@ -73,19 +75,19 @@ def _read_geometry(geometry: etree._Element, findings: Findings) -> Sequence[Cur
         return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
     if shape.tag == "paramPoly3":
         return [_read_param_poly3(shape, s, x, y, h, length, findings)]
-    findings.add(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
+    findings.report_error(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
     return []
 
 
 def _read_param_poly3(
-    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, findings: Findings
+    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, findings: AttributeReader
 ) -> Cubic:
     u0, u1, u2, u3 = (findings.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
     v0, v1, v2, v3 = (findings.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
     span = shape.get("pRange", "normalized")
     if span not in ("arcLength", "normalized"):
-        findings.add(shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized")))
+        findings.report_error(shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized")))
     if not any((u1, u2, u3, v1, v2, v3)):
-        findings.add(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
+        findings.report_error(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
     pace = 1.0 if span == "arcLength" else 1.0 / length
     return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace, line=line_of(shape.getparent()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import InputError, Problem
+from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.openscenario.lint import at
 from eidrive_scenario.openscenario.model import (
     AssignRouteAction,
@@ -18,7 +18,7 @@ from eidrive_scenario.openscenario.model import (
     Vehicle,
 )
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 from eidrive_scenario.storyboard.route import route_of
 from eidrive_scenario.storyboard.trajectory import Layout, lay_out
 
@@ -34,26 +34,26 @@ class _Relative(Exception):
     """A position depends on where somebody is."""
 
 
-def trajectories_off_road(survey: RoadSurvey) -> Iterator[Problem]:
+def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A trajectory of a vehicle that leaves all roads."""
-    if survey.roads is None:
+    if context.roads is None:
         return
-    for action, actors in survey.performances:
+    for action, actors in context.performances:
         for element in action.walk():
-            if isinstance(element, FollowTrajectoryAction) and _vehicles(survey, actors):
-                trajectory = _trajectory(survey, element.trajectory_ref or element)
-                layout = _layout(survey, trajectory) if trajectory is not None else None
+            if isinstance(element, FollowTrajectoryAction) and _vehicles(context, actors):
+                trajectory = _trajectory(context, element.trajectory_ref or element)
+                layout = _layout(context, trajectory) if trajectory is not None else None
                 if trajectory is not None and layout is not None:
-                    yield from _leaves(survey, element, trajectory, layout)
+                    yield from _leaves(context, element, trajectory, layout)
 
 
 def _leaves(
-    survey: RoadSurvey, action: FollowTrajectoryAction, trajectory: Trajectory, layout: Layout
-) -> Iterator[Problem]:
+    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, layout: Layout
+) -> Iterator[Diagnostic]:
     count = min(max(2, math.ceil(layout.length / SPACING) + 1), MAX_POINTS)
     along = [layout.length * number / (count - 1) for number in range(count)]
     points = [layout.at(s) for s in along]
-    outside = survey.outside([point.x for point in points], [point.y for point in points])
+    outside = context.outside([point.x for point in points], [point.y for point in points])
     first = next((number for number, gap in enumerate(outside) if gap > MARGIN), None)
     if first is not None:
         where = points[first]
@@ -65,11 +65,11 @@ def _leaves(
         )
 
 
-def _layout(survey: RoadSurvey, trajectory: Trajectory) -> Layout | None:
+def _layout(context: RoadLintContext, trajectory: Trajectory) -> Layout | None:
     """The trajectory in the world, None where it depends on somebody or a point of it is nowhere."""
 
     def pose(position: Position) -> Pose:
-        place = survey.place(position)
+        place = context.place(position)
         if place is None:
             raise _Relative
         return place.pose
@@ -83,53 +83,53 @@ def _layout(survey: RoadSurvey, trajectory: Trajectory) -> Layout | None:
         return None
 
 
-def _trajectory(survey: RoadSurvey, given: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
+def _trajectory(context: RoadLintContext, given: TrajectoryRef | FollowTrajectoryAction) -> Trajectory | None:
     if given.trajectory is not None or given.catalog_reference is None:
         return given.trajectory
-    entry = survey.scenario.entries.get(given.catalog_reference)
+    entry = context.scenario.entries.get(given.catalog_reference)
     return entry if isinstance(entry, Trajectory) else None
 
 
-def waypoints_off_road(survey: RoadSurvey) -> Iterator[Problem]:
+def waypoints_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A waypoint beside the road."""
-    if survey.roads is None:
+    if context.roads is None:
         return
-    for route in _routes(survey):
+    for route in _routes(context):
         for waypoint in route.waypoint:
-            if id(waypoint.position) in survey.lost or (place := survey.place(waypoint.position)) is None:
+            if id(waypoint.position) in context.unresolved or (place := context.place(waypoint.position)) is None:
                 continue
-            gap = survey.outside([place.pose.x], [place.pose.y])[0]
+            gap = context.outside([place.pose.x], [place.pose.y])[0]
             if gap > MARGIN:
                 yield at(waypoint, f"the waypoint is {gap:.1f} m off the road", "move it onto a lane")
 
 
-def impossible_routes(survey: RoadSurvey) -> Iterator[Problem]:
+def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A route between whose waypoints no lanes lead."""
-    if survey.roads is None:
+    if context.roads is None:
         return
-    for route in _routes(survey):
+    for route in _routes(context):
         positions = [waypoint.position for waypoint in route.waypoint]
-        if any(id(position) in survey.lost or survey.place(position) is None for position in positions):
+        if any(id(position) in context.unresolved or context.place(position) is None for position in positions):
             continue
         try:
-            route_of(route, survey.roads, survey.place, again=True)  # type: ignore[arg-type]
+            route_of(route, context.roads, context.place, again=True)  # type: ignore[arg-type]
         except InputError as error:
-            for problem in error.problems:
-                yield at(route, problem.message, problem.remedy)
+            for problem in error.diagnostics:
+                yield at(route, problem.message, problem.hint)
 
 
-def _routes(survey: RoadSurvey) -> Iterator[Route]:
+def _routes(context: RoadLintContext) -> Iterator[Route]:
     """Routes that the scenario uses, each once."""
     routes = []
-    for element in survey.elements:
+    for element in context.elements:
         if isinstance(element, AssignRouteAction | RouteRef):
             entry = element.route or (
-                survey.scenario.entries.get(element.catalog_reference) if element.catalog_reference else None
+                context.scenario.entries.get(element.catalog_reference) if element.catalog_reference else None
             )
             if isinstance(entry, Route):
                 routes.append(entry)
     yield from {id(route): route for route in routes}.values()
 
 
-def _vehicles(survey: RoadSurvey, actors: tuple[str, ...]) -> bool:
-    return any(isinstance(survey.scenario.entities.get(name), Vehicle) for name in actors)
+def _vehicles(context: RoadLintContext, actors: tuple[str, ...]) -> bool:
+    return any(isinstance(context.scenario.entities.get(name), Vehicle) for name in actors)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import Problem, suggestion
+from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario.lint import at
 from eidrive_scenario.openscenario.model import (
     LaneChangeAction,
@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario.model import (
     TrafficSignalState,
     TrafficSignalStateAction,
 )
-from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 
 BEYOND = 0.01
 """Roads are as long as their files round them [m]."""
@@ -22,45 +22,45 @@ _ADDRESS = "="
 """ScenarioRunner addresses signals as `pos=x,y` or `id=7`."""
 
 
-def missing_places(survey: RoadSurvey) -> Iterator[Problem]:
+def missing_places(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A position on a road or lane that is not there."""
-    seen: set[Problem] = set()
-    for error in survey.lost.values():
-        for problem in error.problems:
+    seen: set[Diagnostic] = set()
+    for error in context.unresolved.values():
+        for problem in error.diagnostics:
             if problem not in seen:
                 seen.add(problem)
                 yield problem
 
 
-def beyond_ends(survey: RoadSurvey) -> Iterator[Problem]:
+def beyond_ends(context: RoadLintContext) -> Iterator[Diagnostic]:
     """An s before the start or beyond the end of its road: the engine takes the end, as others do."""
-    for element in survey.elements:
-        if survey.roads is None or not isinstance(element, LanePosition | RoadPosition):
+    for element in context.elements:
+        if context.roads is None or not isinstance(element, LanePosition | RoadPosition):
             continue
-        road = survey.roads.roads.get(element.road_id)
+        road = context.roads.roads.get(element.road_id)
         if road is not None and not -BEYOND <= element.s <= road.length + BEYOND:
             what = f"s = {element.s:g} lies beyond road {road.id!r}, which is {road.length:.2f} m long"
             yield at(element, what, "its end is meant; give an s on the road")
 
 
-def missing_lanes(survey: RoadSurvey) -> Iterator[Problem]:
+def missing_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A change to a lane that no road has."""
-    if survey.roads is None:
+    if context.roads is None:
         return
-    known = {str(number) for road in survey.roads.roads.values() for part in road.sections for number in part.lanes}
-    for element in survey.elements:
+    known = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
+    for element in context.elements:
         target = element.lane_change_target.absolute_target_lane if isinstance(element, LaneChangeAction) else None
         if target is not None and target.value.strip() not in known - {"0"}:
             shown = ", ".join(sorted(known - {"0"}, key=int))
             yield at(target, f"no road has a lane {target.value!r}", f"lanes of the roads are {shown}")
 
 
-def missing_signals(survey: RoadSurvey) -> Iterator[Problem]:
+def missing_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A traffic signal that the road network does not have."""
-    if survey.roads is None:
+    if context.roads is None:
         return
-    known = set(survey.roads.signals)
-    for element in survey.elements:
+    known = set(context.roads.signals)
+    for element in context.elements:
         if isinstance(element, TrafficSignalState):
             name = element.traffic_signal_id
         elif isinstance(element, TrafficSignalStateAction | TrafficSignalCondition):

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from eidrive_scenario.errors import Problem
-from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 
 
-def doubts_about(rule: str) -> Callable[[RoadSurvey], Iterator[Problem]]:
+def map_warning_rule(rule: str) -> Callable[[RoadLintContext], Iterator[Diagnostic]]:
     """What the road network itself finds doubtful in its file, of one rule."""
 
-    def check(survey: RoadSurvey) -> Iterator[Problem]:
-        if survey.roads is not None:
-            yield from (problem for problem in survey.roads.doubts if problem.rule == rule)
+    def check(context: RoadLintContext) -> Iterator[Diagnostic]:
+        if context.roads is not None:
+            yield from (problem for problem in context.roads.map_warnings if problem.rule == rule)
 
     return check

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from eidrive_scenario.driving.area_checks import areas_off_road
 from eidrive_scenario.driving.declared import declared_settings
-from eidrive_scenario.errors import InputError, Problem
-from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 
 
-def conflict_areas_off_road(survey: RoadSurvey) -> Iterator[Problem]:
+def conflict_areas_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A conflict area of which no part lies on a road; wrong settings are reported elsewhere."""
     try:
-        settings = declared_settings(survey.scenario, None, None)
+        settings = declared_settings(context.scenario, None, None)
     except InputError:
         return
-    yield from areas_off_road(survey.scenario, settings, survey.roads)
+    yield from areas_off_road(context.scenario, settings, context.roads)

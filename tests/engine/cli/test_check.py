@@ -162,9 +162,9 @@ def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_pa
 def test_one_that_breaks_the_checker_is_named_and_keeps_none_from_being_checked(
     eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from eidrive_scenario.experiments import inspection
+    from eidrive_scenario.experiments import scenario_checks
 
-    inspect = inspection.inspect_scenario
+    inspect = scenario_checks.check_scenario
 
     def broken(path: Path, ignored: tuple[str, ...]) -> object:
         if path.name == "a.xosc":
@@ -173,7 +173,7 @@ def test_one_that_breaks_the_checker_is_named_and_keeps_none_from_being_checked(
 
     for name in ("a.xosc", "b.xosc"):
         (tmp_path / name).write_text("<OpenSCENARIO/>")
-    monkeypatch.setattr(inspection, "inspect_scenario", broken)
+    monkeypatch.setattr(scenario_checks, "check_scenario", broken)
     result = eidrive("check", tmp_path)
     assert result.exit_code == 3
     assert f"{tmp_path / 'a.xosc'}: internal error: ZeroDivisionError: division by zero" in result.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.experiments.rules import run_rules
 from eidrive_scenario.openscenario import load_scenario
 
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
@@ -80,7 +80,7 @@ def found(maps: None) -> dict[str, Counter[str]]:
             scenario = load_scenario(path)
         except ScenarioError:
             continue
-        rules = Counter(problem.rule for _, problem in broken_rules(scenario))
+        rules = Counter(problem.rule for _, problem in run_rules(scenario))
         counts[path.relative_to(CORPORA).as_posix()] = rules
     return counts
 

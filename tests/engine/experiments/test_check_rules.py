@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, SettingError
-from eidrive_scenario.experiments.rules import ALL_RULES, broken_rules
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.experiments.rules import ALL_RULES, run_rules
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.openscenario.lint import Level
 
@@ -92,7 +92,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Problem]]:
+def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
     """What the rules find in the scaffold with elements put in their places."""
     root = etree.fromstring(text)
     for fragment in fragments:
@@ -103,7 +103,7 @@ def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[
                 put(root, element)
     path = folder / "scenario.xosc"
     path.write_bytes(etree.tostring(root, pretty_print=True))
-    return list(broken_rules(load_scenario(path)))
+    return list(run_rules(load_scenario(path)))
 
 
 def put_on_road(folder: Path, element: etree._Element) -> None:
@@ -170,7 +170,7 @@ def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> N
     for _, problem in found:
         assert problem.source == str(folder / ("street.xodr" if in_roads else "scenario.xosc"))
         assert problem.line is not None
-        assert problem.remedy
+        assert problem.hint
 
 
 def test_backwards_a_car_is_no_faster(folder: Path) -> None:
@@ -181,6 +181,6 @@ def test_backwards_a_car_is_no_faster(folder: Path) -> None:
 def test_a_rule_can_be_left_out(folder: Path) -> None:
     findings(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
-    assert list(broken_rules(scenario, ["no-stop-trigger"])) == []
+    assert list(run_rules(scenario, ["no-stop-trigger"])) == []
     with pytest.raises(SettingError, match="there is no rule 'no-stop'; did you mean 'no-stop-trigger'"):
-        list(broken_rules(scenario, ["no-stop"]))
+        list(run_rules(scenario, ["no-stop"]))

@@ -16,8 +16,8 @@ from eidrive_scenario.experiments.paper import (
     PUBLISHED,
     SCENARIOS,
     Table,
-    checks,
     difference,
+    evaluate_claims,
     run_settings,
     tabulate,
 )
@@ -112,7 +112,7 @@ def test_a_run_without_the_metric_is_named() -> None:
 
 
 def test_the_papers_episodes_bear_out_the_papers_order(table: Table) -> None:
-    found = checks(table)
+    found = evaluate_claims(table)
     assert len(found) == 6
     assert all(check.holds for check in found)
     assert "cooperation 3.98 m, none 3.26 m; difference per seed +0.72 m" in found[0].evidence
@@ -120,7 +120,9 @@ def test_the_papers_episodes_bear_out_the_papers_order(table: Table) -> None:
 
 def test_a_wrong_order_does_not_hold() -> None:
     runs = [(job, result(job.scenario, job.seed, 2.0, 0.0) if job.arm == "ideal" else run) for job, run in episodes()]
-    verdicts = {check.statement: check.holds for check in checks(tabulate(runs, LINKS)) if check.scenario[-1] == "1"}
+    verdicts = {
+        check.statement: check.holds for check in evaluate_claims(tabulate(runs, LINKS)) if check.scenario[-1] == "1"
+    }
     assert verdicts["cooperation > none"] is False
     assert verdicts["latency < cooperation"] is False
 
@@ -141,7 +143,7 @@ def test_the_sentence_says_so_where_nothing_changes() -> None:
 
 def test_the_print_fits_80_columns_and_holds_the_paper_beside(table: Table) -> None:
     out = io.StringIO()
-    Console(file=out, width=80).print(render(table, checks(table)))
+    Console(file=out, width=80).print(render(table, evaluate_claims(table)))
     text = out.getvalue()
     assert "…" not in text
     assert max(len(line) for line in text.splitlines()) <= 80

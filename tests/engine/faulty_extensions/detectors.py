@@ -93,7 +93,7 @@ class ExitsWhenBuilt(Detector):
 
 class WrongSettings(Detector):
     def __init__(self):
-        raise SettingError(Problem("no weights", "give weights"))
+        raise SettingError(Diagnostic("no weights", "give weights"))
 
     def detect(self, readings):
         return Detections(readings.time)

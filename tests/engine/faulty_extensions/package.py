@@ -20,7 +20,7 @@ from py_trees.common import Status
 
 from eidrive_scenario.api import (
     ActionBehaviour, Condition, Criterion, CriterionSettings, Detections, Detector, FusionMethod, LinkChannel,
-    ChannelProfile, Plan, Problem, RoutePlanner, SettingError, Verdict,
+    ChannelProfile, Plan, Diagnostic, RoutePlanner, SettingError, Verdict,
 )
 
 AFTER = 0.5  # [s]: the faults begin later than the run

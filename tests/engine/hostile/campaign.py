@@ -25,7 +25,7 @@ from mutants import mutant
 from trial import TIME_LIMIT, Outcome, attempt
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.inspection import inspect_roads, inspect_scenario
+from eidrive_scenario.experiments.scenario_checks import check_road_file, check_scenario
 from eidrive_scenario.library import definition, library_path
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.roads import RoadNetwork
@@ -97,17 +97,17 @@ def _check_and_run(path: Path) -> None:
         return
     if kind == "distribution":
         runs = load_distribution(path)
-        inspect_scenario(runs.scenario)
+        check_scenario(runs.scenario)
         for number in runs.spread(3):
             scenario = load_scenario(runs.scenario, runs[number].assignments)
             Simulation(scenario, seed=1, settings=RunSettings(time_limit=0.2)).run()
         return
-    inspect_scenario(path)
+    check_scenario(path)
     Simulation(load_scenario(path), seed=1, settings=RunSettings(time_limit=TIME_LIMIT)).run()
 
 
 def _drive_on(path: Path, scenario: str) -> None:
-    inspect_roads(path)
+    check_road_file(path)
     text = scenario.replace("ROADS", str(path)).encode()
     Simulation(load_scenario(text), seed=1, settings=RunSettings(time_limit=TIME_LIMIT)).run()
 

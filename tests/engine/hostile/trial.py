@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from eidrive_scenario.errors import EidriveError, InputError
-from eidrive_scenario.experiments.inspection import inspect_roads, inspect_scenario
+from eidrive_scenario.experiments.scenario_checks import check_road_file, check_scenario
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -64,7 +64,7 @@ def attempt(path: Path, cpu_limit: int = 60, run: Callable[[Path], None] | None 
 def check_and_run(path: Path) -> None:
     """What the commands `check` and `run` do with a file."""
     roads = definition(path) == "roads" or path.suffix == ".xodr"
-    (inspect_roads if roads else inspect_scenario)(path)
+    (check_road_file if roads else check_scenario)(path)
     if not roads:
         scenario = load_scenario(path)
         Simulation(scenario, seed=1, settings=RunSettings(time_limit=TIME_LIMIT)).run()
@@ -82,7 +82,7 @@ def _child(path: Path, writer: int, cpu_limit: int, run: Callable[[Path], None])
         os.dup2(silence, 2)
         run(path)
     except InputError as error:
-        kind, detail = "refused", "\n".join(str(problem) for problem in error.problems)[:3000]
+        kind, detail = "refused", "\n".join(str(problem) for problem in error.diagnostics)[:3000]
     except EidriveError as error:
         kind, detail = "refused", str(error)[:3000]
     except MemoryError:

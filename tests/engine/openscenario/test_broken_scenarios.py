@@ -51,7 +51,7 @@ def test_broken_file_is_refused_where_it_is_wrong(name: str, monkeypatch: pytest
     path = BROKEN / f"{name}.xosc"
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path)
-    problems = caught.value.problems
+    problems = caught.value.diagnostics
     assert [problem.line for problem in problems] == [line for line, _ in EXPECTED[name]]
     for problem, (line, text) in zip(problems, EXPECTED[name], strict=True):
         assert problem.source == str(path)

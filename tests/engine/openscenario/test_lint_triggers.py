@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.lint import RULES, Survey
+from eidrive_scenario.openscenario.lint import RULES, LintContext
 
 PLACE = """<Private entityRef="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
 </TeleportAction></PrivateAction></Private>"""
@@ -80,8 +80,8 @@ def check(scenario_xml: Callable[..., bytes]) -> Check:
         )
         init = parts.pop("init", PLACE)
         scenario = load_scenario(scenario_xml(story=story, init=init, stop=stop, **parts))
-        survey = Survey(scenario)
-        problems = [problem for rule in RULES for problem in rule.findings(survey)]
+        survey = LintContext(scenario)
+        problems = [problem for rule in RULES for problem in rule.run(survey)]
         return [problem.rule for problem in sorted(problems, key=lambda problem: problem.line or 0)]
 
     return found

@@ -132,7 +132,7 @@ def test_a_wrong_declaration_is_reported_once(scenario_xml: Build, story_xml: Te
     xml = scenario_xml(declarations=parameters_xml(Speed=("double", "${1 / 0}")), story=story_xml(speed="$Speed"))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(xml)
-    assert len(caught.value.problems) == 1
+    assert len(caught.value.diagnostics) == 1
     assert "has no value" in str(caught.value)
 
 

@@ -21,7 +21,7 @@ CURVE = """<Trajectory name="t" closed="false"><Shape><Polyline>
 def problems_of(xml: bytes) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(xml)
-    return [problem.message for problem in caught.value.problems]
+    return [problem.message for problem in caught.value.diagnostics]
 
 
 def private(action: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
 from eidrive_scenario.openscenario.parameters import Scope, declare
 from eidrive_scenario.openscenario.references import resolve_references, without
@@ -15,7 +15,7 @@ from eidrive_scenario.settings import key_lines, load_yaml
 
 
 def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:
-    scope, findings = Scope(), Findings()
+    scope, findings = Scope(), DiagnosticCollector()
     for name, (kind, value) in parameters.items():
         declare(scope, ParameterDeclaration(name=name, parameter_type=kind, value=value), None, findings)
     assert not findings.problems
@@ -94,7 +94,7 @@ def test_wrong_reference_is_reported_with_line_and_key(text: str, problem: str) 
 def test_all_wrong_references_are_reported_together() -> None:
     with pytest.raises(SettingError) as caught:
         resolved("{a: $X, b: [$Y, $Latency]}")
-    assert [problem.message.split(":")[0] for problem in caught.value.problems] == ["setting 'a'", "setting 'b.0'"]
+    assert [problem.message.split(":")[0] for problem in caught.value.diagnostics] == ["setting 'a'", "setting 'b.0'"]
 
 
 def test_settings_without_scope_stay_as_they_are() -> None:

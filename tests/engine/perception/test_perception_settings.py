@@ -38,7 +38,7 @@ def write(tmp_path: Path) -> Write:
 def told(path: Path, **options: str) -> list[str]:
     with pytest.raises(InputError) as error:
         Simulation(load_for_seed(path, 1, {}), settings=RunSettings(**options))  # type: ignore[arg-type]
-    return [str(problem) for problem in error.value.problems]
+    return [str(problem) for problem in error.value.diagnostics]
 
 
 def line_of(path: Path, word: str) -> int:

@@ -25,7 +25,7 @@ PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 def problems(text: str, **given: object) -> list[str]:
     with pytest.raises(SettingError) as caught:
         parse_criteria(text, source="a.xosc", line=10, **given)  # type: ignore[arg-type]
-    return [str(problem) for problem in caught.value.problems]
+    return [str(problem) for problem in caught.value.diagnostics]
 
 
 def test_one_criterion() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from eidrive_scenario.experiments.paper import SCENARIOS, checks, run_settings
+from eidrive_scenario.experiments.paper import SCENARIOS, evaluate_claims, run_settings
 from eidrive_scenario.reporting.demo import demo, main
 
 
@@ -18,7 +18,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, tuple[boo
     out = tmp_path_factory.mktemp("demo") / "demo.html"
     printed = io.StringIO()
     tables = demo(out, range(1, 2), 1, Console(file=printed, width=80))
-    return out, printed.getvalue(), tuple(check.holds for table in tables for check in checks(table)[:2])
+    return out, printed.getvalue(), tuple(check.holds for table in tables for check in evaluate_claims(table)[:2])
 
 
 def test_cooperation_keeps_farther_away_than_none_and_than_late_messages(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lxml import html
 
-from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, Rule, Table
+from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, ModelVariant, Table
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.demo_page import CameraPicture, Place, _speed, write_demo
@@ -19,7 +19,7 @@ from eidrive_scenario.reporting.top_view import RoadDrawing
 AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
 
 
-def table(rule: Rule) -> Table:
+def table(rule: ModelVariant) -> Table:
     cells = []
     for (scenario, name), published in PUBLISHED.items():
         arm = next(arm for arm in ARMS if arm.name == name)

@@ -88,7 +88,7 @@ def test_a_lane_inside_the_centre_of_its_bend_does_not_turn_round(road: Text, ma
 def test_numbers_that_no_road_has_are_refused(road: Text, map_of: Text) -> None:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(map_of(road(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
-    assert [str(problem) for problem in caught.value.problems] == [
+    assert [str(problem) for problem in caught.value.diagnostics] == [
         "town.xodr:1: <geometry> has x='1000000000000.0'; give a number of at most 1e+09"
     ]
 
@@ -105,7 +105,7 @@ def test_a_route_over_a_jump_of_the_map_has_no_more_points_than_its_lanes(road: 
 def problems(text: str) -> list[str]:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(text, "town.xodr")
-    return [str(problem) for problem in caught.value.problems]
+    return [str(problem) for problem in caught.value.diagnostics]
 
 
 @pytest.mark.parametrize("text", ["1_0", "\u0663", "nan", "1,5"])
@@ -163,7 +163,7 @@ def test_a_signal_beyond_its_road_stands_at_its_end(road: Text, map_of: Text) ->
     )
     network = RoadNetwork.parse(map_of(road(lanes=section(), extra=f"<signals>{signals}</signals>")), "town.xodr")
     assert [network.signal_pose(signal).x for signal in network.signals.values()] == [0.0, 100.0, 100.0]
-    (doubt,) = network.doubts
+    (doubt,) = network.map_warnings
     assert doubt.rule == "signal-off-road"
     assert str(doubt) == (
         "town.xodr:1: a signal stands at s = -3 m of road '1', and is put at s = 0 m; "

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, RoadError
+from eidrive_scenario.errors import Diagnostic, RoadError
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 
 Text = Callable[..., str]
@@ -18,7 +18,7 @@ Text = Callable[..., str]
 def problems(text: str) -> list[str]:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(text, "town.xodr")
-    return [str(problem) for problem in caught.value.problems]
+    return [str(problem) for problem in caught.value.diagnostics]
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_lanes_under_the_wrong_side_lie_where_their_ids_say(road: Text, map_of: 
     text = map_of(road(lanes=sides(left, "<center/>", right)))
     network = RoadNetwork.parse(text, "town.xodr")
     assert [network.lane_pose_at("1", lane, 10.0).y for lane in (1, -1, -2)] == [1.5, -1.5, -4.5]
-    (doubt,) = network.doubts
+    (doubt,) = network.map_warnings
     assert doubt.rule == "lane-side"
     assert str(doubt) == (
         "town.xodr:1: lane -1 stands under <left>, and is taken by its id; "
@@ -99,7 +99,7 @@ def test_a_road_that_leads_to_no_junction_ends_there(road: Text, map_of: Text) -
     network = RoadNetwork.parse(
         map_of(road(link='<successor elementType="junction" elementId="7"/>'), road("2", y=50.0)), "town.xodr"
     )
-    (doubt,) = network.doubts
+    (doubt,) = network.map_warnings
     assert doubt.rule == "road-link"
     assert str(doubt) == (
         "town.xodr:1: road '1' links to junction '7', which does not exist; "
@@ -123,7 +123,7 @@ def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
     second = road("2", x=80.0, link=link.format("prede", 1, "end"), lanes=one_lane.format("prede"))
     network = RoadNetwork.parse(map_of(first, second), "town.xodr")
     assert network.roads["1"].length == 80.0
-    assert [(doubt.rule, doubt.message) for doubt in network.doubts] == [
+    assert [(doubt.rule, doubt.message) for doubt in network.map_warnings] == [
         ("road-jump", f"road '1' has length {length:g} m, but its geometry ends {there} that: the geometry counts")
     ]
     ahead = network.advance(network.location("1", -1, 70.0), 25.0)
@@ -151,7 +151,7 @@ def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
         '<width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection>'
     )
     network = RoadNetwork.parse(map_of(road(lanes=lanes)), "town.xodr")
-    (doubt,) = network.doubts
+    (doubt,) = network.map_warnings
     assert (doubt.rule, doubt.line) == ("road-mark", 1)
     assert doubt.message == f"{what}, and is drawn without it"
     paint = next(mesh for mesh in surface_meshes(network) if mesh.kind == "marking_white")
@@ -284,13 +284,13 @@ def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, 
             del element.attrib[name]
         else:
             element.set(name, text)
-    refused: tuple[Problem, ...] = ()
+    refused: tuple[Diagnostic, ...] = ()
     try:
         network = RoadNetwork.parse(etree.tostring(root))
     except RoadError as error:
-        refused = error.problems
+        refused = error.diagnostics
     if refused:
-        assert all(problem.message and problem.remedy for problem in refused)
+        assert all(problem.message and problem.hint for problem in refused)
         return
     network.locate([0.0, 30.0], [0.0, 5.0])
     for key in list(network.graph)[:8]:
@@ -312,7 +312,7 @@ def test_a_virtual_junction_does_not_lead_from_the_ends_of_its_main_road(road: T
     driveway = road("2", x=50.0, y=-2.0, hdg=-1.5, length=20.0, link=leaves, junction="9")
     network = RoadNetwork.parse(map_of(road("1"), driveway, rest=virtual), "town.xodr")
     assert network.advance(network.location("1", -1, 90.0), 20.0) is None
-    (doubt,) = network.doubts
+    (doubt,) = network.map_warnings
     assert str(doubt) == (
         "town.xodr:1: a road leads to road '1' between its ends, and ends there instead; "
         "split that road there, and join the parts by a junction"

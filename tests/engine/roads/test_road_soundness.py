@@ -26,7 +26,7 @@ def section(s: float, *right: str) -> str:
 
 def told(text: str) -> list[tuple[str, str]]:
     """Rule and message of each finding."""
-    return [(problem.rule, problem.message) for problem in RoadNetwork.parse(text, "town.xodr").doubts]
+    return [(problem.rule, problem.message) for problem in RoadNetwork.parse(text, "town.xodr").map_warnings]
 
 
 def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) -> str:
@@ -59,7 +59,7 @@ def test_a_length_that_is_not_that_of_the_geometry(road: Text, map_of: Text) -> 
 
 def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of: Text) -> None:
     text = map_of(*("\n" + road(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
-    (problem,) = RoadNetwork.parse(text, "town.xodr").doubts
+    (problem,) = RoadNetwork.parse(text, "town.xodr").map_warnings
     assert str(problem) == (
         "town.xodr:3: road '0' jumps by 1 m at s = 50 m; 7 more of such jumps: line 5, 7, 9, 11, …; "
         "let each geometry begin where the one before ends"
@@ -182,7 +182,7 @@ def test_links_lead_past_a_section_of_no_length(road: Text, map_of: Text) -> Non
     none = section(60, lane(-1), lane(-2, '<successor id="-1"/>'), lane(-3, '<successor id="-2"/>'))
     last = section(60.0000004, lane(-1, '<predecessor id="-2"/>'), lane(-2, '<predecessor id="-3"/>'))
     network = RoadNetwork.parse(map_of(road(lanes=first + none + last)), "town.xodr")
-    assert network.doubts == ()
+    assert network.map_warnings == ()
     for number in (-1, -2):
         assert network.roads["1"].sections[0].lanes[number].successors == (number,)
 
@@ -191,7 +191,7 @@ def test_real_maps_are_not_flooded(corpora: Path) -> None:
     """Every map gives a finding or none for each kind; those below are true ones, looked up in the files."""
     found = {}
     for file in sorted(corpora.rglob("*.xodr")):
-        for problem in RoadNetwork.load(file).doubts:
+        for problem in RoadNetwork.load(file).map_warnings:
             found.setdefault((file.name, problem.rule), []).append(problem.line)
     assert found == {
         ("SampleDatabase.xodr", "lane-width"): [1807, 1807],

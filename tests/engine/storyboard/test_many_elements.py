@@ -10,7 +10,7 @@ import pytest
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.reach import Reach
+from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
 from eidrive_scenario.openscenario.storyboard_names import Meant, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.elements import StoryElement
@@ -48,10 +48,10 @@ def test_times_of_a_chain_are_found_by_looking_at_each_link_a_few_times(
     monkeypatch: pytest.MonkeyPatch, order: Callable[[list[int]], Any]
 ) -> None:
     looked = []
-    advance = Reach._advance
-    monkeypatch.setattr(Reach, "_advance", lambda self, node: looked.append(node) or advance(self, node))
+    advance = ReachabilityAnalysis._advance
+    monkeypatch.setattr(ReachabilityAnalysis, "_advance", lambda self, node: looked.append(node) or advance(self, node))
     outline = Outline(load_scenario(chain(60, order)))
-    reach = Reach(outline)
+    reach = ReachabilityAnalysis(outline)
     assert all(reach.start[node] == pytest.approx(0.5, abs=1e-5) for node in outline.nodes if "event" in node.path[-1])
     assert len(looked) < 6 * len(outline.nodes)
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.reach import Reach
+from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
 from eidrive_scenario.storyboard.states import Transition
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
@@ -115,7 +115,7 @@ def test_nothing_starts_before_its_earliest_time(build: Callable[..., Storyboard
     for number in range(30):
         storyboard = build(PLACE, stop=f"{Storyteller(1000 * seed + number).story()}<StopTrigger/>")
         outline = Outline(storyboard.scenario)
-        earliest = Reach(outline).start
+        earliest = ReachabilityAnalysis(outline).start
         happened = starts(storyboard)
         for node in outline.nodes[1:]:
             bound, time = earliest[node], happened.get(node.path, math.inf)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from eidrive_scenario.experiments.inspection import inspect_scenario
+from eidrive_scenario.experiments.scenario_checks import check_scenario
 from eidrive_scenario.storyboard.lint.paths import MAX_POINTS, SPACING
-from eidrive_scenario.storyboard.lint.survey import RoadSurvey
+from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 
 FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T00:00:00" description="t" author="test"/>
 <CatalogLocations><VehicleCatalog><Directory path="eidrive_library/catalogs"/></VehicleCatalog></CatalogLocations>
@@ -30,14 +30,14 @@ def test_trajectory_off_road_check_looks_at_a_bounded_number_of_points(
     monkeypatch: pytest.MonkeyPatch, end: float, points: int
 ) -> None:
     counts = []
-    outside = RoadSurvey.outside
+    outside = RoadLintContext.outside
 
-    def counted(self: RoadSurvey, x: Sequence[float], y: Sequence[float]) -> Sequence[float]:
+    def counted(self: RoadLintContext, x: Sequence[float], y: Sequence[float]) -> Sequence[float]:
         counts.append(len(x))
         return outside(self, x, y)
 
-    monkeypatch.setattr(RoadSurvey, "outside", counted)
-    report = inspect_scenario(FILE.format(end=end).encode())
+    monkeypatch.setattr(RoadLintContext, "outside", counted)
+    report = check_scenario(FILE.format(end=end).encode())
     assert not report.problems
     assert any("the trajectory 'far' leaves the road after" in str(warning) for warning in report.warnings)
     assert max(counts) == points

@@ -7,8 +7,8 @@ from typing import Literal, overload
 
 from lxml import etree
 
-from eidrive_scenario.errors import Problem, RoadError, quoted, suggestion
-from eidrive_scenario.roads.flaws import Flaw
+from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
+from eidrive_scenario.roads.map_warnings import MapWarning
 
 MOST = 100
 """Problems after which reading ends."""
@@ -24,24 +24,24 @@ def line_of(element: etree._Element | None) -> int | None:
     return line if isinstance(line, int) else None
 
 
-class Findings:
+class AttributeReader:
     """Reads attributes of elements of one file and remembers each problem with its line."""
 
     def __init__(self, source: str) -> None:
         self.source = source
-        self.problems: list[Problem] = []
-        self.flaws: list[Flaw] = []
+        self.problems: list[Diagnostic] = []
+        self.map_warnings: list[MapWarning] = []
         self._spent: dict[str, float] = {}
 
-    def add(self, element: etree._Element | None, message: str, remedy: str) -> None:
+    def report_error(self, element: etree._Element | None, message: str, remedy: str) -> None:
         """Remember a problem at an element."""
-        self.tell(Problem(message, remedy, self.source, line_of(element)))
+        self.append_diagnostic(Diagnostic(message, remedy, self.source, line_of(element)))
 
-    def tell(self, problem: Problem) -> None:
+    def append_diagnostic(self, problem: Diagnostic) -> None:
         """Remember a problem. Raises RoadError with all of them once there are too many."""
         self.problems.append(problem)
         if len(self.problems) >= MOST:
-            last = Problem(f"reading ends after {MOST} errors", "", self.source, problem.line)
+            last = Diagnostic(f"reading ends after {MOST} errors", "", self.source, problem.line)
             raise RoadError([*sorted(self.problems, key=lambda one: one.line or 0), last])
 
     def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
@@ -49,12 +49,12 @@ class Findings:
         before = self._spent.get(what, 0.0)
         self._spent[what] = before + amount
         if before <= limit < before + amount:
-            self.add(element, f"the file has more than {limit:g} {what}", "split it")
+            self.report_error(element, f"the file has more than {limit:g} {what}", "split it")
 
-    def doubt(self, element: etree._Element, rule: str, kind: str, message: str, remedy: str) -> None:
+    def report_warning(self, element: etree._Element, rule: str, kind: str, message: str, remedy: str) -> None:
         """Remember what is against the standard, and is read all the same."""
-        if len(self.flaws) < MOST_DOUBTS:
-            self.flaws.append(Flaw(rule, kind, message, remedy, line_of(element)))
+        if len(self.map_warnings) < MOST_DOUBTS:
+            self.map_warnings.append(MapWarning(rule, kind, message, remedy, line_of(element)))
 
     @overload
     def number(self, element: etree._Element, name: str) -> float: ...
@@ -74,7 +74,7 @@ class Findings:
         if abs(value) <= LARGEST:
             return value
         remedy = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
-        self.add(element, f"<{element.tag}> has {name}={quoted(text)}", remedy)
+        self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", remedy)
         return 0.0
 
     def mark_number(self, element: etree._Element, name: str, default: float | None) -> float | None:
@@ -91,7 +91,7 @@ class Findings:
     def doubt_mark(self, element: etree._Element, what: str) -> None:
         """Remember what is missing or wrong in a road mark."""
         message, remedy = f"{what}, and is drawn without it", "correct it, or take the element out"
-        self.doubt(element, "road-mark", "road marks that are not complete", message, remedy)
+        self.report_warning(element, "road-mark", "road marks that are not complete", message, remedy)
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
         """A piece of a cubic: its start and a, b, c, d."""
@@ -125,7 +125,7 @@ class Findings:
             value = None
         if value is not None and abs(value) <= LARGEST:
             return value
-        self.add(element, f"<{element.tag}> has {name}={quoted(text)}", "give a whole number")
+        self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", "give a whole number")
         return 0
 
     def contact(self, element: etree._Element, name: str) -> Literal["start", "end"] | None:
@@ -136,7 +136,7 @@ class Findings:
         if text == "end":
             return "end"
         if text is not None:
-            self.add(element, f"<{element.tag}> has {name}={quoted(text)}", suggestion(text, ("start", "end")))
+            self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", suggestion(text, ("start", "end")))
         return None
 
     def flag(self, element: etree._Element, name: str) -> bool:
@@ -146,7 +146,7 @@ class Findings:
     def _missing(self, element: etree._Element, name: str) -> None:
         near = suggestion(name, map(str, element.attrib)) if element.attrib else ""
         remedy = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
-        self.add(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)
+        self.report_error(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)
 
 
 def _number(text: str) -> float:

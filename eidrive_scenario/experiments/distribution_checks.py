@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eidrive_scenario.errors import ConstraintError, InputError, Problem
-from eidrive_scenario.experiments.inspection import Findings, inspect_scenario
-from eidrive_scenario.experiments.rules import broken_rules
+from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError
+from eidrive_scenario.experiments.rules import run_rules
+from eidrive_scenario.experiments.scenario_checks import CheckReport, check_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import Combinations, Listed
 from eidrive_scenario.openscenario.lint import Level
@@ -21,13 +21,13 @@ _FIRST_DRAWS = 20
 
 
 @dataclass(frozen=True)
-class DistributionFindings(Findings):
+class DistributionCheckReport(CheckReport):
     """What keeps a distribution's runs from being played, what is worth knowing, and how many runs there are."""
 
     runs: int = 0
 
 
-def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> DistributionFindings:
+def check_distribution(path: Path, ignored: Collection[str] = ()) -> DistributionCheckReport:
     """Read a distribution, its scenario, and the scenario with each value that the distribution lists.
 
     Every listed value is in one of the runs that are read, with the first value of all other parameters; so are the
@@ -37,11 +37,11 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
     try:
         unfolding = load_distribution(path)
     except InputError as error:
-        return DistributionFindings(error.problems)
-    alone = inspect_scenario(unfolding.scenario, ignored)
+        return DistributionCheckReport(error.diagnostics)
+    alone = check_scenario(unfolding.scenario, ignored)
     if alone.problems:
         known = (*unfolding.warnings, *alone.warnings)
-        return DistributionFindings(alone.problems, known, len(unfolding), notes=alone.notes)
+        return DistributionCheckReport(alone.problems, known, len(unfolding), notes=alone.notes)
     found = _Gathered(alone, unfolding.warnings, ignored)
     telling = sorted(set(_telling(unfolding)))
     for number in telling[:_MOST_LOADED]:
@@ -50,16 +50,16 @@ def inspect_distribution(path: Path, ignored: Collection[str] = ()) -> Distribut
         found.read(unfolding[number], every_value=False)
     if len(telling) > _MOST_LOADED:
         unread = f"{len(telling) - _MOST_LOADED} of the listed values were not tried"
-        found.told[Level.WARNING][Problem(unread, "run them", unfolding.source)] = None
+        found.told[Level.WARNING][Diagnostic(unread, "run them", unfolding.source)] = None
     problems, warnings, notes = (tuple(found.told[level]) for level in (Level.ERROR, Level.WARNING, Level.NOTE))
-    return DistributionFindings(problems, warnings, len(unfolding), notes=notes)
+    return DistributionCheckReport(problems, warnings, len(unfolding), notes=notes)
 
 
 class _Gathered:
     """What is found in one run after the other; of each rule at each place once."""
 
-    def __init__(self, alone: Findings, warnings: Iterable[Problem], ignored: Collection[str]) -> None:
-        self.told: dict[Level, dict[Problem, None]] = {
+    def __init__(self, alone: CheckReport, warnings: Iterable[Diagnostic], ignored: Collection[str]) -> None:
+        self.told: dict[Level, dict[Diagnostic, None]] = {
             Level.ERROR: {},
             Level.WARNING: dict.fromkeys((*warnings, *alone.warnings)),
             Level.NOTE: dict.fromkeys(alone.notes),
@@ -78,7 +78,7 @@ class _Gathered:
         except InputError as error:
             self._refused(error, every_value)
             return
-        for level, problem in broken_rules(scenario, self._ignored):
+        for level, problem in run_rules(scenario, self._ignored):
             if _place(problem) not in self._known:
                 self._known.add(_place(problem))
                 self.told[level][replace(problem, message=f"in run {run.number}: {problem.message}")] = None
@@ -86,15 +86,15 @@ class _Gathered:
     def _refused(self, error: InputError, every_value: bool) -> None:
         """A run that cannot be played; of one that was read besides only what is new."""
         known = {_place(problem) for told in self.told.values() for problem in told}
-        problems = [one for one in error.problems if every_value or _place(one) not in known]
+        problems = [one for one in error.diagnostics if every_value or _place(one) not in known]
         if isinstance(error, ConstraintError):
-            left_out = (replace(one, remedy=f"{one.remedy}; such runs are left out") for one in problems)
+            left_out = (replace(one, hint=f"{one.hint}; such runs are left out") for one in problems)
             self.told[Level.WARNING].update(dict.fromkeys(left_out))
         else:
             self.told[Level.ERROR].update(dict.fromkeys(problems))
 
 
-def _place(problem: Problem) -> tuple[str, str, int | None]:
+def _place(problem: Diagnostic) -> tuple[str, str, int | None]:
     return problem.rule, problem.source, problem.line
 
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 from lxml import etree
 
-from eidrive_scenario.openscenario.findings import Findings
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.parsing import line_of
 from eidrive_scenario.openscenario.scalars import Version
 
 
 @dataclass(frozen=True)
-class Slip:
+class Workaround:
     """One of them, in elements of one name.
 
     since, before  the versions of the standard in which it is one
@@ -30,25 +30,27 @@ class Slip:
     message: str
     remedy: str
     found: Callable[[etree._Element], bool]
-    mend: Callable[[etree._Element], None]
+    repair: Callable[[etree._Element], None]
     since: Version = (1, 0)
     before: Version = (2, 0)
 
 
-def without_slips(root: etree._Element, name: str, version: Version, findings: Findings) -> etree._Element:
+def apply_workarounds(
+    root: etree._Element, name: str, version: Version, findings: DiagnosticCollector
+) -> etree._Element:
     """The tree as it is meant: itself, or a copy where something had to be put right, with a warning for each."""
-    slips = {slip.element: slip for slip in SLIPS if slip.since <= version < slip.before}
+    slips = {slip.element: slip for slip in WORKAROUNDS if slip.since <= version < slip.before}
     wrong = [node for node in root.iter(*slips) if slips[str(node.tag)].found(node)]
     if not wrong:
         return root
     for node in wrong:
         slip = slips[str(node.tag)]
-        findings.warn(slip.message, slip.remedy, source=name, line=line_of(node))
+        findings.warning(slip.message, slip.remedy, source=name, line=line_of(node))
     meant = copy.deepcopy(root)
     for node in list(meant.iter(*slips)):
         slip = slips[str(node.tag)]
         if slip.found(node):
-            slip.mend(node)
+            slip.repair(node)
     return meant
 
 
@@ -108,9 +110,9 @@ def _wrapped_command(node: etree._Element) -> None:
         around.append(command)
 
 
-SLIPS = (
+WORKAROUNDS = (
     *(
-        Slip(
+        Workaround(
             holder,
             f"a CustomCommandAction stands in {holder} by itself",
             "put it into a UserDefinedAction; other tools may refuse it",
@@ -119,28 +121,28 @@ SLIPS = (
         )
         for holder in ("Actions", "Action")
     ),
-    Slip(
+    Workaround(
         "MiscObject",
         "the category of a MiscObject is written 'grafficIsland'",
         "write trafficIsland; other tools may refuse it",
         _graffic,
         _traffic,
     ),
-    Slip(
+    Workaround(
         "ManeuverGroup",
         "a CatalogReference stands behind a Maneuver in ManeuverGroup",
         "put CatalogReferences first; other tools may refuse it",
         _maneuver_first,
         _catalog_references_first,
     ),
-    Slip(
+    Workaround(
         "LightStateAction",
         "LightState stands before LightType in LightStateAction",
         "put LightType first; other tools may refuse it",
         _light_type_second,
         _light_type_first,
     ),
-    Slip(
+    Workaround(
         "Phase",
         "TrafficeSignalGroupState is the spelling of OpenSCENARIO up to 1.2",
         "write TrafficSignalGroupState; other tools may refuse it",
@@ -148,7 +150,7 @@ SLIPS = (
         _new_group_state,
         since=(1, 3),
     ),
-    Slip(
+    Workaround(
         "Sun",
         "Sun has the illuminance of OpenSCENARIO 1.3 in place of intensity",
         "write intensity, or raise revMinor to 3; other tools may refuse it",

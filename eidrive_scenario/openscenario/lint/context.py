@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import cached_property
 
 from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.reach import Reach, Watch
+from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis, TriggerAnalysis
 
 
-class Survey(Outline):
+class LintContext(Outline):
     """The outline of a scenario, and what its triggers can ever see."""
 
     @cached_property
-    def watches(self) -> tuple[Watch, ...]:
+    def watches(self) -> tuple[TriggerAnalysis, ...]:
         """All triggers that are asked at all."""
-        return tuple(Reach(self).watches())
+        return tuple(ReachabilityAnalysis(self).watches())

@@ -25,7 +25,7 @@ class Guarded(TyperGroup):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            for problem in error.problems:
+            for problem in error.diagnostics:
                 typer.echo(str(problem), err=True)
             raise typer.Exit(WRONG_INPUT) from error
         except KeyboardInterrupt as error:
@@ -39,11 +39,11 @@ class Guarded(TyperGroup):
         except (Exception, SystemExit) as error:
             if _from_typer(error):
                 raise
-            (show_traceback if ctx.params.get("traceback") else tell)(error)
+            (show_traceback if ctx.params.get("traceback") else print_error)(error)
             raise typer.Exit(BROKEN) from error
 
 
-def tell(error: BaseException, file: object = None) -> None:
+def print_error(error: BaseException, file: object = None) -> None:
     """Say on stderr what broke in a few words: the run, what the system refused, or an error of this program's own.
 
     file  file whose check broke; None for a run

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.lint.intervals import ALWAYS, NEVER, Intervals, compared
 from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.spans import ALWAYS, NEVER, Spans, compared
 from eidrive_scenario.openscenario.model import Element, Rule
 from eidrive_scenario.openscenario.names import CRITERIA
 
@@ -17,7 +17,7 @@ IMPOSSIBLE, STATE, WAITS = "impossible-condition", "impossible-state", "unreacha
 
 
 @dataclass(frozen=True)
-class Truth:
+class TruthIntervals:
     """When a condition can hold, its edge and delay left aside.
 
     spans    it holds at none but these instants [s]
@@ -28,7 +28,7 @@ class Truth:
     risen    why it never becomes true while somebody looks, though it may become false; "" where it can
     """
 
-    spans: Spans = ALWAYS
+    spans: Intervals = ALWAYS
     certain: bool = False
     rule: str = ""
     reason: str = ""
@@ -36,16 +36,16 @@ class Truth:
     risen: str = ""
 
 
-def never(reason: str, rule: str = IMPOSSIBLE) -> Truth:
+def never(reason: str, rule: str = IMPOSSIBLE) -> TruthIntervals:
     """Of a condition that cannot hold."""
-    return Truth(NEVER, True, rule, reason)
+    return TruthIntervals(NEVER, True, rule, reason)
 
 
-OPEN = Truth()
+OPEN = TruthIntervals()
 """Of a condition of which the file alone does not say when it holds."""
 
 
-def truth(condition: model.Condition, outline: Outline) -> Truth:
+def truth_intervals(condition: model.Condition, outline: Outline) -> TruthIntervals:
     """When a condition can hold that does not ask for the state of the storyboard."""
     by_entity, by_value = condition.by_entity_condition, condition.by_value_condition
     if by_entity is not None:
@@ -57,33 +57,33 @@ def truth(condition: model.Condition, outline: Outline) -> Truth:
     return find(leaf, outline)
 
 
-def _time(leaf: model.SimulationTimeCondition, _: Outline) -> Truth:
+def _time(leaf: model.SimulationTimeCondition, _: Outline) -> TruthIntervals:
     spans = compared(leaf.rule, leaf.value)
-    return Truth(spans, True) if spans else never("the simulation time is never negative")
+    return TruthIntervals(spans, True) if spans else never("the simulation time is never negative")
 
 
-def _parameter(leaf: model.ParameterCondition, outline: Outline) -> Truth:
+def _parameter(leaf: model.ParameterCondition, outline: Outline) -> TruthIntervals:
     """A parameter keeps its value, unless an action sets or modifies it; which value that is, the user may say."""
     name = leaf.parameter_ref
     if any(isinstance(one, model.ParameterAction) and one.parameter_ref == name for one in outline.elements):
         return OPEN
-    return Truth(steady=f"no action sets the parameter {name!r}")
+    return TruthIntervals(steady=f"no action sets the parameter {name!r}")
 
 
-def _time_of_day(_: model.TimeOfDayCondition, outline: Outline) -> Truth:
+def _time_of_day(_: model.TimeOfDayCondition, outline: Outline) -> TruthIntervals:
     if any(isinstance(one, model.TimeOfDay) for one in outline.elements):
         return OPEN
     return never("no EnvironmentAction says what time of day it is")
 
 
-_BY_VALUE: Mapping[type[Element] | type[None], Callable[[Any, Outline], Truth]] = {
+_BY_VALUE: Mapping[type[Element] | type[None], Callable[[Any, Outline], TruthIntervals]] = {
     model.SimulationTimeCondition: _time,
     model.ParameterCondition: _parameter,
     model.TimeOfDayCondition: _time_of_day,
 }
 
 
-def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> Truth:
+def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthIntervals:
     triggering = condition.triggering_entities
     names = [name for ref in triggering.entity_ref for name in outline.members(ref.entity_ref)]
     absent = [name for name in names if _absent(name, outline)]
@@ -99,7 +99,7 @@ def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> Truth:
     if other is not None and names and all(name == other for name in names) and isinstance(leaf, _PAIRS):
         return never(f"{other!r} is compared with itself")
     if isinstance(leaf, model.TraveledDistanceCondition) and leaf.value <= 0.0 and set(names) <= outline.at_start:
-        return Truth(steady="no distance at all is travelled at once")
+        return TruthIntervals(steady="no distance at all is travelled at once")
     return _of_quantity(leaf)
 
 
@@ -133,7 +133,7 @@ _AMOUNTS: Mapping[type[Element], str] = {
 }
 
 
-def _of_quantity(leaf: Element) -> Truth:
+def _of_quantity(leaf: Element) -> TruthIntervals:
     """Some quantities are never negative."""
     if isinstance(leaf, model.ReachPositionCondition) and leaf.tolerance < 0.0:
         return never("a tolerance below zero is never kept")

@@ -9,7 +9,7 @@ import numpy as np
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.lint import Survey
+from eidrive_scenario.openscenario.lint import LintContext
 from eidrive_scenario.openscenario.model import Position
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.motion import Place
@@ -18,7 +18,7 @@ from eidrive_scenario.storyboard.stage import Absent, Stage
 from eidrive_scenario.world.view import WorldView
 
 
-class RoadSurvey(Survey):
+class RoadLintContext(LintContext):
     """What the rules ask about a scenario and its roads, before anybody is in the world."""
 
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
@@ -36,7 +36,7 @@ class RoadSurvey(Survey):
             return None
 
     @cached_property
-    def lost(self) -> dict[int, InputError]:
+    def unresolved(self) -> dict[int, InputError]:
         """Why a position is nowhere, by the identity of the position."""
         return dict(self._lost())
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from eidrive_scenario.driving.declared import torchscript_warnings
-from eidrive_scenario.errors import InputError, Problem, capped
-from eidrive_scenario.experiments.rules import broken_rules, check_names
+from eidrive_scenario.errors import Diagnostic, InputError, capped
+from eidrive_scenario.experiments.rules import check_rule_names, run_rules
 from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.openscenario.catalog_check import check_catalog
-from eidrive_scenario.openscenario.findings import in_order
+from eidrive_scenario.openscenario.diagnostics import sort_diagnostics
 from eidrive_scenario.openscenario.lint import Level
 from eidrive_scenario.recording.criteria_text import unbuilt_criteria
 from eidrive_scenario.roads import RoadNetwork
@@ -19,15 +19,15 @@ from eidrive_scenario.simulation import Simulation
 
 
 @dataclass(frozen=True)
-class Findings:
+class CheckReport:
     """What keeps a scenario from being played, what is most likely a mistake, and what is worth knowing."""
 
-    problems: tuple[Problem, ...]
-    warnings: tuple[Problem, ...] = ()
-    notes: tuple[Problem, ...] = field(default=(), kw_only=True)
+    problems: tuple[Diagnostic, ...]
+    warnings: tuple[Diagnostic, ...] = ()
+    notes: tuple[Diagnostic, ...] = field(default=(), kw_only=True)
 
 
-def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
+def check_scenario(source: Source, ignored: Collection[str] = ()) -> CheckReport:
     """Read a scenario with its roads, controllers, channels and criteria; every problem says where and what is right.
 
     source  all that load_scenario takes
@@ -38,39 +38,43 @@ def inspect_scenario(source: Source, ignored: Collection[str] = ()) -> Findings:
     try:
         scenario = load_scenario(source)
     except InputError as error:
-        return Findings(error.problems)
+        return CheckReport(error.diagnostics)
     unbuilt = [problem for problem in unbuilt_criteria(scenario) if problem not in scenario.warnings]
-    found: dict[Level, list[Problem]] = {Level.ERROR: [], Level.WARNING: [*scenario.warnings, *unbuilt], Level.NOTE: []}
-    for level, problem in broken_rules(scenario, ignored):
+    found: dict[Level, list[Diagnostic]] = {
+        Level.ERROR: [],
+        Level.WARNING: [*scenario.warnings, *unbuilt],
+        Level.NOTE: [],
+    }
+    for level, problem in run_rules(scenario, ignored):
         found[level].append(problem)
     try:
         Simulation(scenario, load_weights=False).close()
         found[Level.WARNING] += torchscript_warnings(scenario)
     except InputError as error:
         known = [replace(problem, rule="") for problem in found[Level.ERROR]]
-        found[Level.ERROR] += [problem for problem in error.problems if problem not in known]
-    problems, warnings, notes = (tuple(capped(in_order(problems))) for problems in found.values())
-    return Findings(problems, warnings, notes=notes)
+        found[Level.ERROR] += [problem for problem in error.diagnostics if problem not in known]
+    problems, warnings, notes = (tuple(capped(sort_diagnostics(problems))) for problems in found.values())
+    return CheckReport(problems, warnings, notes=notes)
 
 
-def inspect_catalog(path: Path, ignored: Collection[str] = ()) -> Findings:
+def inspect_catalog(path: Path, ignored: Collection[str] = ()) -> CheckReport:
     """Read a catalog file, each entry with the defaults of its parameters. No rule applies to a catalog by itself.
 
     Raises SettingError for an unknown name in `ignored`.
     """
-    check_names(ignored)
-    return Findings(*check_catalog(path))
+    check_rule_names(ignored)
+    return CheckReport(*check_catalog(path))
 
 
-def inspect_roads(path: Path, ignored: Collection[str] = ()) -> Findings:
+def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
     """Read an OpenDRIVE file: what keeps it from being read, and what its roads have against themselves.
 
     `ignored` are the names of rules that are left out. Raises SettingError for an unknown name.
     """
-    check_names(ignored)
+    check_rule_names(ignored)
     try:
         roads = RoadNetwork.load(path)
     except InputError as error:
-        return Findings(error.problems)
-    doubts = [problem for problem in roads.doubts if problem.rule not in ignored]
-    return Findings((), tuple(capped(sorted(doubts, key=lambda problem: problem.line or 0))))
+        return CheckReport(error.diagnostics)
+    doubts = [problem for problem in roads.map_warnings if problem.rule not in ignored]
+    return CheckReport((), tuple(capped(sorted(doubts, key=lambda problem: problem.line or 0))))

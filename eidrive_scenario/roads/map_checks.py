@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads.flaws import Flaw
 from eidrive_scenario.roads.links import LaneEnd, LaneLinks, end_section, side_at
 from eidrive_scenario.roads.location import LaneKey
+from eidrive_scenario.roads.map_warnings import MapWarning
 from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
 from eidrive_scenario.roads.poses import lateral_axis
 
@@ -30,7 +30,9 @@ OPEN = 0.5
 """A lane of this width at its end does not just taper off [m]."""
 
 
-def flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks) -> Iterator[Flaw]:
+def check_road_map(
+    roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: LaneLinks
+) -> Iterator[MapWarning]:
     """What is likely wrong with a file's roads."""
     for road in roads.values():
         yield from _jumps(road)
@@ -50,13 +52,13 @@ def flaws(roads: Mapping[str, Road], junctions: Mapping[str, Junction], links: L
             yield from _connection(roads, junction, connection)
 
 
-def _jumps(road: Road) -> Iterator[Flaw]:
+def _jumps(road: Road) -> Iterator[MapWarning]:
     curves = road.reference.curves
     name = f"road {road.id!r}"
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
         what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield Flaw("road-jump", spans, what, "let it begin at s=0", curves[0].line)
+        yield MapWarning("road-jump", spans, what, "let it begin at s=0", curves[0].line)
     for one, other in pairwise(curves):
         if one.line is not None and one.line == other.line:
             continue
@@ -64,7 +66,7 @@ def _jumps(road: Road) -> Iterator[Flaw]:
         if abs(missing) > JUMP:
             how = "ends before the next one begins" if missing > 0.0 else "runs on into the next one"
             what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
-            yield Flaw("road-jump", spans, what, "let s be the sum of the lengths before", other.line)
+            yield MapWarning("road-jump", spans, what, "let s be the sum of the lengths before", other.line)
             continue
         end, start = one.at(one.length), other.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
@@ -72,25 +74,29 @@ def _jumps(road: Road) -> Iterator[Flaw]:
         if apart > JUMP:
             what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
             remedy = "let each geometry begin where the one before ends"
-            yield Flaw("road-jump", "such jumps", what, remedy, other.line)
+            yield MapWarning("road-jump", "such jumps", what, remedy, other.line)
         elif KINK < turn < CORNER:
             what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
-            yield Flaw("road-kink", "such kinks", what, "let each geometry go on with the heading before", other.line)
+            yield MapWarning(
+                "road-kink", "such kinks", what, "let each geometry go on with the heading before", other.line
+            )
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
-        yield Flaw("road-jump", "lengths that are not those of the geometry", what, "correct the length", road.line)
+        yield MapWarning(
+            "road-jump", "lengths that are not those of the geometry", what, "correct the length", road.line
+        )
 
 
-def _tilts(road: Road) -> Iterator[Flaw]:
+def _tilts(road: Road) -> Iterator[MapWarning]:
     for start, tilt, *_ in road.superelevation.pieces:
         if abs(tilt) > STEEP:
             what = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
-            yield Flaw("road-surface", "such tilts", what, "give <superelevation> in radians", road.line)
+            yield MapWarning("road-surface", "such tilts", what, "give <superelevation> in radians", road.line)
 
 
-def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
+def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning]:
     sound = lane.width.is_constant and NARROW <= lane.width.value(0.0) <= WIDE
     if lane.id == 0 or (sound and lane.width_from <= JUMP):
         return
@@ -98,15 +104,15 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[Flaw]:
     if lane.width_from > JUMP:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
         what = f"{name} has no width{until}"
-        yield Flaw("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
+        yield MapWarning("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
     widths = list(_extremes(lane, section.length))
     least, most = min(widths), max(widths)
     if least < NARROW:
         what = f"{name} becomes {least:.3g} m wide"
-        yield Flaw("lane-width", "negative widths", what, "let widths be 0 or more", lane.line)
+        yield MapWarning("lane-width", "negative widths", what, "let widths be 0 or more", lane.line)
     if most > WIDE:
         what = f"{name} becomes {most:.3g} m wide"
-        yield Flaw("lane-width", "widths beyond all roads", what, "correct its terms", lane.line)
+        yield MapWarning("lane-width", "widths beyond all roads", what, "correct its terms", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
@@ -128,7 +134,7 @@ def _extremes(lane: Lane, length: float) -> Iterator[float]:
                 yield a + ds * (b + ds * (c + ds * d))
 
 
-def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int) -> Iterator[Flaw]:
+def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int) -> Iterator[MapWarning]:
     """Links of lanes at an end of a road, to another road."""
     if link is None or link.element_type != "road" or not road.sections:
         return
@@ -139,17 +145,17 @@ def _end(roads: Mapping[str, Road], road: Road, link: RoadLink | None, side: int
     yield from _broken(road, end_section(road, side), side, facing.lanes, f"the {link.contact} of road {other.id!r}")
 
 
-def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lane], where: str) -> Iterator[Flaw]:
+def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lane], where: str) -> Iterator[MapWarning]:
     for lane in section.lanes.values():
         for number in lane.successors if side > 0 else lane.predecessors:
             if number not in there:
                 word = "successor" if side > 0 else "predecessor"
                 what = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
                 remedy = "known: " + ", ".join(map(str, sorted(there)))
-                yield Flaw("lane-link", "links to lanes that do not exist", what, remedy, lane.line)
+                yield MapWarning("lane-link", "links to lanes that do not exist", what, remedy, lane.line)
 
 
-def _dead_ends(road: Road, links: LaneLinks) -> Iterator[Flaw]:
+def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
     """Lanes on which one drives to where the road goes on, and they do not.
 
     Bidirectional lanes (those in the middle, for turning) may end at junctions.
@@ -169,17 +175,17 @@ def _dead_ends(road: Road, links: LaneLinks) -> Iterator[Flaw]:
                 yield _dead_end(road, section, lane, None if inside else link)
 
 
-def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> Flaw:
+def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | None) -> MapWarning:
     what = f"lane {lane.id} of road {road.id!r} (section at s = {section.s:g} m) leads nowhere, and the road goes on"
     if link is not None:
         what += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
         remedy = "add a <laneLink> from it to a <connection>"
-        return Flaw("lane-link", "lanes that lead nowhere at junctions", what, remedy, lane.line)
-    return Flaw("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
+        return MapWarning("lane-link", "lanes that lead nowhere at junctions", what, remedy, lane.line)
+    return MapWarning("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
 
 
-def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[Flaw]:
+def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
     """Linked lanes of two roads that do not meet: cars jump there. The reference lines need not meet."""
     ends: dict[tuple[str, int], RoadEnd] = {}
     for one, other in links.between_roads():
@@ -193,7 +199,7 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[Flaw]:
         if apart > JUMP:
             names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
             what = f"{names} are linked, and their ends are {apart:.3g} m apart"
-            yield Flaw("road-jump", "linked lanes that do not meet", what, "let the roads meet there", lane.line)
+            yield MapWarning("road-jump", "linked lanes that do not meet", what, "let the roads meet there", lane.line)
 
 
 class RoadEnd(NamedTuple):
@@ -222,7 +228,7 @@ def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -
     return found.x + t * found.dx, found.y + t * found.dy
 
 
-def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[Flaw]:
+def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[MapWarning]:
     incoming, connecting = roads[connection.incoming_road], roads[connection.connecting_road]
     if not incoming.sections or not connecting.sections:
         return
@@ -233,11 +239,11 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     if junction.type == "default" and not touches:
         what = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
         remedy = "link that road to the junction, or correct incomingRoad"
-        yield Flaw(rule, "connections from elsewhere", what, remedy, connection.line)
+        yield MapWarning(rule, "connections from elsewhere", what, remedy, connection.line)
     if junction.type == "default" and connecting.junction_id != junction.id:
         what = f"{name} takes road {connecting.id!r}, which is not of this junction"
         remedy = f"give that road junction={junction.id!r}, or correct connectingRoad"
-        yield Flaw(rule, "connections by roads outside", what, remedy, connection.line)
+        yield MapWarning(rule, "connections by roads outside", what, remedy, connection.line)
     side, other_side = (
         side_at(incoming, junction, connecting, connection.contact),
         1 if connection.contact == "end" else -1,
@@ -249,13 +255,13 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
         what = f"{name} leads against the traffic of the roads {incoming.id!r} and {connecting.id!r}"
         remedy = 'swap them; where traffic keeps to the left, give the roads rule="LHT"'
-        yield Flaw(rule, "connections against the traffic", what, remedy, connection.line)
+        yield MapWarning(rule, "connections against the traffic", what, remedy, connection.line)
     for number, target in connection.lane_links:
         for lane, known, road in ((number, here, incoming), (target, there, connecting)):
             if lane not in known:
                 what = f"{name} links lane {lane} of road {road.id!r}, which it does not have there"
                 remedy = "known: " + ", ".join(map(str, sorted(known)))
-                yield Flaw(rule, "links of lanes that do not exist", what, remedy, connection.line)
+                yield MapWarning(rule, "links of lanes that do not exist", what, remedy, connection.line)
     if not connection.lane_links and not set(here) & set(there) - {0}:
         what = f"{name} links no lane"
-        yield Flaw(rule, "connections without lanes", what, "add a <laneLink>", connection.line)
+        yield MapWarning(rule, "connections without lanes", what, "add a <laneLink>", connection.line)

@@ -7,17 +7,17 @@ from collections.abc import Iterable
 
 from eidrive_scenario.openscenario.model import Rule
 
-Spans = tuple[tuple[float, float], ...]
+Intervals = tuple[tuple[float, float], ...]
 
-NEVER: Spans = ()
-ALWAYS: Spans = ((0.0, math.inf),)
+NEVER: Intervals = ()
+ALWAYS: Intervals = ((0.0, math.inf),)
 TINY = 1e-6
 """Two numbers nearer than this are equal to a Rule."""
 STEP = 0.25
 """An edge is seen at the first tick after it: no later than one step, which is shorter than this [s]."""
 
 
-def compared(rule: Rule, value: float) -> Spans:
+def compared(rule: Rule, value: float) -> Intervals:
     """The instants at which the time is as the rule says."""
     spans = {
         Rule.GREATER_THAN: ((value + TINY, math.inf),),
@@ -27,21 +27,21 @@ def compared(rule: Rule, value: float) -> Spans:
         Rule.EQUAL_TO: ((value - TINY, value + TINY),),
         Rule.NOT_EQUAL_TO: ((-math.inf, value - TINY), (value + TINY, math.inf)),
     }[rule]
-    return since(spans, 0.0)
+    return clip_before(spans, 0.0)
 
 
-def since(spans: Spans, first: float) -> Spans:
+def clip_before(spans: Intervals, first: float) -> Intervals:
     """What of the spans is not before `first`."""
     return tuple((max(low, first), high) for low, high in spans if high >= first)
 
 
-def both(one: Spans, other: Spans) -> Spans:
+def intersection(one: Intervals, other: Intervals) -> Intervals:
     """The instants that are in both."""
     met = ((max(a, c), min(b, d)) for a, b in one for c, d in other)
     return tuple(sorted((low, high) for low, high in met if low <= high))
 
 
-def either(several: Iterable[Spans]) -> Spans:
+def union(several: Iterable[Intervals]) -> Intervals:
     """The instants that are in one of them."""
     joined: list[tuple[float, float]] = []
     for low, high in sorted(span for spans in several for span in spans):
@@ -52,22 +52,22 @@ def either(several: Iterable[Spans]) -> Spans:
     return tuple(joined)
 
 
-def shifted(spans: Spans, delay: float) -> Spans:
+def shifted(spans: Intervals, delay: float) -> Intervals:
     """The spans, later by a delay."""
     return tuple((low + delay, high + delay) for low, high in spans) if delay > 0.0 else spans
 
 
-def rises(spans: Spans, first: float) -> Spans:
+def rising_edges(spans: Intervals, first: float) -> Intervals:
     """Where something that is true in these spans is seen to become true by one who looks from `first` on."""
     return tuple((low, low + STEP) for low, _ in spans if low > first)
 
 
-def falls(spans: Spans, first: float) -> Spans:
+def falling_edges(spans: Intervals, first: float) -> Intervals:
     """Where it is seen to become false."""
     return tuple((high, high + STEP) for _, high in spans if first <= high < math.inf)
 
 
-def in_words(spans: Spans) -> str:
+def format_intervals(spans: Intervals) -> str:
     """The first and the last instant in words."""
     if not spans:
         return "never"

@@ -21,12 +21,12 @@ def never_ends(action: Action) -> str:
     for element in action.walk():
         if isinstance(element, _CONTINUOUS) and element.continuous:
             return f"{type(element).__name__} is continuous"
-        if isinstance(element, TransitionDynamics) and stands_still(element):
+        if isinstance(element, TransitionDynamics) and has_zero_rate(element):
             return f"its rate is {element.value:g}"
     return ""
 
 
-def stands_still(dynamics: TransitionDynamics) -> bool:
+def has_zero_rate(dynamics: TransitionDynamics) -> bool:
     """Whether a transition never gets anywhere, as its rate is 0."""
     by_rate = dynamics.dynamics_dimension is DynamicsDimension.RATE and dynamics.value == 0.0
     return by_rate and dynamics.dynamics_shape is not DynamicsShape.STEP

@@ -11,18 +11,28 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from eidrive_scenario.openscenario.lint.intervals import (
+    ALWAYS,
+    NEVER,
+    Intervals,
+    clip_before,
+    falling_edges,
+    intersection,
+    rising_edges,
+    shifted,
+    union,
+)
 from eidrive_scenario.openscenario.lint.outline import Node, Outline
-from eidrive_scenario.openscenario.lint.spans import ALWAYS, NEVER, Spans, both, either, falls, rises, shifted, since
 from eidrive_scenario.openscenario.lint.states import States, asks_for_state
-from eidrive_scenario.openscenario.lint.truth import Truth, truth
+from eidrive_scenario.openscenario.lint.truth_intervals import TruthIntervals, truth_intervals
 from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
 from eidrive_scenario.openscenario.names import CRITERIA
 
-SWALLOWED = "swallowed-edge"
+UNOBSERVED_EDGE = "swallowed-edge"
 
 
 @dataclass(frozen=True)
-class Seen:
+class ConditionAnalysis:
     """What a trigger can see of one of its conditions, with edge and delay.
 
     spans   the instants at which it can count as true
@@ -31,42 +41,42 @@ class Seen:
     """
 
     condition: Condition
-    spans: Spans
+    spans: Intervals
     rule: str = ""
     reason: str = ""
 
 
 @dataclass(frozen=True)
-class Judged:
+class GroupAnalysis:
     """A condition group, its conditions as seen, and when all of them can hold together."""
 
     group: ConditionGroup
-    seen: tuple[Seen, ...]
-    spans: Spans
+    seen: tuple[ConditionAnalysis, ...]
+    spans: Intervals
 
 
 @dataclass(frozen=True)
-class Watch:
+class TriggerAnalysis:
     """A trigger at work: whose it is, whether it starts or stops that, and since when it is asked at the earliest."""
 
     owner: Node
     trigger: Trigger
     starts: bool
     first: float
-    groups: tuple[Judged, ...]
+    groups: tuple[GroupAnalysis, ...]
 
     @property
-    def spans(self) -> Spans:
+    def spans(self) -> Intervals:
         """When it can fire."""
-        return either(group.spans for group in self.groups)
+        return union(group.spans for group in self.groups)
 
 
-class Reach:
+class ReachabilityAnalysis:
     """The earliest times of an outline's elements [s]; inf for never."""
 
     def __init__(self, outline: Outline) -> None:
         self._outline = outline
-        self._truths: dict[int, Truth] = {}
+        self._truths: dict[int, TruthIntervals] = {}
         self._states = States(outline)
         watchers = self._watchers()
         waiting = dict.fromkeys(outline.nodes)
@@ -110,52 +120,54 @@ class Reach:
         first = self._first(node, starts=starts)
         if first == math.inf:
             return first
-        spans = either(self._judge(group, node, starts, first).spans for group in trigger.condition_group)
+        spans = union(self._judge(group, node, starts, first).spans for group in trigger.condition_group)
         return spans[0][0] if spans else math.inf
 
-    def watches(self) -> Iterator[Watch]:
+    def watches(self) -> Iterator[TriggerAnalysis]:
         """All triggers that are asked at all."""
         for node in self._outline.nodes:
             for trigger, starts in ((node.start, True), (stop_trigger(node), False)):
                 first = self._first(node, starts=starts)
                 if trigger is not None and first < math.inf:
                     groups = tuple(self._judge(group, node, starts, first) for group in trigger.condition_group)
-                    yield Watch(node, trigger, starts, first, groups)
+                    yield TriggerAnalysis(node, trigger, starts, first, groups)
 
-    def _judge(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> Judged:
+    def _judge(self, group: ConditionGroup, owner: Node, starts: bool, first: float) -> GroupAnalysis:
         seen = tuple(self._see(condition, owner, starts, first) for condition in group.condition)
-        spans = since(ALWAYS, first)
+        spans = clip_before(ALWAYS, first)
         for one in seen:
-            spans = both(spans, one.spans)
-        return Judged(group, seen, spans)
+            spans = intersection(spans, one.spans)
+        return GroupAnalysis(group, seen, spans)
 
-    def _see(self, condition: Condition, owner: Node, starts: bool, first: float) -> Seen:
+    def _see(self, condition: Condition, owner: Node, starts: bool, first: float) -> ConditionAnalysis:
         known = self._truth(condition, owner, starts)
-        spans = since(known.spans, first)
+        spans = clip_before(known.spans, first)
         if not spans:
             if known.rule:
-                return Seen(condition, NEVER, known.rule, known.reason)
-            return Seen(condition, NEVER, "impossible-condition", f"that is over before {owner.title} looks for it")
+                return ConditionAnalysis(condition, NEVER, known.rule, known.reason)
+            return ConditionAnalysis(
+                condition, NEVER, "impossible-condition", f"that is over before {owner.title} looks for it"
+            )
         edge = condition.condition_edge
         dead = _unseen(known, edge, first)
         if dead:
-            return Seen(condition, NEVER, SWALLOWED, dead)
+            return ConditionAnalysis(condition, NEVER, UNOBSERVED_EDGE, dead)
         if known.certain and edge is not ConditionEdge.NONE:
-            up = rises(known.spans, first) if edge is not ConditionEdge.FALLING else NEVER
-            down = falls(known.spans, first) if edge is not ConditionEdge.RISING else NEVER
-            spans = either((up, down))
-        return Seen(condition, shifted(spans, condition.delay))
+            up = rising_edges(known.spans, first) if edge is not ConditionEdge.FALLING else NEVER
+            down = falling_edges(known.spans, first) if edge is not ConditionEdge.RISING else NEVER
+            spans = union((up, down))
+        return ConditionAnalysis(condition, shifted(spans, condition.delay))
 
-    def _truth(self, condition: Condition, owner: Node, starts: bool) -> Truth:
+    def _truth(self, condition: Condition, owner: Node, starts: bool) -> TruthIntervals:
         if asks_for_state(condition):
             return self._states.truth(condition, owner, starts)
         known = self._truths.get(id(condition))
         if known is None:
-            known = self._truths[id(condition)] = truth(condition, self._outline)
+            known = self._truths[id(condition)] = truth_intervals(condition, self._outline)
         return known
 
 
-def _unseen(known: Truth, edge: ConditionEdge, first: float) -> str:
+def _unseen(known: TruthIntervals, edge: ConditionEdge, first: float) -> str:
     """Why an edge is never seen, "" where it can be."""
     if edge is ConditionEdge.NONE:
         return ""
@@ -165,13 +177,13 @@ def _unseen(known: Truth, edge: ConditionEdge, first: float) -> str:
         return known.risen
     if not known.certain:
         return ""
-    if edge is not ConditionEdge.FALLING and rises(known.spans, first):
+    if edge is not ConditionEdge.FALLING and rising_edges(known.spans, first):
         return ""
-    if edge is not ConditionEdge.RISING and falls(known.spans, first):
+    if edge is not ConditionEdge.RISING and falling_edges(known.spans, first):
         return ""
     if edge is ConditionEdge.FALLING:
         return "it never becomes false"
-    return "it is already true at the first evaluation" if since(known.spans, first) else "it never becomes true"
+    return "it is already true at the first evaluation" if clip_before(known.spans, first) else "it never becomes true"
 
 
 def stop_trigger(node: Node) -> Trigger | None:
