@@ -31,7 +31,7 @@ from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
-from eidrive_scenario.v2x.surroundings import LOS, NLOSV, SightLines, Surroundings
+from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world.view import WorldView
 
 TICK = 0.05
@@ -50,12 +50,12 @@ def place(row: int, stations: int, now: float) -> tuple[float, float, float]:
 
 
 @cache
-def trucks(stations: int) -> SightLines:
+def trucks(stations: int) -> LineOfSightStates:
     """Every tenth pair has a truck in between; no rays are cast here."""
     first, second = np.triu_indices(stations, 1)
     blocked = (first + second) % 10 == 0
     behind: dict[int, tuple[str, ...]] = {int(pair): ("Truck",) for pair in np.flatnonzero(blocked)}
-    return SightLines(np.where(blocked, NLOSV, LOS), np.where(blocked, 3.0, -np.inf), behind)
+    return LineOfSightStates(np.where(blocked, NLOSV, LOS), np.where(blocked, 3.0, -np.inf), behind)
 
 
 def view_of(places: dict[str, tuple[float, float, float]], tick: int) -> WorldView:
@@ -83,7 +83,7 @@ def run(stations: int, seconds: float, technology: str, look: bool) -> tuple[flo
     for tick in range(round(seconds / TICK)):
         now = tick * TICK
         places = {name: place(row, stations, now) for row, name in enumerate(names)}
-        channel.around(Surroundings(places, lambda pairs: trucks(stations)))
+        channel.update_environment(RadioEnvironment(places, lambda pairs: trucks(stations)))
         for name in names:
             channel.deliver(name, now)
         outbox = [
@@ -139,7 +139,7 @@ def main() -> None:
         books = channel.statistics(given.seconds).values()
         reading = time.process_time() - begin
         sent, received = sum(book.sent for book in books), sum(book.received for book in books)
-        busy = np.mean([channel.busy_ratio(f"{row:03d}") or 0.0 for row in range(given.stations)])
+        busy = np.mean([channel.channel_busy_ratio(f"{row:03d}") or 0.0 for row in range(given.stations)])
         print(f"  {technology:11} {sent} fates, {100 * received / sent:.1f} % heard, busy ratio {busy:.3f}")
         print(f"  {technology:11} to read the books of {len(books)} links at the end takes {reading:.2f} s, once")
         if given.profile:

@@ -59,8 +59,8 @@ from eidrive_scenario.storyboard.trajectory import Layout, TrajectoryProgress, l
 from eidrive_scenario.storyboard.transition import Transition as ValueTransition
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.link_events import FateBlock, Fates, LinkEvents
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock, OutcomeColumns
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
@@ -98,8 +98,6 @@ __all__ = [
     "EntityCondition",
     "Environment",
     "ExtensionError",
-    "FateBlock",
-    "Fates",
     "Frame",
     "FusionMethod",
     "Goal",
@@ -115,6 +113,8 @@ __all__ = [
     "Measure",
     "Message",
     "Motion",
+    "OutcomeBlock",
+    "OutcomeColumns",
     "Override",
     "Place",
     "Placement",
@@ -124,7 +124,7 @@ __all__ = [
     "Progress",
     "QuantityCondition",
     "Readings",
-    "Received",
+    "ReceivedMessage",
     "Report",
     "RoadNetwork",
     "Route",

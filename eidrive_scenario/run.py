@@ -14,7 +14,7 @@ from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.result_views import result_html, result_row
 from eidrive_scenario.resolved_settings import ResolvedSettings
-from eidrive_scenario.v2x.books import LinkStatistics
+from eidrive_scenario.v2x.link_statistics import LinkStatistics
 
 PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
 """Exit codes of a run."""

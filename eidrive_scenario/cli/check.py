@@ -64,7 +64,7 @@ def check(
             print_error(error, path)
             broken.append(error)
             continue
-        for level, found in zip(told, (findings.problems, findings.warnings, findings.notes), strict=True):
+        for level, found in zip(told, (findings.errors, findings.warnings, findings.notes), strict=True):
             for problem in found:
                 if problem not in told[level]:
                     typer.echo(f"{problem}{_mark(level, problem.rule)}")

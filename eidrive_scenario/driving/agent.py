@@ -25,7 +25,7 @@ from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.sensing.readings import EgoState, Readings
-from eidrive_scenario.v2x.message import Message, Received, StationState
+from eidrive_scenario.v2x.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ class Agent:
         )
         """Time [s], centre of the body and height of its reference point [m], heading [rad]."""
 
-    def act(self, readings: Readings, inbox: Sequence[Received], now: float, goal: Goal | None) -> AgentStep:
+    def act(self, readings: Readings, inbox: Sequence[ReceivedMessage], now: float, goal: Goal | None) -> AgentStep:
         """One tick at `now` [s]."""
         readings = self.perception.locate(readings)
         ego = readings.ego
@@ -136,10 +136,10 @@ class Agent:
         ahead, aside, _ = self.spec.offset
         self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
-    def _listen(self, inbox: Sequence[Received], now: float) -> None:
+    def _listen(self, inbox: Sequence[ReceivedMessage], now: float) -> None:
         """Keep the newest report of each sender that counts, and forget the old ones."""
         for received in inbox:
-            message = self._clock.understood(received.message, now)
+            message = self._clock.with_local_timestamps(received.message, now)
             sender = message.sender
             if sender == self.name:
                 if not self.own_perception or message.kind == "cam":

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, SightLines
+from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.rays import NOTHING
@@ -38,7 +38,7 @@ def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Pla
     return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + over)
 
 
-def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> SightLines:
+def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
     """What the rays between the antennas of these pairs meet; their own two bodies do not count.
 
     A vehicle or any other actor in between makes NLOSv, a building or the ground NLOS.
@@ -48,7 +48,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
     if count <= _FEW:
         met = world.first_met(*_ends(places, pairs))
         if all(row in (NOTHING, view.rows.get(second)) for row, (_, second) in zip(met, pairs, strict=True)):
-            return SightLines(np.full(count, LOS), np.full(count, -np.inf), {})
+            return LineOfSightStates(np.full(count, LOS), np.full(count, -np.inf), {})
     origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
     states, heights = np.full(count, LOS), np.full(count, -np.inf)
     found: dict[int, list[str]] = {}
@@ -79,7 +79,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
             if begun[ray] < 1.0:
                 going_on.append(ray)
         open_rays = np.array(going_on, dtype=np.int64)
-    return SightLines(states, heights, {ray: tuple(names) for ray, names in found.items()})
+    return LineOfSightStates(states, heights, {ray: tuple(names) for ray, names in found.items()})
 
 
 def _ends(places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> tuple[list[Place], list[Place]]:

@@ -11,9 +11,9 @@ import numpy as np
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.v2x.asn1 import Asn1Encoder
-from eidrive_scenario.v2x.generation.cam import EQUAL, LONGEST, SHORTEST, CamTriggers
-from eidrive_scenario.v2x.generation.cpm import CpmTriggers
-from eidrive_scenario.v2x.generation.numbering import Numbering
+from eidrive_scenario.v2x.generation.cam import EQUAL, LONGEST, SHORTEST, CamGenerationRules
+from eidrive_scenario.v2x.generation.cpm import CpmGenerationRules
+from eidrive_scenario.v2x.generation.object_ids import ObjectIdAssigner
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.point_cloud import PointCloud
 from eidrive_scenario.v2x.size import cam_size, cpm_size, objects_that_fit
@@ -36,9 +36,9 @@ class Speaker:
         self._clock = settings.clock
         self._number = 0
         self._periods = -1
-        self._cam = CamTriggers()
-        self._cpm = CpmTriggers()
-        self._numbering = Numbering()
+        self._cam = CamGenerationRules()
+        self._cpm = CpmGenerationRules()
+        self._numbering = ObjectIdAssigner()
         self._said = dict.fromkeys(settings.messages, -math.inf)
         """When each kind of message was last made [s]."""
 
@@ -76,7 +76,7 @@ class Speaker:
             if messages:
                 self._said[kind] = now
             said += messages
-        return tuple([self._clock.stamped(message, now) for message in said])
+        return tuple([self._clock.with_station_timestamps(message, now) for message in said])
 
     def _due(
         self, kind: str, state: StationState, detections: Detections, now: float, shortest: float
@@ -84,7 +84,7 @@ class Speaker:
         """The messages of this kind that the rules of ETSI ask for now."""
         if kind == "cpm":
             return self._triggered(state, detections, now, shortest)
-        return [self._awareness(state, now)] if self._cam.due(state, now, shortest) else []
+        return [self._awareness(state, now)] if self._cam.is_due(state, now, shortest) else []
 
     def _in_turn(self, now: float) -> bool:
         """Each tick, or at a rate."""
@@ -104,7 +104,7 @@ class Speaker:
 
     def _triggered(self, state: StationState, detections: Detections, now: float, shortest: float) -> list[Message]:
         """What the rules of ETSI choose, in as many messages as it needs."""
-        numbers = self._numbering.numbers(detections)
+        numbers = self._numbering.assign_ids(detections)
         contents = self._cpm.contents(detections, numbers, now, shortest)
         if contents is None:
             return []

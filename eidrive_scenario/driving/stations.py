@@ -23,13 +23,13 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
-from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.channel_checks import check_delivered, check_interval, check_statistics, check_told
 from eidrive_scenario.v2x.link_events import LinkEvents
-from eidrive_scenario.v2x.message import LinkEvent, Received
+from eidrive_scenario.v2x.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView
@@ -160,7 +160,7 @@ class Stations:
             return {}
         if self._channel is not None:
             self._books = None
-            self._channel.around(self._surroundings(world, view))
+            self._channel.update_environment(self._surroundings(world, view))
         readings = read_all(list(self._rigs.values()), world, view)
         for name, lookout in self._lookouts.items():
             seen = lookout.read(world, view, view.row(name), self.signals)
@@ -168,7 +168,7 @@ class Stations:
         self.readings = readings
         now = view.time
         for name, agent in self._agents.items():
-            agent.message_interval = 0.0 if self._channel is None else self._channel.interval(name)
+            agent.message_interval = 0.0 if self._channel is None else self._channel.min_message_interval(name)
             if self._checked_channel is not None:
                 check_interval(self._checked_channel, agent.message_interval)
         return {
@@ -231,13 +231,13 @@ class Stations:
                 check_statistics(channel, self._books[1])
         return self._books[1]
 
-    def _surroundings(self, world: World, view: WorldView) -> Surroundings:
+    def _surroundings(self, world: World, view: WorldView) -> RadioEnvironment:
         places = {
             name: antenna_place(view, agent.spec, agent.settings.antenna_height) for name, agent in self._agents.items()
         }
-        return Surroundings(places, partial(sight_lines, world, places))
+        return RadioEnvironment(places, partial(sight_lines, world, places))
 
-    def _deliver(self, receiver: str, now: float) -> Sequence[Received]:
+    def _deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
         if self._channel is None:
             return ()
         delivered = self._channel.deliver(receiver, now)

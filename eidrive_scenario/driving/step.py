@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.records import made_often
 from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.v2x.message import Message, Received
+from eidrive_scenario.v2x.message import Message, ReceivedMessage
 from eidrive_scenario.world.actor import Control
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ class AgentStep:
     """One tick of one station: what it saw, heard, concluded, planned and did."""
 
     detections: Detections
-    inbox: tuple[Received, ...]
+    inbox: tuple[ReceivedMessage, ...]
     fused: Detections
     plan: Plan | None
     control: Control | None

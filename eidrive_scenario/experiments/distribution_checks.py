@@ -39,9 +39,9 @@ def check_distribution(path: Path, ignored: Collection[str] = ()) -> Distributio
     except InputError as error:
         return DistributionCheckReport(error.diagnostics)
     alone = check_scenario(unfolding.scenario, ignored)
-    if alone.problems:
+    if alone.errors:
         known = (*unfolding.warnings, *alone.warnings)
-        return DistributionCheckReport(alone.problems, known, len(unfolding), notes=alone.notes)
+        return DistributionCheckReport(alone.errors, known, len(unfolding), notes=alone.notes)
     found = _Gathered(alone, unfolding.warnings, ignored)
     telling = sorted(set(_telling(unfolding)))
     for number in telling[:_MOST_LOADED]:

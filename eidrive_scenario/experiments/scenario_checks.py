@@ -22,7 +22,7 @@ from eidrive_scenario.simulation import Simulation
 class CheckReport:
     """What keeps a scenario from being played, what is most likely a mistake, and what is worth knowing."""
 
-    problems: tuple[Diagnostic, ...]
+    errors: tuple[Diagnostic, ...]
     warnings: tuple[Diagnostic, ...] = ()
     notes: tuple[Diagnostic, ...] = field(default=(), kw_only=True)
 

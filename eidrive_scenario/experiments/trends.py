@@ -27,7 +27,7 @@ from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.propagation import blockage_moments, highway_los
-from eidrive_scenario.v2x.surroundings import SightLines, Surroundings
+from eidrive_scenario.v2x.radio_environment import LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 
@@ -120,7 +120,7 @@ def reception_by_distance(distances: Sequence[float], *, truck: bool, messages: 
         kept = 0
         for seed in range(messages):
             channel = RadioChannel(profile, seed)
-            channel.around(Surroundings(places, lambda pairs, seen=sight: seen))  # type: ignore[misc]
+            channel.update_environment(RadioEnvironment(places, lambda pairs, seen=sight: seen))  # type: ignore[misc]
             state = StationState(0.0, distance, 0.0, 0.0, 0.0, 0.0)
             channel.transmit([(Message("RSU", 0, 0.0, state, Detections(0.0), 350), ["Ego"])], 0.0)
             kept += len(channel.deliver("Ego", 0.05))
@@ -131,7 +131,7 @@ def reception_by_distance(distances: Sequence[float], *, truck: bool, messages: 
     return Curve(label, at, np.array(measured), expected, 1.96 * np.sqrt(expected * (1.0 - expected) / messages))
 
 
-def _seen_in_the_world(places: dict[str, tuple[float, float, float]], truck: bool) -> SightLines:
+def _seen_in_the_world(places: dict[str, tuple[float, float, float]], truck: bool) -> LineOfSightStates:
     with World(None) as world:
         if truck:
             spec = ActorSpec("Firetruck", "firetruck", "truck", TRUCK, (0.0, 0.0, TRUCK[2] / 2.0))

@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.link_events import FateBlock, LinkEvents
+from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
@@ -90,7 +90,7 @@ class TraceHash:
             return
         for part in links.parts:
             self._sha.update(
-                self._columns(part) if isinstance(part, FateBlock) else b"".join([self._fate(link) for link in part])
+                self._columns(part) if isinstance(part, OutcomeBlock) else b"".join([self._fate(link) for link in part])
             )
 
     def _fate(self, link: LinkEvent) -> bytes:
@@ -104,7 +104,7 @@ class TraceHash:
             link.size,
         )
 
-    def _columns(self, block: FateBlock) -> bytes:
+    def _columns(self, block: OutcomeBlock) -> bytes:
         fates = block.columns()
         names = np.array([self._word(name) for name in fates.names], dtype="<u8")
         outcomes = np.array([self._word(*outcome) for outcome in fates.outcomes], dtype="<u8")

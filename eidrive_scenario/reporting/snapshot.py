@@ -9,7 +9,7 @@ from eidrive_scenario.driving.received_objects import ReceivedObjects
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
 USUAL = AgentSettings()
@@ -30,7 +30,7 @@ class Snapshot:
     station: str
     view: WorldView
     own: Detections
-    heard: tuple[Received, ...]
+    heard: tuple[ReceivedMessage, ...]
     fused: Detections
     links: tuple[LinkEvent, ...]
     step: AgentStep | None
@@ -46,7 +46,7 @@ class Knowledge:
 
     def __init__(self, station: str) -> None:
         self.station = station
-        self._heard: dict[tuple[str, str], Received] = {}
+        self._heard: dict[tuple[str, str], ReceivedMessage] = {}
         self._partial: dict[str, ReceivedObjects] = {}
         self._links: dict[str, LinkEvent] = {}
         self._own_travels = False
@@ -77,7 +77,7 @@ class Knowledge:
             step=step,
         )
 
-    def _hear(self, received: Received) -> None:
+    def _hear(self, received: ReceivedMessage) -> None:
         message = received.message
         if message.objects is not None:
             usual = USUAL.lifetime(complete=False)

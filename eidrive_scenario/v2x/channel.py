@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.v2x.links import LinkStatistics
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
-Outgoing = tuple[Message, Sequence[str]]
+OutgoingMessage = tuple[Message, Sequence[str]]
 """A message and those who listen."""
 
 
@@ -20,13 +20,13 @@ class Channel(ABC):
     (seed, purpose, sender, receiver, message number).
 
     A model is a class with `settings`, the ChannelProfile that it reads, and is built as `Model(profile, seed)`.
-    In each tick `around` comes first, then `deliver` for every station, then one `transmit`.
+    In each tick `update_environment` comes first, then `deliver` for every station, then one `transmit`.
     """
 
     own_perception: bool = False
     """True: a station's own detections travel this channel too, as a link from the station to itself."""
 
-    def around(self, surroundings: Surroundings) -> None:  # noqa: B027 - a channel need not care
+    def update_environment(self, surroundings: RadioEnvironment) -> None:  # noqa: B027 - a channel need not care
         """Where the antennas are now, and whom to ask for lines of sight between them."""
 
     @abstractmethod
@@ -37,7 +37,7 @@ class Channel(ABC):
         `own_perception` asks for it.
         """
 
-    def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
+    def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         """All that the stations say in one tick; it may be nothing.
 
         Any sequence of events will do as the answer. A channel that decides about very many messages may keep their
@@ -46,10 +46,10 @@ class Channel(ABC):
         return [event for message, receivers in outbox for event in self.send(message, receivers, now)]
 
     @abstractmethod
-    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+    def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         """What has arrived at `receiver` by `now` [s] and was not given out yet, in order of arrival."""
 
-    def interval(self, station: str) -> float:
+    def min_message_interval(self, station: str) -> float:
         """How long congestion control lets a station wait from one message to the next [s]: T_GenCam_DCC of ETSI
         EN 302 637-2. 0 where there is no such control."""
         return 0.0
@@ -63,5 +63,5 @@ class Channel(ABC):
         """The books of every link so far, by (sender, receiver)."""
 
     @abstractmethod
-    def take_over(self, previous: Channel) -> None:
+    def continue_from(self, previous: Channel) -> None:
         """Carry on for a channel replaced during a run: what it has on its way arrives by its old fate."""

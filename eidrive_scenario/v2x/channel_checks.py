@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_events import LinkEvents
-from eidrive_scenario.v2x.message import LinkEvent, Received
+from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
 
 _NUMBER = int | float | np.integer | np.floating
 
@@ -19,15 +19,16 @@ _NUMBER = int | float | np.integer | np.floating
 def check_interval(channel: Channel, interval: Any) -> None:
     """Raise InvalidResult unless the interval between messages [s] is a finite number from 0 on."""
     if not isinstance(interval, _NUMBER) or not 0.0 <= interval < math.inf:
-        raise InvalidResult(channel, "interval", f"returned {interval!r} (expected a finite number from 0 on)")
+        problem = f"returned {interval!r} (expected a finite number from 0 on)"
+        raise InvalidResult(channel, "min_message_interval", problem)
 
 
 def check_delivered(channel: Channel, delivered: Any, now: float) -> None:
     """Raise InvalidResult unless all that is delivered at `now` [s] are messages that have arrived by then."""
     if not isinstance(delivered, tuple | list):
-        raise InvalidResult(channel, "deliver", f"returned {delivered!r} (expected a tuple of Received)")
+        raise InvalidResult(channel, "deliver", f"returned {delivered!r} (expected a tuple of ReceivedMessage)")
     for received in delivered:
-        if not isinstance(received, Received):
+        if not isinstance(received, ReceivedMessage):
             raise InvalidResult(channel, "deliver", f"returned {received!r} (expected Received)")
         arrived: Any = received.arrived
         if not isinstance(arrived, _NUMBER) or not -math.inf < arrived <= now + 1e-6:

@@ -18,11 +18,11 @@ class StationClock:
         """How much it is ahead [s]."""
         return self.offset + self.drift * now
 
-    def stamped(self, message: Message, now: float) -> Message:
+    def with_station_timestamps(self, message: Message, now: float) -> Message:
         """A message of this station, its time stamps as this clock shows them; `generated` stays the true instant."""
         return _moved(message, self.error(now))
 
-    def understood(self, message: Message, now: float) -> Message:
+    def with_local_timestamps(self, message: Message, now: float) -> Message:
         """A received message, its time stamps as this station takes them: it believes its own clock."""
         return _moved(message, -self.error(now))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal
 
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.delay import ConstantDelay, Delay
 from eidrive_scenario.v2x.delay_trace import TraceDelay
-from eidrive_scenario.v2x.draws import LinkDraws
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.link_random import LinkRandom
 from eidrive_scenario.v2x.loss import Loss, NoLoss
-from eidrive_scenario.v2x.loss_draws import LossDraws
+from eidrive_scenario.v2x.loss_process import LossProcess
 from eidrive_scenario.v2x.message import Message
 from eidrive_scenario.v2x.profile import ChannelProfile
 
@@ -42,11 +42,11 @@ class ComposedChannel(LinkChannel):
         super().__init__()
         self.profile = profile
         self.own_perception = profile.own_perception
-        self._losses = LossDraws(profile.loss, seed)
-        self._draws = LinkDraws(seed)
+        self._losses = LossProcess(profile.loss, seed)
+        self._draws = LinkRandom(seed)
         self._last_arrival: dict[tuple[str, str], float] = {}
 
-    def fate(self, message: Message, receiver: str, now: float) -> float | str:
+    def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
         distance = self.surroundings.distance(message.sender, receiver)
         reason = self._losses.reason(message, receiver, now, distance)
         if reason is not None:
@@ -61,12 +61,12 @@ class ComposedChannel(LinkChannel):
             self._last_arrival[link] = now + seconds
         return seconds
 
-    def busy_ratio(self, station: str) -> float | None:
+    def channel_busy_ratio(self, station: str) -> float | None:
         loss = self.profile.loss
-        return loss.table().busy_ratio if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss) else None
+        return loss.table().channel_busy_ratio if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss) else None
 
 
-def delay_of(delay: Delay, draws: LinkDraws, message: Message, receiver: str) -> float:
+def delay_of(delay: Delay, draws: LinkRandom, message: Message, receiver: str) -> float:
     """How long this message takes on this link [s]."""
     if isinstance(delay, TraceDelay) and delay.replay:
         return delay.at(message.number)

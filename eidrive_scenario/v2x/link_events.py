@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 
-class Fates(NamedTuple):
+class OutcomeColumns(NamedTuple):
     """E fates of messages in columns, each as the attribute of LinkEvent with that name says.
 
     names      of stations;  senders, receivers   (E,) places in `names`
@@ -34,7 +34,7 @@ class Fates(NamedTuple):
     size: Places
 
 
-class FateBlock(ABC):
+class OutcomeBlock(ABC):
     """Fates that are kept in columns; whoever wants events iterates over it."""
 
     @abstractmethod
@@ -44,7 +44,7 @@ class FateBlock(ABC):
     def __iter__(self) -> Iterator[LinkEvent]: ...
 
     @abstractmethod
-    def columns(self) -> Fates:
+    def columns(self) -> OutcomeColumns:
         """The same in arrays, in the same order."""
 
 
@@ -55,8 +55,8 @@ class LinkEvents(Sequence[LinkEvent]):
     plain list of events: whoever reads `parts` takes any other sequence as the only part.
     """
 
-    def __init__(self, parts: Iterable[Sequence[LinkEvent] | FateBlock]) -> None:
-        self.parts: tuple[Sequence[LinkEvent] | FateBlock, ...] = tuple(part for part in parts if len(part))
+    def __init__(self, parts: Iterable[Sequence[LinkEvent] | OutcomeBlock]) -> None:
+        self.parts: tuple[Sequence[LinkEvent] | OutcomeBlock, ...] = tuple(part for part in parts if len(part))
         self._number = sum(map(len, self.parts))
         self._made: tuple[LinkEvent, ...] | None = None
 

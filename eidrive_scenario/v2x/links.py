@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from eidrive_scenario.v2x.books import Book, LinkStatistics
-from eidrive_scenario.v2x.hearings import Entry, Hearings
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.link_statistics import LinkCounters, LinkStatistics
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.reception_log import Entry, ReceptionLog
 
 TIME_TOLERANCE = 1e-9
 """Two instants nearer than this are one: sums of time steps do not meet exactly in floating point [s]."""
@@ -23,21 +23,21 @@ class Links:
 
     def __init__(self) -> None:
         self._queues: dict[str, list[Entry]] = {}
-        self._books: dict[str, dict[str, Book]] = {}
+        self._books: dict[str, dict[str, LinkCounters]] = {}
         """By receiver and sender."""
-        self._hearings = Hearings()
+        self._hearings = ReceptionLog()
 
-    def book(self, sender: str, receiver: str) -> Book:
+    def counters(self, sender: str, receiver: str) -> LinkCounters:
         """The book of a link, opened if there is none."""
         books = self._books.get(receiver)
         if books is None:
             books = self._books[receiver] = {}
         book = books.get(sender)
         if book is None:
-            book = books[sender] = Book()
+            book = books[sender] = LinkCounters()
         return book
 
-    def put(
+    def enqueue_delivery(
         self, message: Message, receiver: str, now: float, delay: float, distance: float | None = None
     ) -> LinkEvent:
         """Send a message that arrives `delay` [s] after `now`, over this distance between antennas [m]."""
@@ -48,23 +48,23 @@ class Links:
         if not valid:
             raise ValueError(f"the delay of a message to {receiver!r} is {delay} (expected seconds from 0 on, finite)")
         arrives = now + delay
-        self.carry((arrives, message.sender, message.number, now, Received(message, arrives)), receiver)
+        self.enqueue((arrives, message.sender, message.number, now, ReceivedMessage(message, arrives)), receiver)
         book = self._enter(message, receiver)
         if distance is not None:
-            book.fate(distance, True)
+            book.count_outcome(distance, True)
         return LinkEvent(message.sender, receiver, message.number, now, "delivered", arrives, "", message.size)
 
-    def lose(
+    def record_loss(
         self, message: Message, receiver: str, now: float, reason: str, distance: float | None = None
     ) -> LinkEvent:
         """Send a message that never arrives."""
         book = self._enter(message, receiver)
-        book.lose(reason)
+        book.count_loss(reason)
         if distance is not None:
-            book.fate(distance, False)
+            book.count_outcome(distance, False)
         return LinkEvent(message.sender, receiver, message.number, now, "lost", None, reason, message.size)
 
-    def carry(self, entry: Entry, *receivers: str) -> None:
+    def enqueue(self, entry: Entry, *receivers: str) -> None:
         """Put a message on its way whose sending is in the books."""
         queues = self._queues
         for receiver in receivers:
@@ -73,13 +73,13 @@ class Links:
             else:
                 queues[receiver] = [entry]
 
-    def _enter(self, message: Message, receiver: str) -> Book:
-        book = self.book(message.sender, receiver)
+    def _enter(self, message: Message, receiver: str) -> LinkCounters:
+        book = self.counters(message.sender, receiver)
         book.sent += 1
         book.bytes_sent += message.size
         return book
 
-    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+    def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         """What has arrived by `now`, each message once, in order of arrival, then of sender and number."""
         queue = self._queues.get(receiver)
         if not queue:
@@ -93,7 +93,7 @@ class Links:
         else:
             queue[:] = [entry for entry in queue if entry[0] > latest or entry[3] > oldest]
         due.sort()
-        self._hearings.take(receiver, due)
+        self._hearings.record(receiver, due)
         return tuple([entry[4] for entry in due])
 
     def in_flight(self) -> int:
@@ -101,15 +101,15 @@ class Links:
         return sum(len(queue) for queue in self._queues.values())
 
     def statistics(
-        self, now: float, busy_ratio: Callable[[str], float | None] = lambda station: None
+        self, now: float, channel_busy_ratio: Callable[[str], float | None] = lambda station: None
     ) -> dict[tuple[str, str], LinkStatistics]:
         """The books of every link, by (sender, receiver), at `now` [s], in alphabetical order.
 
-        `busy_ratio` says how busy a station found the channel.
+        `channel_busy_ratio` says how busy a station found the channel.
         """
-        heard = self._hearings.by_link(now)
+        heard = self._hearings.statistics_by_link(now)
         links = sorted((sender, receiver) for receiver, books in self._books.items() for sender in books)
-        busy = {receiver: busy_ratio(receiver) for receiver in self._books}
+        busy = {receiver: channel_busy_ratio(receiver) for receiver in self._books}
         return {
             (sender, receiver): self._books[receiver][sender].statistics(
                 now, heard.get((sender, receiver)), busy[receiver]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 

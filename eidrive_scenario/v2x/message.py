@@ -61,7 +61,7 @@ class Message:
 
 @made_often
 @dataclass(frozen=True)
-class Received:
+class ReceivedMessage:
     """A message at its receiver, and when it arrived [s]."""
 
     message: Message

@@ -94,7 +94,7 @@ def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel |
         return None
     channel: Channel = construct(registry("channels").load(profile.model, Channel), profile, seed)
     if previous is not None:
-        channel.take_over(previous)
+        channel.continue_from(previous)
     return channel
 
 

@@ -85,7 +85,7 @@ def test_check_tells_of_such_runs() -> None:
 def test_every_value_makes_a_scenario(path: Path) -> None:
     """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""
     findings = check_distribution(path)
-    assert findings.problems == ()
+    assert findings.errors == ()
     own = [warning for warning in findings.warnings if warning.source == str(path)]
     assert all("outside its constraints" in warning.message for warning in own)
     assert findings.runs == len(load_distribution(path))

@@ -18,9 +18,9 @@ from eidrive_scenario.recording import RunLog, read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
-from eidrive_scenario.v2x.books import LinkStatistics
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.link_statistics import LinkStatistics
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 
 ONE = resolve_scenario("coop/scenario_1")
@@ -98,11 +98,11 @@ def test_the_command_line_prints_every_link() -> None:
     assert 0.0 < link["mean_delay"] <= link["max_delay"] < 0.2
     assert 0.0 < link["mean_age"] < link["p95_age"]
     assert link["peak_age"] > link["mean_age"]
-    assert 0.2 < link["busy_ratio"] < 0.5
+    assert 0.2 < link["channel_busy_ratio"] < 0.5
     assert link["bytes_sent"] >= 121 * link["sent"]
     assert [entry["from_m"] for entry in link["reception"]] == [0.0, 25.0]
     on_air = link["sent"] - link["in_flight"] - link["lost_by"].get("queue", 0)
-    assert sum(entry["fates"] for entry in link["reception"]) == on_air
+    assert sum(entry["messages"] for entry in link["reception"]) == on_air
 
 
 class SharedMemory(Channel):
@@ -115,10 +115,10 @@ class SharedMemory(Channel):
         self._lying.append((message, receivers, now))
         return ()
 
-    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+    def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         heard = [entry for entry in self._lying if receiver in entry[1]]
         self._lying = [entry for entry in self._lying if receiver not in entry[1]]
-        return tuple(Received(message, sent) for message, _, sent in heard)
+        return tuple(ReceivedMessage(message, sent) for message, _, sent in heard)
 
     def in_flight(self) -> int:
         return len(self._lying)
@@ -126,7 +126,7 @@ class SharedMemory(Channel):
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         return {}
 
-    def take_over(self, previous: Channel) -> None:
+    def continue_from(self, previous: Channel) -> None:
         raise AssertionError("this run keeps its channel")
 
 

@@ -185,12 +185,12 @@ def test_what_is_no_scenario_is_refused() -> None:
 
 def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
     findings = check_scenario(cut_in())
-    assert (findings.problems, findings.warnings) == ((), ())
+    assert (findings.errors, findings.warnings) == ((), ())
     scenario = cut_in()
     scenario.parameters.add_parameter(xosc.Parameter("Speed", xosc.ParameterType.double, "3"))
     (unused,) = check_scenario(scenario).warnings
     assert str(unused).startswith("<Scenario>:5: the parameter 'Speed' is never used")
-    (problem,) = check_scenario(cut_in(changing="Taget")).problems
+    (problem,) = check_scenario(cut_in(changing="Taget")).errors
     assert "did you mean 'Target'?" in problem.hint
 
 

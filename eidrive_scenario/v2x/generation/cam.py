@@ -22,7 +22,7 @@ EQUAL = 1e-6
 """Differences smaller than this are none: 4.0 m are not more than 4 m, however they came about in floating point."""
 
 
-class CamTriggers:
+class CamGenerationRules:
     """Says at each tick whether a message is due.
 
     A change of heading, place or speed beyond the limits triggers one, at the earliest `SHORTEST` after the last; its
@@ -37,7 +37,7 @@ class CamTriggers:
         self._interval = LONGEST
         self._repeats = 0
 
-    def due(self, state: StationState, now: float, shortest: float = SHORTEST) -> bool:
+    def is_due(self, state: StationState, now: float, shortest: float = SHORTEST) -> bool:
         """Whether to send now [s]; congestion control may ask for a longer `shortest` interval [s]."""
         if now - self._checked < CHECK - EQUAL:
             return False

@@ -27,7 +27,7 @@ EQUAL = 1e-6
 
 
 @dataclass(frozen=True)
-class Contents:
+class CpmContents:
     """What a message carries: rows of the detections, the most important first, and whether it lists the sensors."""
 
     rows: tuple[int, ...]
@@ -35,7 +35,7 @@ class Contents:
 
 
 @dataclass(frozen=True)
-class _Said:
+class _ReportedObject:
     time: float
     x: float
     y: float
@@ -43,7 +43,7 @@ class _Said:
     direction: float
 
 
-class CpmTriggers:
+class CpmGenerationRules:
     """Remembers what it has said of each object.
 
     Vehicles come when they are new, have moved, changed speed or direction, or were not said for `LONGEST`; pedestrians
@@ -53,12 +53,12 @@ class CpmTriggers:
     def __init__(self) -> None:
         self._sent = -math.inf
         self._sensors = -math.inf
-        self._said: dict[int, _Said] = {}
+        self._said: dict[int, _ReportedObject] = {}
 
     def contents(
         self, detections: Detections, numbers: Sequence[int], now: float, shortest: float = SHORTEST
-    ) -> Contents | None:
-        """What to send now [s]; None if nothing is due. `numbers` tells the objects apart from message to message."""
+    ) -> CpmContents | None:
+        """Return what to send now [s], None if nothing is due. `numbers` identify objects across messages."""
         if now - self._sent < shortest - EQUAL:
             return None
         scores: list[float] = detections.confidence.tolist()
@@ -77,9 +77,9 @@ class CpmTriggers:
         self._said = {number: said for number, said in self._said.items() if now - said.time <= 2.0 * LONGEST}
         self._sent = now
         self._sensors = now if sensors else self._sensors
-        return Contents(tuple(chosen), sensors)
+        return CpmContents(tuple(chosen), sensors)
 
-    def _vehicle_due(self, number: int, present: _Said) -> bool:
+    def _vehicle_due(self, number: int, present: _ReportedObject) -> bool:
         last = self._said.get(number)
         return (
             last is None
@@ -93,7 +93,7 @@ class CpmTriggers:
         last = self._said.get(number)
         return last is None or now - last.time >= LONGEST / 2.0 - EQUAL
 
-    def _utility(self, number: int, present: _Said, score: float) -> float:
+    def _utility(self, number: int, present: _ReportedObject, score: float) -> float:
         """How much an object is worth its place: new ones first, then the better seen and the more changed.
 
         The terms are those of Artery's CpService: quality, changes of place, speed and direction, age; up to 1 each.
@@ -117,9 +117,9 @@ def quality(score: float) -> int:
     return math.floor(15.0 * score + 0.5)
 
 
-def _said(detections: Detections, row: int, now: float) -> _Said:
+def _said(detections: Detections, row: int, now: float) -> _ReportedObject:
     x, y, *_, yaw = detections.boxes[row].tolist()
     vx, vy = detections.velocity[row].tolist()
     speed = math.hypot(vx, vy)
     known = not math.isnan(speed)
-    return _Said(now, x, y, speed if known else 0.0, math.atan2(vy, vx) if known and speed > MOVING else yaw)
+    return _ReportedObject(now, x, y, speed if known else 0.0, math.atan2(vy, vx) if known and speed > MOVING else yaw)

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.message import Message
-from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.fading import FadingDraws
 
 Array = NDArray[np.float64]
@@ -58,13 +58,13 @@ class Transmission:
     """(N,) what became of its control information at each station, as a cause of loss or 0; None where it has none."""
 
 
-class Access(ABC):
+class MediumAccess(ABC):
     """A discrete-event model of the medium for the stations in `names`, one row each.
 
     sensing_dbm  a station senses a message of at least this power
     """
 
-    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: Gate, sensing_dbm: float) -> None:
+    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: DccGate, sensing_dbm: float) -> None:
         self.names = names
         self.gate = gate
         self.queue = queue
@@ -90,7 +90,7 @@ class Access(ABC):
         self.on_air: list[Transmission] = []
         """What may overlap with something whose end is not reached."""
 
-    def offer(self, transmissions: Sequence[Transmission]) -> None:
+    def enqueue(self, transmissions: Sequence[Transmission]) -> None:
         """Messages that stations have said; they enter their queues when they are ready."""
         self._arrivals = deque(sorted([*self._arrivals, *transmissions], key=_entry))
 
@@ -107,7 +107,7 @@ class Access(ABC):
         """
 
     @abstractmethod
-    def headed(self, row: int, transmission: Transmission | None) -> None:
+    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
         """A message has become the first in the queue of its station; None: the queue is empty now."""
 
     def share(self, transmission: Transmission) -> float:
@@ -123,7 +123,7 @@ class Access(ABC):
         """How long congestion control lets a station wait from one message to the next, after its last one [s]."""
         return self.gate.interval(row, float(self._last_use[row]))
 
-    def busy_ratio(self, row: int, span: float) -> float:
+    def channel_busy_ratio(self, row: int, span: float) -> float:
         """The channel busy ratio of a station over the `span` [s] since it joined."""
         return float(self._busy_time[row] + self._period_busy[row]) / span
 
@@ -186,12 +186,12 @@ class Access(ABC):
         self.contending += bool(queue) - (self._head[row] is not None)
         if not queue:
             self._head[row], self.ready[row] = None, math.inf
-            self.headed(row, None)
+            self.predicted_starts(row, None)
             return
         first = queue[0]
         opens = self._last_start[row] + self.interval(row)
         self._head[row], self.ready[row] = first, max(first.ready, opens)
-        self.headed(row, first)
+        self.predicted_starts(row, first)
 
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
         """The first message in the queue of a station goes on the air."""

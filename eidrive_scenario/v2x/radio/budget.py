@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from eidrive_scenario.v2x.counter_draws import Integers, Keys, joined, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.path_loss import Between, Link, PathLoss
+from eidrive_scenario.v2x.counter_random import Integers, Keys, combine_keys, key, uniform, uniforms
+from eidrive_scenario.v2x.radio.path_loss import Link, LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio.propagation import probability_of_los
-from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Surroundings
+from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
 
 Array = NDArray[np.float64]
 
@@ -80,14 +80,14 @@ class LinkBudget:
         self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         self._take_in(())
 
-    def at(self, surroundings: Surroundings) -> Budget:
+    def at(self, surroundings: RadioEnvironment) -> Budget:
         """The budget with the antennas where they are now."""
         names = surroundings.names
         if names != self._names:
             self._take_in(names)
         return self._at_few(surroundings) if 0 < len(self._pairs) <= FEW else self._at_many(surroundings)
 
-    def _at_many(self, surroundings: Surroundings) -> Budget:
+    def _at_many(self, surroundings: RadioEnvironment) -> Budget:
         names, positions = surroundings.names, surroundings.positions
         first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
@@ -101,7 +101,7 @@ class LinkBudget:
         states = np.append(between.states, LOS).take(self._pair_at)
         return Budget(names, self._rows, square[0], square[1], square[2], states, blockers)
 
-    def _at_few(self, surroundings: Surroundings) -> Budget:
+    def _at_few(self, surroundings: RadioEnvironment) -> Budget:
         """The same in plain numbers, pair by pair."""
         names = surroundings.names
         places = [surroundings.places[name] for name in names]
@@ -122,7 +122,7 @@ class LinkBudget:
         return Budget(names, self._rows, np.array(distance), np.array(loss), np.array(mean_loss), codes, blockers)
 
     def _links(
-        self, surroundings: Surroundings, places: Sequence[tuple[float, float, float]]
+        self, surroundings: RadioEnvironment, places: Sequence[tuple[float, float, float]]
     ) -> tuple[list[Link], dict[tuple[int, int], tuple[str, ...]]]:
         """What is between the stations of each pair, and the bodies there by rows, for few pairs."""
         links, blockers = [], {}
@@ -194,21 +194,21 @@ class LinkBudget:
 
         def keys(purpose: str) -> Keys:
             own = np.array([key(self._seed, purpose, name) for name in names], dtype=np.uint64)
-            return joined(own[first], own[second])
+            return combine_keys(own[first], own[second])
 
         self._keys = np.stack([keys("shadowing"), keys("blockage")])
         self._sight_keys = keys("sight")
 
     def _between(
-        self, surroundings: Surroundings, positions: Array, distance: Array
-    ) -> tuple[Between, dict[tuple[int, int], tuple[str, ...]]]:
+        self, surroundings: RadioEnvironment, positions: Array, distance: Array
+    ) -> tuple[LinkGeometry, dict[tuple[int, int], tuple[str, ...]]]:
         count = len(distance)
         heights = positions[:, 2]
         lower = np.minimum(heights[self._first], heights[self._second])
         upper = np.maximum(heights[self._first], heights[self._second])
         states, tops = np.full(count, LOS), np.full(count, -np.inf)
         vehicles = np.zeros(count, dtype=np.int64)
-        between = Between(distance, states, lower, upper, tops, vehicles)
+        between = LinkGeometry(distance, states, lower, upper, tops, vehicles)
         blockers: dict[tuple[int, int], tuple[str, ...]] = {}
         if self._line_of_sight == "random":
             hidden = uniforms(self._sight_keys, 0) > probability_of_los(distance, self._environment)

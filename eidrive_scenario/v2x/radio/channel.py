@@ -9,31 +9,31 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.channel import Outgoing
+from eidrive_scenario.v2x.channel import OutgoingMessage
 from eidrive_scenario.v2x.composed import delay_of
-from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniform
+from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
 from eidrive_scenario.v2x.delay import ConstantDelay
-from eidrive_scenario.v2x.draws import LinkDraws
-from eidrive_scenario.v2x.hearings import Entry
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.link_events import FateBlock, LinkEvents
+from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
+from eidrive_scenario.v2x.link_random import LinkRandom
 from eidrive_scenario.v2x.links import LinkStatistics
 from eidrive_scenario.v2x.loss import NoLoss
-from eidrive_scenario.v2x.loss_draws import LossDraws
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received
+from eidrive_scenario.v2x.loss_process import LossProcess
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
-from eidrive_scenario.v2x.radio.access import Access, Transmission
+from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
-from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
-from eidrive_scenario.v2x.radio.events import Batch, Dropped
+from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
 from eidrive_scenario.v2x.radio.fading import FadingDraws, Nakagami
-from eidrive_scenario.v2x.radio.ledger import Ledger
+from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink import Sidelink
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.reception_log import Entry
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -73,46 +73,46 @@ class RadioChannel(LinkChannel):
             background=profile.background_by_loss(),
         )
         background = self._receiver.background
-        self._outside = 0.0 if background is None else background[0].busy_ratio
+        self._outside = 0.0 if background is None else background[0].channel_busy_ratio
         """Share of the time in which vehicles that are not simulated fill the channel."""
-        self._losses = LossDraws(profile.loss, seed)
-        self._draws = LinkDraws(seed)
+        self._losses = LossProcess(profile.loss, seed)
+        self._draws = LinkRandom(seed)
         self._rows: dict[str, int] = {}
         self._listeners: dict[str, tuple[list[str], Rows]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         self._access = self._new_access(())
         self._access.fading = self._fading
-        self._ledger = Ledger(())
+        self._ledger = LinkCounterTable(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self._jitter_keys: list[int] = []
         self._budget: Budget | None = None
         self._open: list[Transmission] = []
-        self._told: list[FateBlock] = []
+        self._told: list[OutcomeBlock] = []
         self._dropped: list[LinkEvent] = []
         self._until: float | None = None
         """Up to when the medium was played [s]."""
         self._joined: dict[str, float] = {}
         self._last_arrival: dict[tuple[str, str], float] = {}
 
-    def _new_access(self, names: tuple[str, ...]) -> Access:
+    def _new_access(self, names: tuple[str, ...]) -> MediumAccess:
         profile = self.profile
-        gate = Gate(profile.congestion, len(names), self._outside)
+        gate = DccGate(profile.congestion, len(names), self._outside)
         if profile.technology == "80211p":
             return Csma(names, profile.queue, gate, profile.sensing, self._seed)
         return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink, profile.noise_dbm)
 
-    def fate(self, message: Message, receiver: str, now: float) -> float | str:
+    def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
         """Nothing can be said of one link alone. Raises TypeError."""
         raise TypeError("a radio decides about messages together: use transmit")
 
-    def around(self, surroundings: Surroundings) -> None:
-        super().around(surroundings)
+    def update_environment(self, surroundings: RadioEnvironment) -> None:
+        super().update_environment(surroundings)
         self._budget = None
 
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         return self.transmit([(message, receivers)], now)
 
-    def transmit(self, outbox: Sequence[Outgoing], now: float) -> Sequence[LinkEvent]:
+    def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         self._advance(now)
         offered = []
         for message, receivers in outbox:
@@ -124,10 +124,10 @@ class RadioChannel(LinkChannel):
                 missing = next(name for name in receivers if name not in self._rows)
                 raise ValueError(f"the radio was not told where {missing!r} is")
             self._ledger.send(row, rows, message.size)
-        self._access.offer(offered)
-        return self.untold()
+        self._access.enqueue(offered)
+        return self.drain_events()
 
-    def deliver(self, receiver: str, now: float) -> tuple[Received, ...]:
+    def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
         self._advance(now)
         return super().deliver(receiver, now)
 
@@ -136,25 +136,25 @@ class RadioChannel(LinkChannel):
         return super().in_flight() + undecided
 
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        self._ledger.write_into(self._links)
+        self._ledger.flush_into(self._links)
         return super().statistics(now)
 
-    def busy_ratio(self, station: str) -> float | None:
+    def channel_busy_ratio(self, station: str) -> float | None:
         row = self._rows.get(station)
         if row is None or self._until is None or self._until <= self._joined[station]:
             return self._outside
-        return min(1.0, self._access.busy_ratio(row, self._until - self._joined[station]) + self._outside)
+        return min(1.0, self._access.channel_busy_ratio(row, self._until - self._joined[station]) + self._outside)
 
-    def interval(self, station: str) -> float:
+    def min_message_interval(self, station: str) -> float:
         row = self._rows.get(station)
         return 0.0 if row is None else self._access.interval(row)
 
-    def settle(self) -> None:
+    def finalize(self) -> None:
         self._advance(math.inf)
-        self._ledger.write_into(self._links)
+        self._ledger.flush_into(self._links)
 
-    def untold(self) -> Sequence[LinkEvent]:
-        told = LinkEvents([super().untold(), self._dropped, *self._told])
+    def drain_events(self) -> Sequence[LinkEvent]:
+        told = LinkEvents([super().drain_events(), self._dropped, *self._told])
         self._told, self._dropped = [], []
         return told
 
@@ -175,16 +175,16 @@ class RadioChannel(LinkChannel):
     def _take_in(self, names: tuple[str, ...], now: float) -> None:
         """Other stations from now on; what those say who have left is lost."""
         self._joined = {name: self._joined.get(name, now) for name in names}
-        self._ledger.write_into(self._links)
+        self._ledger.flush_into(self._links)
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
         self._open = [entry for entry in self._open if entry not in gone]
         self._access.on_air = [entry for entry in self._access.on_air if entry.message.sender in names]
         self._rows = {name: row for row, name in enumerate(names)}
         self._listeners.clear()
-        self._ledger = Ledger(names)
+        self._ledger = LinkCounterTable(names)
         own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
-        self._keys = joined(own[:, None], own[None, :])
+        self._keys = combine_keys(own[:, None], own[None, :])
         self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
         if self._fading is not None:
             self._fading.rearrange(names)
@@ -225,7 +225,7 @@ class RadioChannel(LinkChannel):
         message = entry.message
         sender, rows = self._rows[message.sender], self._rows_of(message.sender, entry.receivers)
         self._ledger.drop(sender, rows)
-        self._told.append(Dropped(entry, self._access.names, sender, rows))
+        self._told.append(DroppedBlock(entry, self._access.names, sender, rows))
         self._lose_absent(entry, rows)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
@@ -236,25 +236,32 @@ class RadioChannel(LinkChannel):
         for place, entry in enumerate(ended):
             present = self._rows_of(entry.message.sender, entry.receivers)
             self._lose_absent(entry, present)
-            receivers.append(present if plain else self._spared(entry, present, receptions.causes[place], budget))
-        batch = Batch(ended, receptions, budget, receivers)
+            receivers.append(
+                present if plain else self._pending_at_switch(entry, present, receptions.causes[place], budget)
+            )
+        batch = ReceptionBlock(ended, receptions, budget, receivers)
         self._carry(batch)
-        self._ledger.decide(batch.senders, batch.heard_by, batch.causes, budget.distance[batch.senders, batch.heard_by])
+        self._ledger.decide(
+            batch.senders,
+            batch.reached_receivers,
+            batch.causes,
+            budget.distance[batch.senders, batch.reached_receivers],
+        )
         self._told.append(batch)
 
-    def _carry(self, batch: Batch) -> None:
+    def _carry(self, batch: ReceptionBlock) -> None:
         """Put the messages on their way to those who hear them."""
         heard = np.flatnonzero(batch.causes == DELIVERED)
         receivers: list[list[str]] = [[] for _ in batch.ended]
         names, delay = batch.budget.names, self.profile.delay
         places = batch.places[heard]
-        for place, row in zip(places.tolist(), batch.heard_by[heard].tolist(), strict=True):
+        for place, row in zip(places.tolist(), batch.reached_receivers[heard].tolist(), strict=True):
             receivers[place].append(names[row])
         if isinstance(delay, ConstantDelay):
             ends = np.array([entry.end + delay.seconds for entry in batch.ended])
             batch.arrives[heard] = ends[places]
             for entry, arrives, hearing in zip(batch.ended, ends.tolist(), receivers, strict=True):
-                self._links.carry(_parcel(entry, arrives), *hearing)
+                self._links.enqueue(_parcel(entry, arrives), *hearing)
             return
         arrivals = []
         for entry, hearing in zip(batch.ended, receivers, strict=True):
@@ -264,10 +271,10 @@ class RadioChannel(LinkChannel):
                     link = (entry.message.sender, name)
                     arrives = self._last_arrival[link] = max(arrives, self._last_arrival.get(link, arrives))
                 arrivals.append(arrives)
-                self._links.carry(_parcel(entry, arrives), name)
+                self._links.enqueue(_parcel(entry, arrives), name)
         batch.arrives[heard] = arrivals
 
-    def _spared(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
+    def _pending_at_switch(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
         """Those among the receivers for whom the loss that comes on top of the radio does not strike."""
         spared = []
         sender = self._rows[entry.message.sender]
@@ -291,10 +298,10 @@ class RadioChannel(LinkChannel):
     def _lose(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
         """A message that was written down as sent is lost for a reason that the reception does not know."""
         message = entry.message
-        book = self._links.book(message.sender, receiver)
-        book.lose(reason)
+        book = self._links.counters(message.sender, receiver)
+        book.count_loss(reason)
         if distance is not None:
-            book.fate(distance, False)
+            book.count_outcome(distance, False)
         self._dropped.append(
             LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
         )
@@ -303,4 +310,4 @@ class RadioChannel(LinkChannel):
 def _parcel(entry: Transmission, arrives: float) -> Entry:
     """A message on its way to whoever hears it at this instant [s]."""
     message = entry.message
-    return arrives, message.sender, message.number, entry.sent, Received(message, arrives)
+    return arrives, message.sender, message.number, entry.sent, ReceivedMessage(message, arrives)

@@ -16,7 +16,7 @@ LONGEST_INTERVAL = 10.0
 """Largest time between two messages that a profile can ask for [s]; the standard has 1 s."""
 
 
-class NoControl(Settings):
+class NoDcc(Settings):
     """Everybody sends when it likes."""
 
     kind: Literal["none"] = "none"
@@ -24,7 +24,7 @@ class NoControl(Settings):
     period: ClassVar[float] = 0.1
 
 
-class ReactiveControl(Settings):
+class ReactiveDcc(Settings):
     """A table from the busy ratio of the last 100 ms to the least interval (ETSI TS 102 687, table A.2).
 
     limits     upper bounds of the busy ratio, rising
@@ -38,7 +38,7 @@ class ReactiveControl(Settings):
     period: ClassVar[float] = 0.1
 
     @model_validator(mode="after")
-    def _a_table(self) -> ReactiveControl:
+    def _a_table(self) -> ReactiveDcc:
         if len(self.limits) != len(self.intervals) or list(self.limits) != sorted(self.limits) or not self.limits:
             raise ValueError("limits must rise, and each has one interval")
         return self
@@ -88,28 +88,28 @@ class Limeric(Settings):
         return np.clip((1.0 - self.alpha) * share + gain, self.share_min, self.share_max)
 
 
-CongestionControl = Annotated[NoControl | ReactiveControl | Limeric, Field(discriminator="kind")]
+CongestionControl = Annotated[NoDcc | ReactiveDcc | Limeric, Field(discriminator="kind")]
 
 
-class Gate:
+class DccGate:
     """The least interval between two messages of each of N stations.
 
     background  busy ratio by traffic that is not simulated; stations begin as if they had long been in it alone
     """
 
-    def __init__(self, control: NoControl | ReactiveControl | Limeric, count: int, background: float = 0.0) -> None:
+    def __init__(self, control: NoDcc | ReactiveDcc | Limeric, count: int, background: float = 0.0) -> None:
         self.control = control
         self.background = background
         self.share = np.full(count, control.steady_share(background) if isinstance(control, Limeric) else 1.0)
         self.filtered = np.full(count, background)
         self.before = np.full(count, background)
         alone = np.full(count, background)
-        self.reactive = control.interval_at(alone) if isinstance(control, ReactiveControl) else np.zeros(count)
+        self.reactive = control.interval_at(alone) if isinstance(control, ReactiveDcc) else np.zeros(count)
 
     def measured(self, busy: Array) -> None:
         """The busy ratios (N,) of the last period of the control, by simulated stations."""
         busy = np.minimum(1.0, busy + self.background)
-        if isinstance(self.control, ReactiveControl):
+        if isinstance(self.control, ReactiveDcc):
             self.reactive = self.control.interval_at(busy)
         elif isinstance(self.control, Limeric):
             self.filtered = 0.5 * self.filtered + 0.25 * (busy + self.before)
@@ -123,9 +123,9 @@ class Gate:
             return min(max(wanted, self.control.interval_min), self.control.interval_max)
         return float(self.reactive[station])
 
-    def rearranged(self, rows: list[int | None]) -> Gate:
+    def rearranged(self, rows: list[int | None]) -> DccGate:
         """The same for other stations: each takes the state of its former row, or begins anew."""
-        gate = Gate(self.control, len(rows), self.background)
+        gate = DccGate(self.control, len(rows), self.background)
         for row, old in enumerate(rows):
             if old is not None:
                 for mine, former in (

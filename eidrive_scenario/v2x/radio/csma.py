@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.counter_draws import Keys, key, uniforms
-from eidrive_scenario.v2x.radio.access import EARLY, Access, QueueSettings, Transmission, moved
-from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
+from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.congestion import DccGate
 
 Array = NDArray[np.float64]
 
@@ -24,13 +24,15 @@ CONTENTION_WINDOW = 15
 """aCWmin: broadcast messages wait 0 to 15 slots and are never repeated."""
 
 
-class Csma(Access):
+class Csma(MediumAccess):
     """A message goes out at once if the medium was free for AIFS; else after AIFS and a number of free slots.
 
     Whoever starts within one slot of another cannot have noticed that, and both are on the air together.
     """
 
-    def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: Gate, sensing_dbm: float, seed: int) -> None:
+    def __init__(
+        self, names: tuple[str, ...], queue: QueueSettings, gate: DccGate, sensing_dbm: float, seed: int
+    ) -> None:
         super().__init__(names, queue, gate, sensing_dbm)
         self._seed = seed
         self._slots = np.full(len(names), math.nan)
@@ -103,7 +105,7 @@ class Csma(Access):
         contending = np.where(np.isnan(self._slots), self.ready, waited)
         return np.where(np.isnan(self._fixed), contending, self._fixed)
 
-    def headed(self, row: int, transmission: Transmission | None) -> None:
+    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
         self._slots[row] = self._fixed[row] = math.nan
 
     def _occupy(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.link_events import FateBlock, Fates
+from eidrive_scenario.v2x.link_events import OutcomeBlock, OutcomeColumns
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Receptions
-from eidrive_scenario.v2x.surroundings import STATES
+from eidrive_scenario.v2x.radio_environment import STATES
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -21,11 +21,11 @@ OUTCOMES = tuple(("delivered", "") if code == DELIVERED else ("lost", cause) for
 """By code of the cause."""
 
 
-class Batch(FateBlock):
+class ReceptionBlock(OutcomeBlock):
     """T messages that have left the air, and E fates: of the first at each of its receivers, then of the second.
 
     receivers  for each message the rows of those who listen
-    places     (E,) of the messages in `ended`;  senders, heard_by  (E,) rows;  causes  (E,) codes
+    places     (E,) of the messages in `ended`;  senders, reached_receivers  (E,) rows;  causes  (E,) codes
     arrives    (E,) [s], infinity where lost
     """
 
@@ -37,25 +37,25 @@ class Batch(FateBlock):
         self.budget = budget
         self.receivers = receivers
         self.places = np.repeat(np.arange(len(ended)), [len(rows) for rows in receivers])
-        self.heard_by = np.concatenate(receivers)
+        self.reached_receivers = np.concatenate(receivers)
         self.senders = receptions.senders[self.places]
-        self.causes = receptions.causes[self.places, self.heard_by].astype(np.int64)
+        self.causes = receptions.causes[self.places, self.reached_receivers].astype(np.int64)
         self.arrives = np.full(len(self.places), np.inf)
 
     def __len__(self) -> int:
         return len(self.places)
 
     def __iter__(self) -> Iterator[LinkEvent]:
-        budget, senders, heard_by = self.budget, self.senders, self.heard_by
+        budget, senders, reached = self.budget, self.senders, self.reached_receivers
         for place, sender, row, cause, arrives, loss, snr, state in zip(
             self.places.tolist(),
             senders.tolist(),
-            heard_by.tolist(),
+            reached.tolist(),
             self.causes.tolist(),
             self.arrives.tolist(),
-            budget.loss[senders, heard_by].tolist(),
-            self.receptions.snr[self.places, heard_by].tolist(),
-            budget.states[senders, heard_by].tolist(),
+            budget.loss[senders, reached].tolist(),
+            self.receptions.snr[self.places, reached].tolist(),
+            budget.states[senders, reached].tolist(),
             strict=True,
         ):
             entry = self.ended[place]
@@ -77,12 +77,12 @@ class Batch(FateBlock):
             )
             yield event
 
-    def columns(self) -> Fates:
+    def columns(self) -> OutcomeColumns:
         number, sent, size = _of_messages(self.ended)
-        return Fates(
+        return OutcomeColumns(
             self.budget.names,
             self.senders,
-            self.heard_by,
+            self.reached_receivers,
             OUTCOMES,
             self.causes,
             number[self.places],
@@ -92,7 +92,7 @@ class Batch(FateBlock):
         )
 
 
-class Dropped(FateBlock):
+class DroppedBlock(OutcomeBlock):
     """A message that its queue threw out: rows of its sender and of those who listen, among `names`."""
 
     def __init__(self, entry: Transmission, names: tuple[str, ...], sender: int, receivers: Rows) -> None:
@@ -111,10 +111,10 @@ class Dropped(FateBlock):
                 message.sender, self._names[row], message.number, sent, "lost", None, CAUSES[QUEUE], message.size
             )
 
-    def columns(self) -> Fates:
+    def columns(self) -> OutcomeColumns:
         number, sent, size = _of_messages([self._entry])
         all_of_one = np.zeros(len(self._receivers), dtype=np.int64)
-        return Fates(
+        return OutcomeColumns(
             self._names,
             all_of_one + self._sender,
             self._receivers,

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from scipy.special import gammaincinv
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniforms
+from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class FadingDraws:
     def rearrange(self, names: tuple[str, ...]) -> None:
         """Use these stations from now on."""
         own = np.array([key(self._seed, "fading", name) for name in names], dtype=np.uint64)
-        self._keys = joined(own[:, None], own[None, :])
+        self._keys = combine_keys(own[:, None], own[None, :])
 
     def gain_db(self, row: int, number: int) -> Array:
         """(N,) power of message `number` of this station over its mean at each station [dB]."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.load import cv2x_mode4, ieee80211p
+from eidrive_scenario.v2x.analytic import cv2x_mode4, ieee80211p
 
 Array = NDArray[np.float64]
 

@@ -20,12 +20,12 @@ from eidrive_scenario.v2x.radio.propagation import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.surroundings import LOS, NLOSV, Integers
+from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, Integers
 
 Array = NDArray[np.float64]
 
 
-class Between:
+class LinkGeometry:
     """M links and what stands on them; LOS is 0 among the states.
 
     distance  (M,) between the antennas [m];  states  (M,) LOS, NLOSV or NLOS;  lower, upper  (M,) heights of the
@@ -44,7 +44,7 @@ class Between:
 
 
 class Link(NamedTuple):
-    """One link of `Between`, in plain numbers."""
+    """One link of `LinkGeometry`, in plain numbers."""
 
     distance: float
     state: int
@@ -73,7 +73,7 @@ class Tr37885(Settings):
         """Distance over which shadowing loses all but 1/e of its correlation, with LOS, NLOSv and NLOS [m]."""
         return (10.0, 13.0, 13.0) if self.environment == "urban" else (25.0, 25.0, 25.0)
 
-    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+    def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
         """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
         los = urban_los if self.environment == "urban" else highway_los
         clear = los(between.distance, frequency_ghz)
@@ -124,7 +124,7 @@ class _LossPerVehicle(Settings):
     def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
         """Return the path loss with LOS [dB] at distances [m]."""
 
-    def loss(self, between: Between, frequency_ghz: float, draws: Array) -> Array:
+    def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
         """(M,) path loss without shadowing [dB]; nothing is drawn."""
         clear = self.line_of_sight_loss(between.distance, frequency_ghz)
         if not between.states.any():

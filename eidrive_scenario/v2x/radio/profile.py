@@ -10,17 +10,17 @@ from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.analytic.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.composed import ComposedProfile
-from eidrive_scenario.v2x.load.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
-from eidrive_scenario.v2x.load.table import ErrorTable
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
-from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoControl
+from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.fading import Fading, NoFading
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
-from eidrive_scenario.v2x.radio.path_loss import Between, PathLoss, Tr37885
+from eidrive_scenario.v2x.radio.path_loss import LinkGeometry, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
-from eidrive_scenario.v2x.surroundings import LOS
+from eidrive_scenario.v2x.radio_environment import LOS
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ class RadioProfile(ComposedProfile):
     jitter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.01
     sidelink: SidelinkSettings = SidelinkSettings()
     queue: QueueSettings = QueueSettings()
-    congestion: CongestionControl = NoControl()
+    congestion: CongestionControl = NoDcc()
     background: Background | None = None
 
     @model_validator(mode="before")
@@ -161,6 +161,6 @@ class RadioProfile(ComposedProfile):
         distance = np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
         count = len(distance)
         heights, nothing = np.full(count, 1.5), np.zeros(count, dtype=np.int64)
-        between = Between(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), nothing)
+        between = LinkGeometry(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), nothing)
         open_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
         return self.background.table(), np.maximum.accumulate(open_loss)

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.counter_draws import Keys, uniform, uniforms
-from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.analytic.table import ErrorTable
+from eidrive_scenario.v2x.counter_random import Keys, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import EARLY, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolated

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.counter_draws import Keys, joined, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import EARLY, Access, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
+from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
-from eidrive_scenario.v2x.radio.congestion import Gate
+from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.pscch import ControlChannel, Pdu
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
 from eidrive_scenario.v2x.radio.resource_selection import WINDOW, Request, candidates
@@ -56,7 +56,7 @@ class Sending:
     end: int
 
 
-class Sidelink(Access):
+class Sidelink(MediumAccess):
     """Resources are (subframe of the interval, subchannels); no station receives in a subframe in which it transmits.
 
     Subframe k lasts from k to k + 1 milliseconds. A station that has no resource for its first message selects one
@@ -69,7 +69,7 @@ class Sidelink(Access):
         self,
         names: tuple[str, ...],
         queue: QueueSettings,
-        gate: Gate,
+        gate: DccGate,
         sensing_dbm: float,
         seed: int,
         settings: SidelinkSettings,
@@ -123,17 +123,17 @@ class Sidelink(Access):
         self._sense(until)
         return started, dropped
 
-    def headed(self, row: int, transmission: Transmission | None) -> None:
+    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
         self._next_event[row] = self.ready[row]
         self._scheduled[row] = False
 
     def share(self, transmission: Transmission) -> float:
         return transmission.bands / self._settings.subchannels
 
-    def busy_ratio(self, row: int, span: float) -> float:
+    def channel_busy_ratio(self, row: int, span: float) -> float:
         """The channel busy ratio of a station: the mean over all subchannels of the subframes that it could measure."""
         measured = span - float(self._deaf_time[row] + self._period_deaf[row])
-        return super().busy_ratio(row, measured) if measured > 0.0 else 0.0
+        return super().channel_busy_ratio(row, measured) if measured > 0.0 else 0.0
 
     def reorder(self, rows: Sequence[int | None]) -> None:
         former = {old: row for row, old in enumerate(rows) if old is not None}
@@ -290,7 +290,7 @@ class Sidelink(Access):
 
     def _sci_keys(self) -> Keys:
         own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
-        return joined(own[:, None], own[None, :])
+        return combine_keys(own[:, None], own[None, :])
 
     def _draw(self, purpose: str, row: int) -> float:
         return uniform(self._key(purpose, row), self._choices[self.names[row]])

@@ -70,7 +70,7 @@ class FaultyChannel(LinkChannel):
         super().__init__()
         self.profile = profile
 
-    def fate(self, message, receiver, now):
+    def transmission_outcome(self, message, receiver, now):
         match self.profile.fault:
             case "nan":
                 return math.nan
@@ -82,7 +82,7 @@ class FaultyChannel(LinkChannel):
                 raise OSError("no radio")
         return 0.1
 
-    def interval(self, station):
+    def min_message_interval(self, station):
         return math.nan if self.profile.fault == "interval" else 0.0
 
     def deliver(self, receiver, now):

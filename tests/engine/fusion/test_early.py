@@ -19,7 +19,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import EgoState, LidarReading, Readings
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
-from eidrive_scenario.v2x.message import Received
+from eidrive_scenario.v2x.message import ReceivedMessage
 from eidrive_scenario.v2x.point_cloud import HEADER_BYTES
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -94,7 +94,7 @@ def test_a_car_that_only_the_other_can_see_is_found_and_passed_to_nobody() -> No
     told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox
     assert told[0].points is not None
     assert told[0].size == 121 + 35 * (1 + len(told[0].detections)) + told[0].points.size > 1000
-    step = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [Received(told[0], 0.05)], 0.05, None)
+    step = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(told[0], 0.05)], 0.05, None)
     assert len(step.detections) == 0
     assert len(step.outbox[0].detections) == 0, "what the ego sees itself"
     assert len(step.fused) == 1
@@ -107,7 +107,7 @@ def test_both_sides_of_a_car_give_a_better_box_than_either() -> None:
     rear = car(*CAR, "b", 5.4)
     told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl", 5.4)), (), 0.0, None).outbox
     alone = agent(EGO).act(readings(0.05, (0.0, 4.0, 0.0), rear), (), 0.05, None).fused
-    both = ego.act(readings(0.05, (0.0, 4.0, 0.0), rear), [Received(told[0], 0.05)], 0.05, None).fused
+    both = ego.act(readings(0.05, (0.0, 4.0, 0.0), rear), [ReceivedMessage(told[0], 0.05)], 0.05, None).fused
     assert len(alone) == len(both) == 1
     assert math.dist(both.boxes[0, :2], CAR) < 0.1 < math.dist(alone.boxes[0, :2], CAR)
     assert both.boxes[0, 3] == pytest.approx(5.4, abs=0.1)
@@ -122,17 +122,17 @@ def test_the_own_body_in_the_points_of_others_is_no_obstacle(height: float) -> N
     told = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body, height=height), (), 0.0, None).outbox[0]
     for tick, given in enumerate(here[:-1]):
         ego.act(given, (), 0.05 * tick, None)
-    assert len(ego.act(here[-1], [Received(told, 0.35)], 0.35, None).fused) == 0
+    assert len(ego.act(here[-1], [ReceivedMessage(told, 0.35)], 0.35, None).fused) == 0
 
 
 def test_old_points_are_not_joined_and_late_ones_do_not_replace_newer() -> None:
     ego, rsu = agent(EGO, fusion_settings={"max_lateness": 0.2}), agent(RSU)
     old = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
     new = rsu.act(readings(0.1, (40.0, 12.0, math.pi)), (), 0.1, None).outbox[0]
-    assert len(ego.act(readings(0.2, (0.0, 0.0, 0.0)), [Received(old, 0.2)], 0.2, None).fused) == 1
+    assert len(ego.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(old, 0.2)], 0.2, None).fused) == 1
     assert len(ego.act(readings(0.25, (0.0, 0.0, 0.0)), (), 0.25, None).outbox) == 1
     fresh = agent(EGO)
-    step = fresh.act(readings(0.2, (0.0, 0.0, 0.0)), [Received(new, 0.15), Received(old, 0.2)], 0.2, None)
+    step = fresh.act(readings(0.2, (0.0, 0.0, 0.0)), [ReceivedMessage(new, 0.15), ReceivedMessage(old, 0.2)], 0.2, None)
     assert len(step.fused) == 0
 
 
@@ -140,7 +140,7 @@ def test_stations_that_share_no_points_are_heard_too() -> None:
     ego, plain = agent(EGO), agent(RSU, fusion="covariance_intersection")
     told = plain.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
     assert told.points is None
-    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [Received(told, 0.05)], 0.05, None).fused
+    fused = ego.act(readings(0.05, (0.0, 0.0, 0.0)), [ReceivedMessage(told, 0.05)], 0.05, None).fused
     assert len(fused) == 1
 
 

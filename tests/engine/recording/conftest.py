@@ -12,7 +12,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import Contact, WorldView
 
@@ -56,7 +56,7 @@ def make_frame() -> Callable[..., Frame]:
         message = Message("Rsu", tick, time, StationState(time, 1.0, 2.0, 3.0, 0.1, 0.0), seen, 300)
         ego = AgentStep(
             detections=Detections(time),
-            inbox=(Received(message, time),),
+            inbox=(ReceivedMessage(message, time),),
             fused=seen,
             plan=Plan(numbers(4, 2), numbers(4), "stops for Incoming", braking=5.0),
             control=Control(brake=1.0, steering=0.01),

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import WorldView
 
@@ -71,12 +71,12 @@ def play(delay: int | None, lost: frozenset[int] = frozenset()) -> list[Frame]:
         by_ego = detections_of(view, view.time, "Truck")
         state = StationState(view.time, 42.2, -6.0, 0.0, 2.6, 0.0)
         said[tick] = Message("RSU", tick, view.time, state, by_rsu, 200)
-        inbox: tuple[Received, ...] = ()
+        inbox: tuple[ReceivedMessage, ...] = ()
         links: tuple[LinkEvent, ...] = ()
         if delay is not None:
             sent = tick - delay
             if sent in said and sent not in lost:
-                inbox = (Received(said[sent], view.time),)
+                inbox = (ReceivedMessage(said[sent], view.time),)
                 known = known or len(said[sent].detections) == 2
             before = tick - 1
             if before in said:

@@ -13,7 +13,7 @@ from lxml import etree
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 
 Play = Callable[..., list[Frame]]
 SVG = "{http://www.w3.org/2000/svg}"
@@ -100,7 +100,7 @@ def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(st
     for tick, frame in enumerate(frames):
         state = StationState(frame.view.time, 0.0, 0.0, 0.0, 0.0, 0.0)
         back = Message("Ego", tick - 6, 0.0, state, sent[tick - 6], 100)
-        inbox = (Received(back, frame.view.time),) if tick >= 6 else ()
+        inbox = (ReceivedMessage(back, frame.view.time),) if tick >= 6 else ()
         step = dataclasses.replace(frame.steps["Ego"], inbox=inbox)
         event = LinkEvent("Ego", "Ego", tick, frame.view.time, "delivered", frame.view.time + 0.3, "", 100)
         travelling.append(Frame(frame.view, {"Ego": step}, (), (event,)))
@@ -110,11 +110,11 @@ def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(st
     assert (snapshot.heard, snapshot.links) == ((), ())
 
 
-def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[Received, ...]:
+def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[ReceivedMessage, ...]:
     """What Ego holds in the end where it hears these, one after the other, from the first frame on."""
     knowledge = Knowledge("Ego")
     for frame, message in zip(frames, messages, strict=False):
-        step = dataclasses.replace(frame.steps["Ego"], inbox=(Received(message, frame.view.time),))
+        step = dataclasses.replace(frame.steps["Ego"], inbox=(ReceivedMessage(message, frame.view.time),))
         snapshot = knowledge.observe(Frame(frame.view, {"Ego": step}))
     return snapshot.heard
 

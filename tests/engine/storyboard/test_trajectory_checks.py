@@ -38,6 +38,6 @@ def test_trajectory_off_road_check_looks_at_a_bounded_number_of_points(
 
     monkeypatch.setattr(RoadLintContext, "outside", counted)
     report = check_scenario(FILE.format(end=end).encode())
-    assert not report.problems
+    assert not report.errors
     assert any("the trajectory 'far' leaves the road after" in str(warning) for warning in report.warnings)
     assert max(counts) == points

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 DT = 0.05
 Place = tuple[float, float, float]
@@ -38,14 +38,14 @@ def talk(
     sight: Any = None,
     per_tick: int = 1,
     dt: float = DT,
-) -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+) -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
     """Every station says something in each tick, in the order of `places`, which move along x."""
     events: list[LinkEvent] = []
-    heard: list[tuple[str, float, Received]] = []
+    heard: list[tuple[str, float, ReceivedMessage]] = []
     for tick in range(ticks):
         now = tick * dt
         at = {name: (x + speed * now * (index + 1), y, z) for index, (name, (x, y, z)) in enumerate(places.items())}
-        carrier.around(Surroundings(at, sight))
+        carrier.update_environment(RadioEnvironment(at, sight))
         for receiver in places:
             heard += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
         outbox = [

@@ -10,7 +10,7 @@ from radio_talk import QUIET, Place, message
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.channel import RadioChannel
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 MODE_4: dict[str, Any] = {**QUIET, "technology": "cv2x_mode4", "jitter": 0.0}
 TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
@@ -39,7 +39,7 @@ class Air:
         """Go on; station S has a message in each `every[S]`-th tick."""
         for _ in range(round(seconds / self.dt)):
             now = self.tick * self.dt
-            self.carrier.around(Surroundings(self.places))
+            self.carrier.update_environment(RadioEnvironment(self.places))
             outbox = [
                 (message(name, self.tick, now, sizes[self.tick % len(sizes)]), [n for n in self.listeners if n != name])
                 for name, period in every.items()

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from radio_talk import message, radio
 
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 NS3 = json.loads((Path(__file__).parents[2] / "data" / "ns3_80211p_broadcast_pdr.json").read_text(encoding="utf-8"))
 FADING = {
@@ -36,7 +36,7 @@ def delivery_ratio(fading: str, distances: list[float], packet_errors: str) -> N
     carrier = radio(1, **PROFILE, fading=FADING[fading], packet_errors=packet_errors)
     places = {"sender": (0.0, 0.0, 1.5), **{f"{metres:04.0f}": (metres, 0.0, 1.5) for metres in distances}}
     receivers = [name for name in places if name != "sender"]
-    carrier.around(Surroundings(places))
+    carrier.update_environment(RadioEnvironment(places))
     delivered = dict.fromkeys(receivers, 0)
     for number in range(MESSAGES + 1):
         outbox = [(message("sender", number, DT * number, NS3["bytes_on_air"]), receivers)] if number < MESSAGES else []

@@ -11,9 +11,9 @@ import pytest
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.settings import parse_settings
-from eidrive_scenario.v2x.load.cv2x_mode4 import cv2x_mode4_errors
-from eidrive_scenario.v2x.load.ieee80211p import airtime, ieee80211p_errors
-from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.analytic.cv2x_mode4 import cv2x_mode4_errors
+from eidrive_scenario.v2x.analytic.ieee80211p import airtime, ieee80211p_errors
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
 DISTANCE = np.array(GOLDEN["distance_m"], dtype=float)
@@ -31,7 +31,7 @@ def test_802_11p_gives_the_golden_curves(golden: dict[str, Any]) -> None:
         power=golden["ptx_dbm"],
         bit_rate=golden["rate_bps"],
     )
-    assert table.busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
+    assert table.channel_busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
     assert table.delivery_ratio == pytest.approx(golden["pdr"], abs=TOLERANCE)
     for key, cause in CAUSES.items():
         assert table.errors[cause] == pytest.approx(golden[key], abs=TOLERANCE), cause
@@ -46,7 +46,7 @@ def test_c_v2x_mode_4_gives_the_golden_curves(golden: dict[str, Any]) -> None:
         power=golden["ptx_dbm"],
         subchannels=golden["subch"],
     )
-    assert table.busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
+    assert table.channel_busy_ratio == pytest.approx(golden["cbr"], abs=TOLERANCE)
     assert table.delivery_ratio == pytest.approx(golden["pdr"], abs=TOLERANCE)
     assert table.errors["half_duplex"] == pytest.approx(golden["err_hd"], abs=TOLERANCE)
     for key, cause in CAUSES.items():
@@ -57,10 +57,10 @@ def test_c_v2x_mode_4_gives_the_golden_curves(golden: dict[str, Any]) -> None:
 def test_more_vehicles_cost_delivery_at_every_distance() -> None:
     sparse, dense = (Ieee80211pLoss(kind="80211p", density=density).table() for density in (0.03, 0.12))
     assert np.all(dense.delivery_ratio <= sparse.delivery_ratio)
-    assert dense.busy_ratio > sparse.busy_ratio
+    assert dense.channel_busy_ratio > sparse.channel_busy_ratio
     sparse, dense = (Cv2xMode4Loss(kind="cv2x_mode4", density=density).table() for density in (0.1, 0.3))
     assert np.all(dense.delivery_ratio <= sparse.delivery_ratio)
-    assert dense.busy_ratio > sparse.busy_ratio
+    assert dense.channel_busy_ratio > sparse.channel_busy_ratio
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_more_vehicles_cost_delivery_at_every_distance() -> None:
 def test_whatever_the_models_take_they_give_probabilities(settings: dict[str, Any]) -> None:
     model = Ieee80211pLoss if settings["kind"] == "80211p" else Cv2xMode4Loss
     table = model.model_validate(settings).table()
-    assert 0.0 <= table.busy_ratio <= 0.85
+    assert 0.0 <= table.channel_busy_ratio <= 0.85
     for probability in [*table.errors.values(), table.delivery_ratio]:
         assert probability.min() >= -1e-9
         assert probability.max() <= 1.0 + 1e-9

@@ -21,9 +21,9 @@ import pytest
 from radio_talk import message, radio
 
 from eidrive_scenario.v2x.radio.access import Transmission
-from eidrive_scenario.v2x.radio.events import Batch
+from eidrive_scenario.v2x.radio.events import ReceptionBlock
 from eidrive_scenario.v2x.radio.reception import CAUSES
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "v2x_analytic_models.json").read_text(encoding="utf-8"))
 DISTANCES = (100, 200, 300)
@@ -49,7 +49,7 @@ class Counts:
     """Of the middle of the road after the warm-up: outcomes by distance, and busy ratios, measured and counted."""
 
     outcomes: dict[int, Counter[str]] = field(default_factory=lambda: {distance: Counter() for distance in DISTANCES})
-    busy_ratio: float = 0.0
+    channel_busy_ratio: float = 0.0
     occupancy: float = 0.0
 
     def ratio(self, cause: str, distance: int) -> float:
@@ -57,7 +57,11 @@ class Counts:
 
     def __add__(self, other: Counts) -> Counts:
         outcomes = {distance: self.outcomes[distance] + other.outcomes[distance] for distance in DISTANCES}
-        return Counts(outcomes, (self.busy_ratio + other.busy_ratio) / 2.0, (self.occupancy + other.occupancy) / 2.0)
+        return Counts(
+            outcomes,
+            (self.channel_busy_ratio + other.channel_busy_ratio) / 2.0,
+            (self.occupancy + other.occupancy) / 2.0,
+        )
 
 
 def simulate(density: float, seed: int) -> Counts:
@@ -70,27 +74,29 @@ def simulate(density: float, seed: int) -> Counts:
     receivers = [[names[other] for other in others] for others in near]
     phase = np.random.default_rng(seed).integers(0, 5, count)
     carrier = radio(seed, **PROFILE)
-    carrier.around(Surroundings({name: (float(x), 0.0, 1.5) for name, x in zip(names, along, strict=True)}))
+    carrier.update_environment(
+        RadioEnvironment({name: (float(x), 0.0, 1.5) for name, x in zip(names, along, strict=True)})
+    )
     sent: list[Transmission] = []
     counts = Counts()
     before: list[float] = []
     for tick in range(round(END / DT)):
         now = tick * DT
         if not before and now >= WARM_UP:
-            before = [now * (carrier.busy_ratio(names[row]) or 0.0) for row in middle]
+            before = [now * (carrier.channel_busy_ratio(names[row]) or 0.0) for row in middle]
             since = now
         outbox = [
             (message(names[row], tick // 5, now, 190), receivers[row]) for row in np.flatnonzero(phase == tick % 5)
         ]
         for block in carrier.transmit(outbox, now).parts:  # type: ignore[attr-defined]
-            if isinstance(block, Batch) and now >= WARM_UP:
+            if isinstance(block, ReceptionBlock) and now >= WARM_UP:
                 sent += block.ended
-                distance = apart[block.senders, block.heard_by]
+                distance = apart[block.senders, block.reached_receivers]
                 for one, outcomes in counts.outcomes.items():
                     at = np.abs(distance - one) <= 0.5 / density + 1e-6
                     outcomes.update(CAUSES[code] for code in block.causes[at].tolist())
-    after = [now * (carrier.busy_ratio(names[row]) or 0.0) for row in middle]
-    counts.busy_ratio = float(np.mean(np.array(after) - before)) / (now - since)
+    after = [now * (carrier.channel_busy_ratio(names[row]) or 0.0) for row in middle]
+    counts.channel_busy_ratio = float(np.mean(np.array(after) - before)) / (now - since)
     loss = carrier._budget.loss  # type: ignore[union-attr]
     counts.occupancy = float(np.mean([occupied(sent, 20.0 - loss[:, row], row, since, now) for row in middle[::15]]))
     return counts
@@ -121,5 +127,5 @@ def test_mode_4_medium_delivers_as_the_analytic_model(golden: dict[str, Any]) ->
         assert counts.ratio("collision", distance) > 0.0
     everywhere = sum(counts.outcomes.values(), Counter())
     assert everywhere["half_duplex"] / everywhere.total() == pytest.approx(0.01, abs=0.006)
-    assert counts.busy_ratio == pytest.approx(counts.occupancy, abs=0.02)
-    assert counts.busy_ratio == pytest.approx(golden["cbr"], abs=0.02)
+    assert counts.channel_busy_ratio == pytest.approx(counts.occupancy, abs=0.02)
+    assert counts.channel_busy_ratio == pytest.approx(golden["cbr"], abs=0.02)

@@ -10,7 +10,7 @@ from radio_talk import message, radio, talk
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.fading import Nakagami
 from eidrive_scenario.v2x.radio.profile import RadioProfile
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 QUIET = {"shadowing_db": 0, "line_of_sight": "clear", "path_loss": {"kind": "log_distance", "exponent": 2.5}}
 DRAWS = (np.arange(200_000) + 0.5) / 200_000
@@ -51,7 +51,7 @@ def test_nakagami_settings_that_mean_nothing_are_an_error(invalid: dict[str, obj
 def test_fading_changes_the_signal_of_each_message_and_not_the_path_loss(technology: str) -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
     carrier = radio(1, technology=technology, fading={"kind": "nakagami", "m": 1}, **QUIET)
-    carrier.around(Surroundings(places))
+    carrier.update_environment(RadioEnvironment(places))
     events: list[LinkEvent] = []
     for number in range(2000):
         events += carrier.transmit([(message("A", number, 0.1 * number, 190), ["B"])], 0.1 * number)
@@ -68,10 +68,12 @@ def test_fading_applies_to_carrier_sensing() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
     mean = 29.0 - (47.8588 + 50.0)
     carrier = radio(1, fading={"kind": "nakagami", "m": 1}, sensing_dbm=mean + 3.0103, **QUIET)
-    carrier.around(Surroundings(places))
+    carrier.update_environment(RadioEnvironment(places))
     for number in range(3000):
         carrier.transmit([(message("A", number, 0.1 * number, 300), [])], 0.1 * number)
-    assert (carrier.busy_ratio("B") or 0.0) / (carrier.busy_ratio("A") or 1.0) == pytest.approx(np.exp(-2.0), rel=0.1)
+    assert (carrier.channel_busy_ratio("B") or 0.0) / (carrier.channel_busy_ratio("A") or 1.0) == pytest.approx(
+        np.exp(-2.0), rel=0.1
+    )
 
 
 def test_fading_shifts_no_other_draw() -> None:

@@ -10,9 +10,9 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.clock import StationClock
-from eidrive_scenario.v2x.generation.cam import CamTriggers
-from eidrive_scenario.v2x.generation.cpm import Contents, CpmTriggers, quality
-from eidrive_scenario.v2x.generation.numbering import Numbering
+from eidrive_scenario.v2x.generation.cam import CamGenerationRules
+from eidrive_scenario.v2x.generation.cpm import CpmContents, CpmGenerationRules, quality
+from eidrive_scenario.v2x.generation.object_ids import ObjectIdAssigner
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.size import cam_size, cpm_size, objects_that_fit
 
@@ -28,9 +28,9 @@ def intervals(times: list[float]) -> list[float]:
 
 
 def cams_at_constant_speed(speed: float, dt: float = DT) -> list[float]:
-    rules = CamTriggers()
+    rules = CamGenerationRules()
     ticks = [tick * dt for tick in range(round(10.0 / dt))]
-    return [now for now in ticks if rules.due(state(now, x=speed * now, speed=speed), now)]
+    return [now for now in ticks if rules.is_due(state(now, x=speed * now, speed=speed), now)]
 
 
 @pytest.mark.parametrize(("speed", "milliseconds"), [(10, 500), (15, 300), (50, 100), (3, 1000), (0, 1000), (4.5, 900)])
@@ -45,37 +45,37 @@ def test_cam_intervals_at_constant_speed(speed: float, milliseconds: int) -> Non
 
 def test_a_heading_across_the_end_of_the_circle_is_a_small_change() -> None:
     """From 179.5 to -179.5 degrees is one degree, no trigger; six degrees are one."""
-    rules = CamTriggers()
-    assert rules.due(state(0.0, yaw=math.radians(179.5)), 0.0)
-    assert not rules.due(state(0.1, yaw=math.radians(-179.5)), 0.1)
-    assert rules.due(state(0.2, yaw=math.radians(-174.5)), 0.2)
+    rules = CamGenerationRules()
+    assert rules.is_due(state(0.0, yaw=math.radians(179.5)), 0.0)
+    assert not rules.is_due(state(0.1, yaw=math.radians(-179.5)), 0.1)
+    assert rules.is_due(state(0.2, yaw=math.radians(-174.5)), 0.2)
 
 
 def test_a_change_of_speed_triggers_and_half_a_metre_per_second_does_not() -> None:
-    rules = CamTriggers()
-    assert rules.due(state(0.0, speed=10.0), 0.0)
-    assert not rules.due(state(0.1, speed=10.5), 0.1)
-    assert rules.due(state(0.2, speed=10.51), 0.2)
+    rules = CamGenerationRules()
+    assert rules.is_due(state(0.0, speed=10.0), 0.0)
+    assert not rules.is_due(state(0.1, speed=10.5), 0.1)
+    assert rules.is_due(state(0.2, speed=10.51), 0.2)
 
 
 def test_no_cam_comes_sooner_than_its_shortest_interval() -> None:
-    rules = CamTriggers()
-    assert rules.due(state(0.0), 0.0)
-    assert not rules.due(state(0.05, x=100.0), 0.05)
-    assert rules.due(state(0.1, x=100.0), 0.1)
-    assert not rules.due(state(0.2, x=200.0), 0.2, shortest=0.3), "congestion control asks for more"
-    assert rules.due(state(0.4, x=200.0), 0.4, shortest=0.3)
+    rules = CamGenerationRules()
+    assert rules.is_due(state(0.0), 0.0)
+    assert not rules.is_due(state(0.05, x=100.0), 0.05)
+    assert rules.is_due(state(0.1, x=100.0), 0.1)
+    assert not rules.is_due(state(0.2, x=200.0), 0.2, shortest=0.3), "congestion control asks for more"
+    assert rules.is_due(state(0.4, x=200.0), 0.4, shortest=0.3)
 
 
 def test_the_interval_of_a_trigger_is_kept_for_three_cams() -> None:
     """A jump 0.3 s after a CAM: the next three follow at 0.3 s, then it is 1 s again (N_GenCam = 3)."""
-    rules = CamTriggers()
-    sent = [t / 10 for t in range(45) if rules.due(state(t / 10, x=5.0 if t >= 3 else 0.0), t / 10)]
+    rules = CamGenerationRules()
+    sent = [t / 10 for t in range(45) if rules.is_due(state(t / 10, x=5.0 if t >= 3 else 0.0), t / 10)]
     assert sent == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.2, 2.2, 3.2, 4.2])
 
 
 def test_the_low_frequency_container_comes_every_half_second_at_most() -> None:
-    rules = CamTriggers()
+    rules = CamGenerationRules()
     carried = [t / 10 for t in range(20) if rules.low_frequency(t / 10)]
     assert carried == pytest.approx([0.0, 0.5, 1.0, 1.5])
     assert (cam_size(False), cam_size(True)) == (190, 300)
@@ -91,21 +91,21 @@ def objects(time: float, *rows: tuple[float, float, float, str], scores: tuple[f
     return Detections(time, boxes, given, classes, velocity, np.full((count, 2, 2), np.nan))
 
 
-def run(rules: CpmTriggers, now: float, seen: Detections) -> Contents | None:
+def run(rules: CpmGenerationRules, now: float, seen: Detections) -> CpmContents | None:
     return rules.contents(seen, tuple(range(len(seen))), now)
 
 
 def test_a_standing_vehicle_comes_once_a_second_and_the_sensors_too() -> None:
-    rules = CpmTriggers()
+    rules = CpmGenerationRules()
     found = {t / 10: run(rules, t / 10, objects(t / 10, (5.0, 0.0, 0.0, "car"))) for t in range(25)}
     sent = {time: contents for time, contents in found.items() if contents is not None}
     assert list(sent) == pytest.approx([0.0, 1.0, 2.0])
-    assert all(contents == Contents((0,), True) for contents in sent.values())
+    assert all(contents == CpmContents((0,), True) for contents in sent.values())
 
 
 @pytest.mark.parametrize(("speed", "interval"), [(10.0, 0.5), (15.0, 0.3), (45.0, 0.1)])
 def test_a_moving_vehicle_comes_when_it_has_moved_more_than_4_m(speed: float, interval: float) -> None:
-    rules = CpmTriggers()
+    rules = CpmGenerationRules()
     times = [
         t / 10
         for t in range(30)
@@ -115,20 +115,20 @@ def test_a_moving_vehicle_comes_when_it_has_moved_more_than_4_m(speed: float, in
 
 
 def test_speed_direction_and_newness_put_a_vehicle_into_the_next_message() -> None:
-    rules = CpmTriggers()
-    assert run(rules, 0.0, objects(0.0, (0.0, 5.0, math.radians(179.0), "car"))) == Contents((0,), True)
+    rules = CpmGenerationRules()
+    assert run(rules, 0.0, objects(0.0, (0.0, 5.0, math.radians(179.0), "car"))) == CpmContents((0,), True)
     assert run(rules, 0.1, objects(0.1, (0.0, 5.5, math.radians(179.0), "car"))) is None
     assert run(rules, 0.2, objects(0.2, (0.0, 5.0, math.radians(-178.0), "car"))) is None, "three degrees"
-    assert run(rules, 0.3, objects(0.3, (0.0, 5.0, math.radians(-176.0), "car"))) == Contents((0,), False)
-    assert run(rules, 0.4, objects(0.4, (0.0, 5.6, math.radians(-176.0), "car"))) == Contents((0,), False)
+    assert run(rules, 0.3, objects(0.3, (0.0, 5.0, math.radians(-176.0), "car"))) == CpmContents((0,), False)
+    assert run(rules, 0.4, objects(0.4, (0.0, 5.6, math.radians(-176.0), "car"))) == CpmContents((0,), False)
     two = objects(0.5, (0.0, 5.6, math.radians(-176.0), "car"), (50.0, 0.0, 0.0, "truck"))
-    assert run(rules, 0.5, two) == Contents((1,), False)
+    assert run(rules, 0.5, two) == CpmContents((1,), False)
 
 
 def test_pedestrians_and_cyclists_come_all_together() -> None:
-    rules = CpmTriggers()
+    rules = CpmGenerationRules()
     walker, rider = (0.0, 1.0, 0.0, "pedestrian"), (9.0, 4.0, 0.0, "bicycle")
-    assert run(rules, 0.0, objects(0.0, walker)) == Contents((0,), True)
+    assert run(rules, 0.0, objects(0.0, walker)) == CpmContents((0,), True)
     assert run(rules, 0.2, objects(0.2, walker)) is None
     joined = run(rules, 0.3, objects(0.3, walker, rider))
     assert joined is not None
@@ -142,43 +142,43 @@ def test_pedestrians_and_cyclists_come_all_together() -> None:
 def test_poorly_perceived_objects_are_left_out() -> None:
     assert [quality(score) for score in (0.0, 0.2, 0.23, 0.24, 1.0)] == [0, 3, 3, 4, 15]
     seen = objects(0.0, (0.0, 0.0, 0.0, "car"), (9.0, 0.0, 0.0, "car"), scores=(0.23, 0.24))
-    assert run(CpmTriggers(), 0.0, seen) == Contents((1,), True)
+    assert run(CpmGenerationRules(), 0.0, seen) == CpmContents((1,), True)
 
 
 def test_new_objects_come_before_those_that_have_changed_most() -> None:
-    rules = CpmTriggers()
+    rules = CpmGenerationRules()
     run(rules, 0.0, objects(0.0, (0.0, 0.0, 0.0, "car"), (0.0, 0.0, 0.0, "car")))
     later = objects(0.5, (4.5, 0.0, 0.0, "car"), (8.0, 0.0, 0.0, "car"), (0.0, 0.0, 0.0, "car"))
-    assert run(rules, 0.5, later) == Contents((2, 1, 0), False)
+    assert run(rules, 0.5, later) == CpmContents((2, 1, 0), False)
 
 
 def test_no_object_and_no_sensor_to_tell_of_is_no_message() -> None:
-    rules = CpmTriggers()
-    assert run(rules, 0.0, Detections(0.0)) == Contents((), True)
+    rules = CpmGenerationRules()
+    assert run(rules, 0.0, Detections(0.0)) == CpmContents((), True)
     assert run(rules, 0.5, Detections(0.5)) is None
-    assert run(rules, 1.0, Detections(1.0)) == Contents((), True)
+    assert run(rules, 1.0, Detections(1.0)) == CpmContents((), True)
 
 
 def test_objects_keep_their_numbers_without_a_tracker() -> None:
     """Two cars that pass each other at 15 m/s, listed in another order each time; a third comes and goes."""
-    numbering = Numbering()
+    numbering = ObjectIdAssigner()
     for tick in range(40):
         time = tick * 0.1
         forth, back = (-30.0 + 15.0 * time, 15.0, 0.0, "car"), (30.0 - 15.0 * time, 15.0, math.pi, "car")
         rows = [forth, back] if tick % 2 else [back, forth]
         seen = objects(time, *rows)
         seen.boxes[:, 1] = [0.0, 3.5] if tick % 2 else [3.5, 0.0]
-        numbers = numbering.numbers(seen)
+        numbers = numbering.assign_ids(seen)
         if tick == 0:
             back_number, forth_number = numbers
         assert numbers == ((forth_number, back_number) if tick % 2 else (back_number, forth_number))
-    assert numbering.numbers(objects(4.0, (500.0, 0.0, 0.0, "car"))) == (2,)
+    assert numbering.assign_ids(objects(4.0, (500.0, 0.0, 0.0, "car"))) == (2,)
 
 
 def test_numbers_of_a_tracker_are_taken_over() -> None:
     seen = objects(0.0, (0.0, 0.0, 0.0, "car"), (9.0, 0.0, 0.0, "car"))
     tracked = Detections(0.0, seen.boxes, seen.scores, seen.classes, seen.velocity, seen.covariance, (7, 3))
-    assert Numbering().numbers(tracked) == (7, 3)
+    assert ObjectIdAssigner().assign_ids(tracked) == (7, 3)
 
 
 def test_sizes_and_what_fits_into_a_message() -> None:
@@ -191,10 +191,10 @@ def test_sizes_and_what_fits_into_a_message() -> None:
 def test_a_clock_moves_the_time_stamps_and_nothing_else() -> None:
     sender, receiver = StationClock(offset=0.02, drift=1e-4), StationClock(offset=-0.01)
     told = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121)
-    stamped = sender.stamped(told, 100.0)
+    stamped = sender.with_station_timestamps(told, 100.0)
     assert stamped.generated == 100.0
     assert stamped.state.time == pytest.approx(100.03)
     assert stamped.detections.time == pytest.approx(99.93)
-    taken = receiver.understood(stamped, 100.2)
+    taken = receiver.with_local_timestamps(stamped, 100.2)
     assert taken.detections.time == pytest.approx(99.94), "30 ms from the sender, 10 ms more from the receiver"
-    assert StationClock().stamped(told, 100.0) is told
+    assert StationClock().with_station_timestamps(told, 100.0) is told

@@ -9,9 +9,9 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x import ages, hearings
-from eidrive_scenario.v2x.hearings import Entry, Hearings
-from eidrive_scenario.v2x.message import Message, Received, StationState
+from eidrive_scenario.v2x import age_of_information, reception_log
+from eidrive_scenario.v2x.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.reception_log import Entry, ReceptionLog
 
 NAMES = ("A", "B", "C")
 NOW = 45.0
@@ -29,19 +29,19 @@ def entries(count: int) -> list[tuple[str, Entry]]:
         arrives = said + float(rng.uniform(SHORTEST, 1.5))
         sender, receiver = rng.choice(NAMES, 2, replace=False).tolist()
         message = Message(sender, number, said, StationState(said, 0, 0, 0, 0, 0), Detections(said), 100)
-        found.append((receiver, (arrives, sender, number, said, Received(message, arrives))))
+        found.append((receiver, (arrives, sender, number, said, ReceivedMessage(message, arrives))))
     return sorted(found, key=lambda entry: entry[1][0])
 
 
 @pytest.mark.parametrize("waiting", [0, 1, 7, 10**6])
 def test_it_does_not_matter_how_many_wait(monkeypatch: pytest.MonkeyPatch, waiting: int) -> None:
-    monkeypatch.setattr(hearings, "MOST_WAITING", waiting)
-    kept = Hearings()
+    monkeypatch.setattr(reception_log, "MOST_WAITING", waiting)
+    kept = ReceptionLog()
     for receiver, entry in entries(400):
-        kept.take(receiver, [entry])
+        kept.record(receiver, [entry])
         if entry[2] % 50 == 0:
-            kept.by_link(entry[0])
-    found = kept.by_link(NOW)
+            kept.statistics_by_link(entry[0])
+    found = kept.statistics_by_link(NOW)
     assert set(found) == {(a, b) for a in NAMES for b in NAMES if a != b}
     for (sender, receiver), heard in found.items():
         own = [entry for name, entry in entries(400) if (name, entry[1]) == (receiver, sender)]
@@ -53,7 +53,7 @@ def test_it_does_not_matter_how_many_wait(monkeypatch: pytest.MonkeyPatch, waiti
                 peaks.append(arrives - newest)
                 newest = said
         assert heard.received == len(own) > 30
-        assert (heard.delay_sum, heard.delay_max, heard.newest) == (sum(delays), max(delays), newest)
+        assert (heard.delay_sum, heard.delay_max, heard.newest_generation_time) == (sum(delays), max(delays), newest)
         assert len(floors) < len(own), "some came too late to be news"
         low, high = np.array(floors), np.array([*peaks[1:], NOW - newest])
         assert heard.mean_age == pytest.approx(np.sum(high**2 - low**2) / 2.0 / np.sum(high - low))
@@ -64,37 +64,37 @@ def test_it_does_not_matter_how_many_wait(monkeypatch: pytest.MonkeyPatch, waiti
 
 def test_a_long_run_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Old ages are sorted into classes: the percentile is off by half of one, averages not at all."""
-    exact, bounded = Hearings(), Hearings()
+    exact, bounded = ReceptionLog(), ReceptionLog()
     for receiver, entry in entries(3000):
-        exact.take(receiver, [entry])
-    at_end = exact.by_link(1000.0)
-    monkeypatch.setattr(ages, "MOST_STEPS", 500)
-    monkeypatch.setattr(ages, "GRID", 0.04)
-    monkeypatch.setattr(hearings, "MOST_WAITING", 50)
-    bounded = Hearings()
+        exact.record(receiver, [entry])
+    at_end = exact.statistics_by_link(1000.0)
+    monkeypatch.setattr(age_of_information, "MOST_STEPS", 500)
+    monkeypatch.setattr(age_of_information, "GRID", 0.04)
+    monkeypatch.setattr(reception_log, "MOST_WAITING", 50)
+    bounded = ReceptionLog()
     kept = []
     for receiver, entry in entries(3000):
-        bounded.take(receiver, [entry])
+        bounded.record(receiver, [entry])
         kept.append(bounded._ages._number)
-    classes = len(at_end) * math.log(LONGEST / SHORTEST) / ages.GRID
+    classes = len(at_end) * math.log(LONGEST / SHORTEST) / age_of_information.GRID
     assert max(kept) < 2.0 * classes + 100 < 0.5 * exact._ages._number
-    for link, heard in bounded.by_link(1000.0).items():
+    for link, heard in bounded.statistics_by_link(1000.0).items():
         assert heard[:4] == pytest.approx(at_end[link][:4])
         assert (heard.mean_age, heard.peak_age) == pytest.approx((at_end[link].mean_age, at_end[link].peak_age))
         assert heard.p95_age == pytest.approx(at_end[link].p95_age, rel=0.02)
 
 
 def test_nothing_heard_is_nothing_known() -> None:
-    assert Hearings().by_link(1.0) == {}
+    assert ReceptionLog().statistics_by_link(1.0) == {}
 
 
 def test_what_is_known_of_a_link_depends_on_no_other() -> None:
     """To the last bit: who else listens changes no book."""
-    everybody, one = Hearings(), Hearings()
+    everybody, one = ReceptionLog(), ReceptionLog()
     for receiver, entry in entries(400):
-        everybody.take(receiver, [entry])
+        everybody.record(receiver, [entry])
         if receiver == "B":
-            one.take(receiver, [entry])
-    alone, among_others = one.by_link(NOW), everybody.by_link(NOW)
+            one.record(receiver, [entry])
+    alone, among_others = one.statistics_by_link(NOW), everybody.statistics_by_link(NOW)
     assert set(alone) == {("A", "B"), ("C", "B")}
     assert all(among_others[link] == heard for link, heard in alone.items())

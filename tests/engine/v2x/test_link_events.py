@@ -11,11 +11,11 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.link_events import FateBlock, LinkEvents
+from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.message import LinkEvent, Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.world.view import WorldView
 
 DT = 0.05
@@ -30,7 +30,7 @@ def ticks(**profile: Any) -> list[LinkEvents]:
         now = DT * tick
         present = NAMES if tick < 7 else NAMES[:-1]
         places = {name: (150.0 * row + 5.0 * now, 3.0 * row, 1.5) for row, name in enumerate(present)}
-        carrier.around(Surroundings(places))
+        carrier.update_environment(RadioEnvironment(places))
         outbox = [
             (
                 Message(name, 2 * tick + part, now, StationState(now, 0, 0, 0, 0, 0), Detections(now), 300 + row),
@@ -69,7 +69,7 @@ def test_columns_say_what_events_say(profile: dict[str, Any]) -> None:
     reasons = set()
     for told in ticks(**profile):
         for block in told.parts:
-            if not isinstance(block, FateBlock):
+            if not isinstance(block, OutcomeBlock):
                 continue
             fates, events = block.columns(), list(block)
             assert len(events) == len(block) > 0

@@ -11,7 +11,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.links import Links
-from eidrive_scenario.v2x.message import LinkEvent, Message, Received, StationState
+from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 
 DT = 0.05
 STATIONS = ("Ego", "RSU", "Spectator")
@@ -27,10 +27,10 @@ def channel(seed: int = 0, **profile: object) -> ComposedChannel:
 
 def talk(
     carrier: Channel, ticks: int, stations: tuple[str, ...] = STATIONS, own: bool = False
-) -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+) -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
     """Every station says one message per tick; the order is that of a run: deliver, then send."""
     events: list[LinkEvent] = []
-    heard: list[tuple[str, float, Received]] = []
+    heard: list[tuple[str, float, ReceivedMessage]] = []
     for tick in range(ticks):
         now = tick * DT
         for receiver in stations:
@@ -120,9 +120,9 @@ def test_the_paper_s_latency_is_six_ticks_of_20_hz_also_during_the_first_six() -
 
 def test_messages_of_one_tick_come_in_the_order_of_their_arrival() -> None:
     links = Links()
-    links.put(message("B", 0, 0.0), "Ego", 0.0, 0.09)
-    links.put(message("A", 0, 0.0), "Ego", 0.0, 0.07)
-    links.put(message("C", 0, 0.0), "Ego", 0.0, 0.07)
+    links.enqueue_delivery(message("B", 0, 0.0), "Ego", 0.0, 0.09)
+    links.enqueue_delivery(message("A", 0, 0.0), "Ego", 0.0, 0.07)
+    links.enqueue_delivery(message("C", 0, 0.0), "Ego", 0.0, 0.07)
     assert [entry.message.sender for entry in links.deliver("Ego", 0.1)] == ["A", "C", "B"]
     assert links.deliver("Ego", 0.1) == ()
 
@@ -130,7 +130,7 @@ def test_messages_of_one_tick_come_in_the_order_of_their_arrival() -> None:
 def test_a_negative_or_undefined_delay_is_refused() -> None:
     for delay in (-0.01, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="expected seconds from 0 on, finite"):
-            Links().put(message("A", 0, 0.0), "Ego", 0.0, delay)
+            Links().enqueue_delivery(message("A", 0, 0.0), "Ego", 0.0, delay)
 
 
 def test_age_of_information_by_hand() -> None:
@@ -139,9 +139,9 @@ def test_age_of_information_by_hand() -> None:
     for second in range(4):
         said = message("RSU", second, float(second))
         if second == 2:
-            links.lose(said, "Ego", float(second), "loss")
+            links.record_loss(said, "Ego", float(second), "loss")
         else:
-            links.put(said, "Ego", float(second), 0.5)
+            links.enqueue_delivery(said, "Ego", float(second), 0.5)
     for now in (1.0, 2.0, 3.0, 3.5):
         links.deliver("Ego", now)
     book = links.statistics(4.0)["RSU", "Ego"]
@@ -170,7 +170,7 @@ def test_a_channel_that_is_replaced_hands_over_what_is_on_its_way() -> None:
         channel(loss={"kind": "bernoulli", "probability": 1.0}),
     )
     slow.send(message("RSU", 0, 0.0), ["Ego"], 0.0)
-    jammed.take_over(slow)
+    jammed.continue_from(slow)
     events = jammed.send(message("RSU", 1, 0.05), ["Ego"], 0.05)
     assert events[0].outcome == "lost"
     assert [entry.message.number for entry in jammed.deliver("Ego", 0.3)] == [0]

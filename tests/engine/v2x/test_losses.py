@@ -17,7 +17,7 @@ from eidrive_scenario.v2x.delay_trace import TraceDelay
 from eidrive_scenario.v2x.loss import DistanceLoss, GilbertElliottLoss, Loss
 from eidrive_scenario.v2x.message import Message, StationState
 from eidrive_scenario.v2x.profile import load_profile
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 DT = 0.1
 
@@ -127,7 +127,7 @@ def test_loss_by_distance_follows_its_table() -> None:
     loss = {"kind": "by_distance", "distances": [0, 100, 200], "reception": [1.0, 0.8, 0.0]}
     for distance, reception in ((0.0, 1.0), (50.0, 0.9), (150.0, 0.4), (500.0, 0.0)):
         carrier = channel(3, loss=loss)
-        carrier.around(Surroundings({"RSU": (0.0, 0.0, 0.0), "Ego": (distance, 0.0, 0.0)}))
+        carrier.update_environment(RadioEnvironment({"RSU": (0.0, 0.0, 0.0), "Ego": (distance, 0.0, 0.0)}))
         kept = received(carrier, 4000)
         assert np.mean(kept) == pytest.approx(reception, abs=5 * math.sqrt(0.25 / 4000))
         book = carrier.statistics(0.0)["RSU", "Ego"]
@@ -142,7 +142,7 @@ def test_loss_by_distance_without_places_says_so() -> None:
 
 def test_the_analytic_model_as_a_loss_names_its_causes() -> None:
     carrier = channel(3, loss={"kind": "80211p", "density": 0.12, "rate": 25, "size": 500})
-    carrier.around(Surroundings({"RSU": (0.0, 0.0, 0.0), "Ego": (150.0, 0.0, 0.0)}))
+    carrier.update_environment(RadioEnvironment({"RSU": (0.0, 0.0, 0.0), "Ego": (150.0, 0.0, 0.0)}))
     kept = received(carrier, 4000)
     table = carrier.profile.loss.table()  # type: ignore[union-attr]
     expected = float(np.interp(150.0, table.distance, table.delivery_ratio))
@@ -150,7 +150,7 @@ def test_the_analytic_model_as_a_loss_names_its_causes() -> None:
     book = carrier.statistics(0.0)["RSU", "Ego"]
     assert set(book.lost_by) == {"busy", "propagation", "collision"}
     assert sum(book.lost_by.values()) == book.lost
-    assert book.busy_ratio == pytest.approx(table.busy_ratio)
+    assert book.channel_busy_ratio == pytest.approx(table.channel_busy_ratio)
 
 
 def test_a_measured_delay_from_a_list() -> None:

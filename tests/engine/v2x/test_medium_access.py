@@ -10,7 +10,7 @@ from radio_talk import DT, QUIET, message, radio, talk
 
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.v2x.radio.channel import RadioChannel
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 BUSY = {"kind": "80211p", "density": 0.12, "rate": 25, "size": 500}
 """Traffic that fills 77 % of the channel."""
@@ -60,7 +60,7 @@ def kinds_said(carrier: RadioChannel, ticks: int, *kinds: str) -> list[LinkEvent
     events: list[LinkEvent] = []
     for tick in range(ticks):
         now = tick * DT
-        carrier.around(Surroundings({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
+        carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
         said = [replace(message("A", tick * len(kinds) + part, now), kind=kind) for part, kind in enumerate(kinds)]  # type: ignore[arg-type]
         events += carrier.transmit([(one, ["B"]) for one in said], now)
     return events
@@ -91,8 +91,8 @@ def test_congestion_control_knows_of_the_traffic_in_the_background(congestion: d
     """77 % busy is beyond LIMERIC's target of 68 %: shares fall to the least one. 300 bytes take 0.448 ms."""
     carrier = radio(1, congestion=congestion, background=BUSY, queue={"discipline": "lcfs"}, **QUIET)
     events = kinds_said(carrier, 400, "cpm")
-    assert carrier.interval("A") == pytest.approx(least)
-    assert carrier.interval("nobody") == 0.0
+    assert carrier.min_message_interval("A") == pytest.approx(least)
+    assert carrier.min_message_interval("nobody") == 0.0
     starts = [event.sent for event in events if event.reason != "queue"]
     assert len(starts) == pytest.approx(20.0 / max(least, DT), abs=1.5)
 
@@ -105,10 +105,10 @@ def test_limeric_holds_a_saturated_channel_at_its_fixed_point() -> None:
     times = {}
     for tick in range(1200):
         now = tick * 0.01
-        carrier.around(Surroundings(places))
+        carrier.update_environment(RadioEnvironment(places))
         carrier.transmit([(message(name, tick, now), []) for name in places], now)
         if tick in (799, 1199):
-            times[tick] = np.mean([now * (carrier.busy_ratio(name) or 0.0) for name in places])
+            times[tick] = np.mean([now * (carrier.channel_busy_ratio(name) or 0.0) for name in places])
     assert (times[1199] - times[799]) / 4.0 == pytest.approx(0.4435, rel=0.05)
 
 
@@ -121,13 +121,15 @@ def test_background_traffic_costs_receptions_and_fills_the_channel() -> None:
     assert {e.reason for e in crowded if e.outcome == "lost"} >= {"busy", "collision"}
     kept = [{(e.sender, e.number) for e in told if e.outcome == "delivered"} for told in (events, crowded)]
     assert kept[1] < kept[0]
-    assert (full.busy_ratio("B") or 0.0) - (free.busy_ratio("B") or 0.0) == pytest.approx(0.7737, abs=0.001)
+    assert (full.channel_busy_ratio("B") or 0.0) - (free.channel_busy_ratio("B") or 0.0) == pytest.approx(
+        0.7737, abs=0.001
+    )
 
 
 def test_a_message_without_listeners_still_takes_its_time_on_the_air() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
     carrier = radio(1, **QUIET)
     for tick in range(100):
-        carrier.around(Surroundings(places))
+        carrier.update_environment(RadioEnvironment(places))
         assert list(carrier.transmit([(message("A", tick, tick * DT), [])], tick * DT)) == []
-    assert carrier.busy_ratio("B") == pytest.approx(0.000448 / DT, rel=0.03)
+    assert carrier.channel_busy_ratio("B") == pytest.approx(0.000448 / DT, rel=0.03)

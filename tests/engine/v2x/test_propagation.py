@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.v2x.counter_draws import uniform, uniforms
+from eidrive_scenario.v2x.counter_random import uniform, uniforms
 from eidrive_scenario.v2x.radio.airtime import fragments, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.packet_error import CURVES
-from eidrive_scenario.v2x.radio.path_loss import Between, Link, LogDistance, Tr37885, WinnerB1
+from eidrive_scenario.v2x.radio.path_loss import Link, LinkGeometry, LogDistance, Tr37885, WinnerB1
 from eidrive_scenario.v2x.radio.propagation import (
     blockage_moments,
     building_nlos,
@@ -20,15 +20,15 @@ from eidrive_scenario.v2x.radio.propagation import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV
+from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV
 
 D = np.array([10.0, 100.0, 1000.0])
 
 
-def between(state: int, distance: float, top: float = 3.0, lower: float = 1.6, upper: float = 1.6) -> Between:
+def between(state: int, distance: float, top: float = 3.0, lower: float = 1.6, upper: float = 1.6) -> LinkGeometry:
     vehicles = np.array([1 if state == NLOSV else 0])
     heights = [np.array([value]) for value in (lower, upper, top)]
-    return Between(np.array([distance]), np.array([state]), heights[0], heights[1], heights[2], vehicles)
+    return LinkGeometry(np.array([distance]), np.array([state]), heights[0], heights[1], heights[2], vehicles)
 
 
 def test_tr_37_885_gives_the_vectors_of_ns_3() -> None:
@@ -87,7 +87,7 @@ def test_the_loss_by_vehicles_has_the_report_s_mean_and_spread() -> None:
     draws = (np.arange(20000) + 0.5) / 20000
     one = np.ones(20000)
     states = np.full(20000, NLOSV)
-    many = Between(60.0 * one, states, 1.6 * one, 1.6 * one, 3.0 * one, np.ones(20000, dtype=np.int64))
+    many = LinkGeometry(60.0 * one, states, 1.6 * one, 1.6 * one, 3.0 * one, np.ones(20000, dtype=np.int64))
     for blockage, tolerance in (("lognormal", 0.01), ("normal", 0.06)):
         model = Tr37885.model_validate({"blockage": blockage})
         extra = model.loss(many, 5.9, draws) - urban_los(many.distance, 5.9)

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from radio_talk import DT, QUIET, Place, message, radio, talk
 
 from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.message import LinkEvent, Received
+from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.radio import budget, csma, reception
 from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 from eidrive_scenario.v2x.radio.budget import LinkBudget
 from eidrive_scenario.v2x.radio.path_loss import Tr37885
-from eidrive_scenario.v2x.surroundings import LOS, NLOS, NLOSV, SightLines, Surroundings
+from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}
 PROFILES: list[dict[str, object]] = [
@@ -54,7 +54,7 @@ def test_nothing_is_heard_before_its_time_nor_twice_and_nothing_vanishes(
         assert event.arrives == received.arrived
         assert event.sent < event.arrives <= time + 1e-9
         assert event.path_loss_db is not None
-    carrier.around(Surroundings(ROW))
+    carrier.update_environment(RadioEnvironment(ROW))
     books = carrier.statistics(now).values()
     assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
     assert all(sum(book.lost_by.values()) == book.lost for book in books)
@@ -74,11 +74,11 @@ def test_the_order_of_the_stations_does_not_matter(profile: dict[str, object]) -
     assert len(forth) > 300
 
 
-def mixed_sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
+def mixed_sight(pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
     """By the letters of the stations: open, behind a truck, or behind a building."""
     states = np.array([(ord(first) + 2 * ord(second)) % 3 for first, second in pairs], dtype=np.int64)
     heights = np.where(states == NLOSV, 3.0, -np.inf)
-    return SightLines(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
+    return LineOfSightStates(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
 
 
 @pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20), ("log_distance", 20)])
@@ -86,7 +86,7 @@ def mixed_sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
 def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
     monkeypatch: pytest.MonkeyPatch, profile: dict[str, object], path_loss: str, power: float
 ) -> None:
-    def told() -> tuple[list[LinkEvent], list[tuple[str, float, Received]]]:
+    def told() -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
         near = {name: (110.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCD")}
         carrier = radio(3, **{"path_loss": {"kind": path_loss}, "tx_power_dbm": power, **profile, "jitter": 0.01})
         return talk(carrier, near, 60, speed=9.0, sizes=(200, 900), sight=mixed_sight)
@@ -115,7 +115,7 @@ def test_who_talks_shifts_no_draw_of_the_others() -> None:
         for tick in range(40):
             now = DT * tick
             places = {name: (30.0 * row + 5.0 * row * now, 0.0, 1.5) for row, name in enumerate("ABC")}
-            carrier.around(Surroundings(places))
+            carrier.update_environment(RadioEnvironment(places))
             for name in places:
                 carrier.deliver(name, now)
             says = [name for name in places if name in talking or (name == "A" and tick in ticks)]
@@ -146,9 +146,9 @@ def test_who_joins_late_measures_its_own_time() -> None:
     for tick in range(200):
         now = DT * tick
         present = "AB" if tick < 100 else "ABC"
-        carrier.around(Surroundings({name: (20.0 * row, 0.0, 1.5) for row, name in enumerate(present)}))
+        carrier.update_environment(RadioEnvironment({name: (20.0 * row, 0.0, 1.5) for row, name in enumerate(present)}))
         carrier.transmit([(message(name, tick, now, 1400), ["A"]) for name in "AB" if name != "A"], now)
-    ratios = [carrier.busy_ratio(name) for name in "ABC"]
+    ratios = [carrier.channel_busy_ratio(name) for name in "ABC"]
     assert ratios == pytest.approx([ratios[0]] * 3, rel=0.03)
     assert ratios[0] == pytest.approx(ieee80211p_airtime(1400, 6.0, 1400) / DT, rel=0.03)
 
@@ -182,10 +182,10 @@ def test_a_turned_lattice_of_equal_distances_has_the_same_fates(technology: str)
 
 
 def behind(state: int, top: float = 3.3) -> Any:
-    def sight(pairs: Sequence[tuple[str, str]]) -> SightLines:
+    def sight(pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
         names = {ray: ("Firetruck",) for ray in range(len(pairs))} if state == NLOSV else {}
         heights = np.full(len(pairs), top if state == NLOSV else -np.inf)
-        return SightLines(np.full(len(pairs), state), heights, names)
+        return LineOfSightStates(np.full(len(pairs), state), heights, names)
 
     return sight
 
@@ -225,7 +225,7 @@ def test_shadowing_is_the_same_both_ways_and_correlated_over_the_way() -> None:
     series = []
     for step in range(60):
         places = {name: (100.0 * n, 5.0 * step if n == 0 else 0.0, 1.5) for n, name in enumerate(names)}
-        held = budget.at(Surroundings(places))
+        held = budget.at(RadioEnvironment(places))
         assert np.array_equal(held.loss, held.loss.T)
         shadow = held.loss - held.mean_loss
         series.append(shadow[0, 1:])
@@ -241,19 +241,19 @@ def test_shadowing_is_the_same_both_ways_and_correlated_over_the_way() -> None:
 def test_a_pair_keeps_its_shadowing_when_others_come_and_go() -> None:
     budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear")
     two = {"B": (0.0, 0.0, 1.5), "D": (50.0, 0.0, 1.5)}
-    loss = budget.at(Surroundings(two)).loss[0, 1]
+    loss = budget.at(RadioEnvironment(two)).loss[0, 1]
     three = {"A": (10.0, 5.0, 1.5), **two}
-    assert budget.at(Surroundings(three)).loss[1, 2] == loss
-    assert budget.at(Surroundings(two)).loss[0, 1] == loss
+    assert budget.at(RadioEnvironment(three)).loss[1, 2] == loss
+    assert budget.at(RadioEnvironment(two)).loss[0, 1] == loss
 
 
 def test_stations_that_leave_take_their_messages_with_them() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5), "C": (90.0, 0.0, 1.5)}
     carrier = radio(1, jitter=0.04)
-    carrier.around(Surroundings(places))
+    carrier.update_environment(RadioEnvironment(places))
     carrier.transmit([(message("A", 0, 0.0), ["B", "C"]), (message("B", 0, 0.0), ["A", "C"])], 0.0)
     del places["B"]
-    carrier.around(Surroundings(places))
+    carrier.update_environment(RadioEnvironment(places))
     carrier.deliver("A", 0.05)
     events = {(e.sender, e.receiver): e for e in carrier.transmit([], 0.05)}
     assert {link: event.reason for link, event in events.items()} == {
@@ -266,10 +266,10 @@ def test_stations_that_leave_take_their_messages_with_them() -> None:
 def test_a_radio_that_is_replaced_hands_over_what_waits() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
     old = radio(1, jitter=0.04)
-    old.around(Surroundings(places))
+    old.update_environment(RadioEnvironment(places))
     old.transmit([(message("A", 0, 0.0), ["B"])], 0.0)
     new = ComposedChannel(ComposedProfile.model_validate({"loss": {"kind": "bernoulli", "probability": 1.0}}), 1)
-    new.take_over(old)
+    new.continue_from(old)
     told = new.transmit([(message("A", 1, 0.05), ["B"])], 0.05)
     assert [(event.number, event.outcome) for event in told] == [(0, "delivered"), (1, "lost")]
     assert [received.message.number for received in new.deliver("B", 0.1)] == [0]
@@ -317,7 +317,7 @@ def test_radio_channel_each_message_has_one_outcome_per_receiver(technology: str
     for tick in range(100):
         now = DT * tick
         places = {name: place for row, (name, place) in enumerate(everybody.items()) if (tick // 3) % (row + 2) != 1}
-        carrier.around(Surroundings(places))
+        carrier.update_environment(RadioEnvironment(places))
         for name in places:
             heard += [(r.message.sender, r.message.number, name) for r in carrier.deliver(name, now)]
         outbox = [
@@ -327,8 +327,8 @@ def test_radio_channel_each_message_has_one_outcome_per_receiver(technology: str
         ]
         said += [(sent.sender, sent.number, receiver) for sent, receivers in outbox for receiver in receivers]
         events += carrier.transmit(outbox, now)
-    carrier.settle()
-    events += carrier.untold()
+    carrier.finalize()
+    events += carrier.drain_events()
     assert sorted((event.sender, event.number, event.receiver) for event in events) == sorted(said)
     delivered = {(e.sender, e.number, e.receiver) for e in events if e.outcome == "delivered"}
     assert len(heard) == len(set(heard)) > 0

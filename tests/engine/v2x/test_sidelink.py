@@ -11,7 +11,7 @@ from radio_talk import message, radio
 from sidelink_air import MODE_4, TWO, Air, many
 
 from eidrive_scenario.v2x.radio.sidelink_settings import SidelinkSettings
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_messages_wait_no_longer_than_the_latency_requirement(latency: float) ->
     waits = []
     for tick in range(600):
         now = 0.05 * tick
-        carrier.around(Surroundings(TWO))
+        carrier.update_environment(RadioEnvironment(TWO))
         due = tick % 12 in (0, 4, 9)
         carrier.transmit([(message("A", tick, now, 190), ["B"])] if due else [], now)
         waits += [r.arrived - r.message.generated for r in carrier.deliver("B", now)]

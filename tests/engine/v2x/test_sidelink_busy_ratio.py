@@ -9,7 +9,7 @@ from radio_talk import DT, message, radio, talk
 from sidelink_air import MODE_4, TWO, Air, many
 
 from eidrive_scenario.v2x.radio.sidelink import Sidelink
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
 @pytest.mark.parametrize(("rate", "size"), [(1, 190), (1, 760), (5, 190), (2, 400)])
@@ -18,7 +18,7 @@ def test_busy_ratio_is_the_occupancy_of_subchannels(rate: int, size: int) -> Non
     places = many(40)
     air = Air(radio(2, **MODE_4, sidelink={"interval": 0.1}), places, 0.1, listeners=0)
     air.run(8.0, dict.fromkeys(places, rate), (size,))
-    heard = [air.carrier.busy_ratio(name) for name in places]
+    heard = [air.carrier.channel_busy_ratio(name) for name in places]
     assert heard == pytest.approx([air.occupancy(0.0, 7.9)] * 40, abs=0.02)
 
 
@@ -27,23 +27,23 @@ def test_busy_ratio_counts_the_subchannel_that_is_used_not_the_subframe() -> Non
     carrier = radio(1, **MODE_4)
     talk(carrier, TWO, 400, sizes=(190,), dt=0.1)
     for name in TWO:
-        assert carrier.busy_ratio(name) == pytest.approx(0.0025, rel=0.05)
+        assert carrier.channel_busy_ratio(name) == pytest.approx(0.0025, rel=0.05)
 
 
 def test_busy_ratio_leaves_out_signals_below_the_threshold() -> None:
     far = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5), "C": (90000.0, 0.0, 1.5)}
     carrier = radio(1, **MODE_4)
     talk(carrier, far, 100, sizes=(190,), dt=0.1)
-    assert carrier.busy_ratio("C") == 0.0
-    assert (carrier.busy_ratio("B") or 0.0) == pytest.approx(0.0025, rel=0.1)
+    assert carrier.channel_busy_ratio("C") == 0.0
+    assert (carrier.channel_busy_ratio("B") or 0.0) == pytest.approx(0.0025, rel=0.1)
 
 
 def test_station_alone_measures_an_empty_channel_and_sends_all_messages() -> None:
     carrier = radio(1, **MODE_4)
     for tick in range(100):
-        carrier.around(Surroundings({"A": (0.0, 0.0, 1.5)}))
+        carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5)}))
         carrier.transmit([(message("A", tick, DT * tick, 190), [])], DT * tick)
-    assert carrier.busy_ratio("A") == 0.0
+    assert carrier.channel_busy_ratio("A") == 0.0
     assert isinstance(carrier._access, Sidelink)
 
 
@@ -67,7 +67,7 @@ def test_limeric_counts_the_share_of_the_channel_that_a_message_takes(size: int,
     """The shortest interval after a message is its duration times its share of the subchannels, over the station's."""
     profile = {**MODE_4, "congestion": {"kind": "limeric", "share_max": 0.002, "share_min": 0.002}}
     air = Air(radio(3, **profile), TWO).run(1.0, {"A": 2}, (size,))
-    assert air.carrier.interval("A") == pytest.approx(channel_time / 0.002)
+    assert air.carrier.min_message_interval("A") == pytest.approx(channel_time / 0.002)
 
 
 def test_reactive_control_follows_the_busy_ratio_of_subchannels() -> None:
@@ -80,4 +80,4 @@ def test_reactive_control_follows_the_busy_ratio_of_subchannels() -> None:
     )
     assert free.occupancy(2.0, 5.9) == pytest.approx(0.3, abs=0.02)
     assert held.occupancy(2.0, 5.9) == pytest.approx(0.15, abs=0.02)
-    assert {held.carrier.interval(name) for name in places} == {0.1}
+    assert {held.carrier.min_message_interval(name) for name in places} == {0.1}

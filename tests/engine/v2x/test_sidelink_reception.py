@@ -8,7 +8,7 @@ import pytest
 from radio_talk import DT, message, radio
 from sidelink_air import MODE_4, Air, many
 
-from eidrive_scenario.v2x.surroundings import Surroundings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
 def test_stations_that_sense_each_other_hardly_collide() -> None:
@@ -53,7 +53,7 @@ def test_link_statistics_with_joining_and_leaving_stations_are_complete() -> Non
     for tick in range(240):
         now = DT * tick
         places = {name: place for row, (name, place) in enumerate(all_places.items()) if (tick // 4) % (row + 2) != 1}
-        carrier.around(Surroundings(places))
+        carrier.update_environment(RadioEnvironment(places))
         for name in places:
             carrier.deliver(name, now)
         outbox = [

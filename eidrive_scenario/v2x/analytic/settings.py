@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.load.cv2x_mode4 import CANDIDATES, cv2x_mode4_errors
-from eidrive_scenario.v2x.load.ieee80211p import ANTENNA, FULL, ieee80211p_errors, offered_load
-from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.analytic.cv2x_mode4 import CANDIDATES, cv2x_mode4_errors
+from eidrive_scenario.v2x.analytic.ieee80211p import ANTENNA, FULL, ieee80211p_errors, offered_load
+from eidrive_scenario.v2x.analytic.table import ErrorTable
 
 FARTHEST, STEP = 1000.0, 10.0
 """Tables reach this far, in these steps [m]; beyond, nothing of either model gets through."""
@@ -73,7 +73,7 @@ class Cv2xMode4Loss(Settings):
 
     @model_validator(mode="after")
     def _not_too_much(self) -> Cv2xMode4Loss:
-        busy = self.table().busy_ratio
+        busy = self.table().channel_busy_ratio
         if busy > 1.0 - CANDIDATES:
             raise ValueError(
                 f"vehicles in reach would keep {busy:.3g} of the resources, and the model holds while {CANDIDATES:g} "

@@ -18,12 +18,12 @@ class ErrorTable:
 
     distance  (D,) between the antennas, rising [m]
     given     cause to (D,) probability of it where no earlier cause struck
-    busy_ratio  channel busy ratio, in [0, 1]
+    channel_busy_ratio  channel busy ratio, in [0, 1]
     """
 
     distance: Array
     given: Mapping[str, Array]
-    busy_ratio: float
+    channel_busy_ratio: float
 
     @cached_property
     def errors(self) -> Mapping[str, Array]:

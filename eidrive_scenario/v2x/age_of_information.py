@@ -20,7 +20,7 @@ LEAST = 1e-6
 """Ages below this are 0 there [s]."""
 
 
-class AgesOfLinks(NamedTuple):
+class AgeStatistics(NamedTuple):
     """Of L links [s]: average and 95th percentile over time, and the mean of the maxima just before each update but the
     first; NaN where nothing can be said."""
 
@@ -29,7 +29,7 @@ class AgesOfLinks(NamedTuple):
     peak: Array
 
 
-class Ages:
+class AgeOfInformation:
     """Age rises at slope 1 from a floor, the age of an update, to a peak just before the next.
 
     The time spent below an age x is piecewise linear in x and bends at floors and peaks. All averages are exact. The
@@ -76,7 +76,7 @@ class Ages:
         if self._number > self._most:
             self._compact()
 
-    def at(self, now: float, newest: Array, order: Codes) -> AgesOfLinks:
+    def at(self, now: float, newest: Array, order: Codes) -> AgeStatistics:
         """What can be said of the links in this order at `now`; their newest information was said at `newest` (L,)."""
         low = self._floor
         high = np.maximum(now - newest, low)
@@ -84,7 +84,7 @@ class Ages:
         some = time > 0.0
         mean = np.divide(area, time, out=np.full(len(low), np.nan), where=some)
         peak = np.divide(self._peaks, self._updates, out=np.full(len(low), np.nan), where=self._updates > 0)
-        return AgesOfLinks(mean[order], self._percentile(0.95, low, high, some, order), peak[order])
+        return AgeStatistics(mean[order], self._percentile(0.95, low, high, some, order), peak[order])
 
     def _percentile(self, share: float, low: Array, high: Array, some: NDArray[np.bool_], order: Codes) -> Array:
         """(L,) the age below which a link spent this share of the time."""

@@ -12,7 +12,7 @@ BLOCK = 128
 """Numbers made at once: a keyed generator costs some 20 µs, however many are drawn from it."""
 
 
-class LinkDraws:
+class LinkRandom:
     """The draw of message `number` on a link is the same whoever else talks, and whenever it is asked for."""
 
     def __init__(self, seed: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.books import DISTANCE_BIN
+from eidrive_scenario.v2x.link_statistics import DISTANCE_BIN
 from eidrive_scenario.v2x.links import Links
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE
 
@@ -16,7 +16,7 @@ _CLASSES = 41
 """Classes of distance; the last one takes all beyond 1 km."""
 
 
-class Ledger:
+class LinkCounterTable:
     """For N stations, by row of sender and receiver."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
@@ -43,11 +43,11 @@ class Ledger:
         place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
         np.add.at(self._fates.reshape(-1), 2 * (link * _CLASSES + place) + (causes == DELIVERED), 1)
 
-    def write_into(self, links: Links) -> None:
+    def flush_into(self, links: Links) -> None:
         """Carry everything over into the books, and begin anew."""
         senders, receivers = np.nonzero((self._sent > 0) | self._causes.any(axis=2))
         books = [
-            links.book(self.names[sender], self.names[receiver])
+            links.counters(self.names[sender], self.names[receiver])
             for sender, receiver in zip(senders.tolist(), receivers.tolist(), strict=True)
         ]
         sent, size = (counts[senders, receivers].tolist() for counts in (self._sent, self._bytes))
@@ -58,10 +58,10 @@ class Ledger:
         causes[:, DELIVERED] = 0
         found = np.nonzero(causes)
         for place, code, number in zip(*(column.tolist() for column in (*found, causes[found])), strict=True):
-            books[place].lose(CAUSES[code], number)
+            books[place].count_loss(CAUSES[code], number)
         fates = self._fates[senders, receivers]
         where = np.nonzero(fates.any(axis=2))
         for place, nearest, (lost, kept) in zip(*(column.tolist() for column in (*where, fates[where])), strict=True):
-            books[place].decide(nearest, lost + kept, kept)
+            books[place].count_outcomes(nearest, lost + kept, kept)
         for counts in (self._sent, self._bytes, self._causes, self._fates):
             counts[...] = 0

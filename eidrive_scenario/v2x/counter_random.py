@@ -40,7 +40,7 @@ def uniform(key: int, count: int) -> float:
     return (((mixed ^ mixed >> 31) >> 11) + 0.5) * 2.0**-53
 
 
-def joined(first: Keys, second: Keys) -> Keys:
+def combine_keys(first: Keys, second: Keys) -> Keys:
     """The keys of pairs, broadcast; (a, b) and (b, a) differ."""
     return _mixed(_mixed(first + _GOLDEN) ^ second)
 

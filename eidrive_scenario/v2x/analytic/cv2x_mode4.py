@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.load.levels import (
+from eidrive_scenario.v2x.analytic.levels import (
     RATIOS,
     STEP,
     autocorrelation,
@@ -19,7 +19,7 @@ from eidrive_scenario.v2x.load.levels import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.radio.propagation import winner_b1
 
 Array = NDArray[np.float64]
@@ -110,8 +110,8 @@ def cv2x_mode4_errors(
         return lost
 
     excluded = _excluded(in_reach, resources)
-    busy_ratio = excluded / resources  # (34)
-    weight = float(np.clip(2.0 * busy_ratio - 0.4, 0.0, 1.0))  # (22)
+    channel_busy_ratio = excluded / resources  # (34)
+    weight = float(np.clip(2.0 * channel_busy_ratio - 0.4, 0.0, 1.0))  # (22)
     collision = weight * collides(excluded, SENSING)
     if weight < 1.0:
         raised, excluded = _raised(around, density, resources)
@@ -122,7 +122,7 @@ def cv2x_mode4_errors(
         "propagation": propagation,
         "collision": collision,
     }
-    return ErrorTable(distance, given, busy_ratio)
+    return ErrorTable(distance, given, channel_busy_ratio)
 
 
 def _excluded(in_reach: float, resources: float) -> float:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x.draws import LinkDraws
-from eidrive_scenario.v2x.load.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.link_random import LinkRandom
 from eidrive_scenario.v2x.loss import AnyLoss, BernoulliLoss, DistanceLoss, GilbertElliottLoss, NoLoss
 from eidrive_scenario.v2x.message import Message
 
@@ -13,7 +13,7 @@ RENEWAL = 4096
 too long to play it from the first message on for somebody who begins to listen after hours."""
 
 
-class LossDraws:
+class LossProcess:
     """A message is lost where its draw lies below the probability of loss.
 
     The draw belongs to the message and the link, whatever the probability is: what arrives with a larger one arrives
@@ -23,7 +23,7 @@ class LossDraws:
     def __init__(self, loss: AnyLoss, seed: int) -> None:
         self.loss = loss
         self._seed = seed
-        self._draws = LinkDraws(seed)
+        self._draws = LinkRandom(seed)
         self._frames: dict[str, tuple[float, float]] = {}
         self._chains: dict[tuple[str, str], tuple[int, bool]] = {}
 

@@ -23,7 +23,7 @@ STATES: tuple[LineOfSight, ...] = ("los", "nlosv", "nlos")
 """Their names, by code."""
 
 
-class SightLines(NamedTuple):
+class LineOfSightStates(NamedTuple):
     """What M rays from antenna to antenna met.
 
     states    (M,) LOS, NLOSV or NLOS
@@ -36,16 +36,16 @@ class SightLines(NamedTuple):
     blockers: Mapping[int, tuple[str, ...]]
 
 
-Sight = Callable[[Sequence[tuple[str, str]]], SightLines]
+LineOfSightQuery = Callable[[Sequence[tuple[str, str]]], LineOfSightStates]
 """Asks for the lines of sight between pairs of stations, now."""
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class RadioEnvironment:
     """Antennas by the name of their station, in the world frame [m]; `sight` is None where nobody can look."""
 
     places: Mapping[str, tuple[float, float, float]]
-    sight: Sight | None = None
+    sight: LineOfSightQuery | None = None
 
     def distance(self, first: str, second: str) -> float | None:
         """Between two antennas [m]; None if one of them is nowhere."""
@@ -63,5 +63,5 @@ class Surroundings:
         return np.array([self.places[name] for name in self.names], dtype=float).reshape(-1, 3)
 
 
-NOWHERE = Surroundings({})
+EMPTY_RADIO_ENVIRONMENT = RadioEnvironment({})
 """Before anybody said where the antennas are."""

@@ -16,14 +16,14 @@ KEPT = 2.0
 """So long an object keeps its number while nobody sees it [s]."""
 
 
-class Numbering:
+class ObjectIdAssigner:
     """The numbers of the tracker where there is one; else of the nearest that was seen before, moved on."""
 
     def __init__(self) -> None:
         self._next = 0
         self._known: dict[int, tuple[float, float, float, float, float]] = {}
 
-    def numbers(self, detections: Detections) -> Sequence[int]:
+    def assign_ids(self, detections: Detections) -> Sequence[int]:
         """One per row."""
         if detections.tracks or not len(detections):
             return detections.tracks

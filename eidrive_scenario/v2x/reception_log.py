@@ -9,20 +9,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.ages import Ages
-from eidrive_scenario.v2x.message import Received
+from eidrive_scenario.v2x.age_of_information import AgeOfInformation
+from eidrive_scenario.v2x.message import ReceivedMessage
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
-Entry = tuple[float, str, int, float, Received]
+Entry = tuple[float, str, int, float, ReceivedMessage]
 """Arrival, sender, number, sending, and what the receiver gets; several receivers may share one."""
 
 MOST_WAITING = 1 << 14
 """So many messages are held at most before they are written down, as each holds what it says."""
 
 
-class Heard(NamedTuple):
+class ReceptionStatistics(NamedTuple):
     """Of one link: messages heard, their delays [s], and when the newest information there was said [s].
 
     mean_age, p95_age, peak_age  see LinkStatistics; None where nothing can be said yet
@@ -31,13 +31,13 @@ class Heard(NamedTuple):
     received: int
     delay_sum: float
     delay_max: float
-    newest: float
+    newest_generation_time: float
     mean_age: float | None
     p95_age: float | None
     peak_age: float | None
 
 
-class Hearings:
+class ReceptionLog:
     """Takes lists of messages as they are given out, and works them off together when somebody asks."""
 
     def __init__(self) -> None:
@@ -48,16 +48,16 @@ class Hearings:
         self._number = 0
         self._received: Codes = np.zeros(0, dtype=np.int64)
         self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
-        self._ages = Ages()
+        self._ages = AgeOfInformation()
 
-    def take(self, receiver: str, entries: Sequence[Entry]) -> None:
+    def record(self, receiver: str, entries: Sequence[Entry]) -> None:
         """A receiver has heard these, in this order."""
         self._waiting.append((receiver, entries))
         self._number += len(entries)
         if self._number > MOST_WAITING:
             self._work_off()
 
-    def by_link(self, now: float) -> dict[tuple[str, str], Heard]:
+    def statistics_by_link(self, now: float) -> dict[tuple[str, str], ReceptionStatistics]:
         """What was heard on each link up to `now` [s], by (sender, receiver) in alphabetical order."""
         self._work_off()
         code_of = {(sender, name): code for name, senders in self._codes.items() for sender, code in senders.items()}
@@ -66,7 +66,7 @@ class Hearings:
         columns = (self._received, self._delay_sum, self._delay_max, self._newest)
         ages = [_known(age) for age in self._ages.at(now, self._newest, codes)]
         rows = zip(*(column[codes].tolist() for column in columns), *ages, strict=True)
-        return {link: Heard(*row) for link, row in zip(links, rows, strict=True)}
+        return {link: ReceptionStatistics(*row) for link, row in zip(links, rows, strict=True)}
 
     def _work_off(self) -> None:
         if not self._waiting:

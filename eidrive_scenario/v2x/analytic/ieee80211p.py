@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.load.levels import (
+from eidrive_scenario.v2x.analytic.levels import (
     RATIOS,
     autocorrelation,
     errors_over,
@@ -19,7 +19,7 @@ from eidrive_scenario.v2x.load.levels import (
     sensed_share,
     signal,
 )
-from eidrive_scenario.v2x.load.table import ErrorTable
+from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.radio.propagation import winner_b1
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def ieee80211p_errors(
     sensed = sensed_share(received(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)
     unsaturated = offered_load(density, rate, size, power, bit_rate, height)
     square, linear, constant = FIT
-    busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
+    channel_busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
     overlap = autocorrelation(sensed)
     overlap /= overlap.max()  # (20)
 
@@ -96,13 +96,13 @@ def ieee80211p_errors(
     )  # (31)
     hears = sensed_share(received(to_receiver), SENSING, SHADOWING)
     senses = sensed_share(received(to_sender), SENSING, SHADOWING)
-    share = rate / (1.0 - busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
+    share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
     same_slot = SLOT * share * senses  # (22)
     hidden = duration * share * (1.0 - senses)  # (18)
     busy = _any(np.where(closer, same_slot * hears, 0.0) + hidden * hears)  # (14), (16), (21)
     collision = _any(np.where(closer, 0.0, spoils * same_slot) + spoils * hidden * (2.0 - hears))  # (26), (28), (32)
     given = {"sensing": not_sensed, "busy": busy, "propagation": propagation, "collision": collision}
-    return ErrorTable(distance, given, busy_ratio)
+    return ErrorTable(distance, given, channel_busy_ratio)
 
 
 def offered_load(density: float, rate: float, size: int, power: float, bit_rate: float, height: float) -> float:
