@@ -135,7 +135,7 @@ def main() -> None:
         simulation.run()
         profile.disable()
     ticks = round(result.simulated_s / 0.05)
-    swarm = len(simulation.storyboard.stage.traffic.names)
+    swarm = len(simulation.storyboard.context.traffic.names)
     print(f"{given.town}: {given.scripted} scripted cars, a swarm of {given.swarm} ({swarm} there at the end)")
     same = "the same trace" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
     print(f"  simulated {result.simulated_s:.2f} s in {ticks} ticks of 0.05 s, {given.runs} runs, {same}")

@@ -31,7 +31,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
-from eidrive_scenario.storyboard.actor import Actor, is_ours
+from eidrive_scenario.storyboard.actor import Actor, is_agent_controller
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.condition import (
@@ -39,24 +39,31 @@ from eidrive_scenario.storyboard.condition import (
     EntityCondition,
     Measure,
     QuantityCondition,
-    compares,
-    in_words,
+    describe_rule,
     relation,
+    satisfies_rule,
 )
-from eidrive_scenario.storyboard.distances import box_of, closing_speed, distance, frame_of, kind_of, same_way
+from eidrive_scenario.storyboard.controller_model import ControllerModel
+from eidrive_scenario.storyboard.distances import (
+    closing_speed,
+    distance,
+    entity_box,
+    resolve_coordinate_system,
+    resolve_distance_type,
+    same_way,
+)
 from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.environments import changed as changed_environment
-from eidrive_scenario.storyboard.motion import STEEPEST, Motion, Place, Steering
-from eidrive_scenario.storyboard.positions import references, resolve, trajectory_of
-from eidrive_scenario.storyboard.progress import Progress, Watch
-from eidrive_scenario.storyboard.random_way import any_branch, random_route
+from eidrive_scenario.storyboard.element_states import ElementStateObserver, ElementStates
+from eidrive_scenario.storyboard.environments import merge_environment
+from eidrive_scenario.storyboard.motion import STEEPEST, LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.positions import referenced_entities, resolve_position, trajectory_of
+from eidrive_scenario.storyboard.random_routes import random_route, uniform_branch_selector
 from eidrive_scenario.storyboard.road_positions import count_lanes, facing
-from eidrive_scenario.storyboard.route import route_of
-from eidrive_scenario.storyboard.stage import Absent, Stage
-from eidrive_scenario.storyboard.stand_in import StandIn
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.storyboard.trajectory import Layout, TrajectoryProgress, lay_out
-from eidrive_scenario.storyboard.transition import Transition as ValueTransition
+from eidrive_scenario.storyboard.route import build_route
+from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.trajectory import TrajectoryCurve, TrajectoryProgress, sample_trajectory
+from eidrive_scenario.storyboard.transition_profile import TransitionProfile
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
 from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock, OutcomeColumns
@@ -71,7 +78,6 @@ from eidrive_scenario.world.view import Contact, WorldView
 __all__ = [
     "CLASSES",
     "STEEPEST",
-    "Absent",
     "ActionBehaviour",
     "Actor",
     "ActorSpec",
@@ -86,6 +92,7 @@ __all__ = [
     "Condition",
     "Contact",
     "Control",
+    "ControllerModel",
     "Criterion",
     "CriterionSettings",
     "CustomCommand",
@@ -95,6 +102,11 @@ __all__ = [
     "Domain",
     "EgoState",
     "EidriveError",
+    "ElementState",
+    "ElementStateObserver",
+    "ElementStates",
+    "ElementTransition",
+    "EntityAbsentError",
     "EntityCondition",
     "Environment",
     "ExtensionError",
@@ -104,7 +116,7 @@ __all__ = [
     "InputError",
     "Installation",
     "LaneLocation",
-    "Layout",
+    "LateralStep",
     "LidarReading",
     "LightState",
     "LinkChannel",
@@ -116,74 +128,69 @@ __all__ = [
     "OutcomeBlock",
     "OutcomeColumns",
     "Override",
-    "Place",
     "Placement",
     "Plan",
     "Planner",
     "Pose",
-    "Progress",
     "QuantityCondition",
     "Readings",
     "ReceivedMessage",
     "Report",
+    "ResolvedPosition",
     "RoadNetwork",
     "Route",
     "RouteError",
     "RoutePlanner",
+    "RuntimeContext",
     "Scenario",
     "ScenarioError",
     "SettingError",
     "Settings",
     "SignalReading",
     "SimulationError",
-    "Stage",
-    "StandIn",
-    "State",
     "StateChange",
-    "Steering",
     "Surroundings",
+    "TrajectoryCurve",
     "TrajectoryProgress",
-    "Transition",
-    "ValueTransition",
+    "TransitionProfile",
     "Verdict",
     "Visibility",
     "WallLimitError",
-    "Watch",
     "WorldView",
-    "any_branch",
     "box_distance",
-    "box_of",
-    "changed_environment",
+    "build_route",
     "closing_speed",
-    "compares",
     "count_lanes",
+    "describe_rule",
     "distance",
+    "entity_box",
     "facing",
     "footprint",
     "footprint_distance",
-    "frame_of",
     "generator",
     "has_times",
-    "in_words",
-    "is_ours",
+    "is_agent_controller",
     "judge",
-    "kind_of",
-    "lay_out",
     "lift",
     "load_yaml",
+    "merge_environment",
     "model",
     "never_appeared",
     "overlap",
     "parse_settings",
     "random_route",
-    "references",
+    "referenced_entities",
     "relation",
-    "resolve",
-    "route_of",
+    "resolve_coordinate_system",
+    "resolve_distance_type",
+    "resolve_position",
     "same_way",
+    "sample_trajectory",
+    "satisfies_rule",
     "suggestion",
     "traffic",
     "trajectory_of",
     "turning_wheelbase",
+    "uniform_branch_selector",
     "wrap_angle",
 ]

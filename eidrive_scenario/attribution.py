@@ -21,7 +21,7 @@ from eidrive_scenario.recording.criterion import Criterion
 from eidrive_scenario.registry import is_built_in, registration, third_party_files
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition
-from eidrive_scenario.storyboard.stand_in import StandIn
+from eidrive_scenario.storyboard.controller_model import ControllerModel
 from eidrive_scenario.wall_limit import LimitReached, current_limit
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -219,7 +219,7 @@ def _for_whom(calls: Sequence[_Call]) -> str:
         subject = call.subject
         if isinstance(subject, Agent):
             return f"station {subject.name!r}"
-        if isinstance(subject, StandIn) and hasattr(subject, "actor"):
+        if isinstance(subject, ControllerModel) and hasattr(subject, "actor"):
             return f"actor {subject.actor.name!r}"
         if isinstance(subject, ActionBehaviour):
             return _of_action(subject)

@@ -51,8 +51,8 @@ def late_warnings(
 
     user_values  all that were set, and those of them that the caller's settings have set
     """
-    yield from map(str, storyboard.stage.warnings)
-    yield from user_value_warnings(storyboard.stage.wanted_values, *user_values)
+    yield from map(str, storyboard.context.warnings)
+    yield from user_value_warnings(storyboard.context.requested_user_values, *user_values)
     yield from map(str, motionless.warnings(scenario, time))
     if end not in _CUT_SHORT and not end.startswith("criterion: "):
         yield from map(str, unstarted(storyboard.root, scenario, time, end))

@@ -98,7 +98,7 @@ class Simulation:
         self._motionless = MotionlessStations(possible_drivers(self.scenario, self.stations.settings))
         self._commands = CustomCommands(self.scenario, self.stations, self.settings, self.criteria, self._warnings)
         self._user_values = dict(self.settings.user_values)
-        self.storyboard.stage.user_values = self._user_values.get
+        self.storyboard.context.user_values = self._user_values.get
         self._environment: Environment | None = None
         try:
             self._apply(self.storyboard.initial())
@@ -245,8 +245,8 @@ class Simulation:
         for name in sorted(commands.removals):
             self.world.remove(name)
             self.stations.leave(name)
-        for name, placement in commands.additions.items():
-            spec = commands.bodies.get(name) or actor_spec(name, self.scenario.entities[name])
+        for name, placement in commands.spawns.items():
+            spec = commands.actor_specs.get(name) or actor_spec(name, self.scenario.entities[name])
             self.world.add(spec, placement)
             self.stations.join(spec)
         for name in sorted(self.stations.drivers):

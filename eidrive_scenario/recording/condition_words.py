@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.storyboard.condition import EntityCondition
-from eidrive_scenario.storyboard.witness import ConditionHistory, Times
+from eidrive_scenario.storyboard.trigger_history import ConditionHistory, TrueIntervals
 
 _CHANGES = {"rising": "became true", "falling": "became false", "risingOrFalling": "changed"}
 
@@ -91,6 +91,6 @@ def _delay(history: ConditionHistory) -> str:
     )
 
 
-def _moments(times: Times) -> str:
+def _moments(times: TrueIntervals) -> str:
     first = f"at {times.first[0]:.2f} s"
     return first if times.count == 1 else f"{times.count} times, first {first}, last at {times.last[0]:.2f} s"

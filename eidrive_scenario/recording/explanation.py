@@ -10,10 +10,10 @@ from eidrive_scenario.recording.condition_words import told
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.storyboard.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.events import EventElement
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.storyboard import Storyboard
-from eidrive_scenario.storyboard.trigger import WaitFor
-from eidrive_scenario.storyboard.witness import GroupHistory, TriggerHistory
+from eidrive_scenario.storyboard.trigger import WaitForTrigger
+from eidrive_scenario.storyboard.trigger_history import GroupHistory, TriggerHistory
 
 STORYBOARD = "storyboard"
 _SHOWN = 5
@@ -71,7 +71,7 @@ def _named(element: StoryElement, act: StoryElement | None) -> Iterator[tuple[St
 class _Subject:
     """One element, the act around it, and what its trigger saw."""
 
-    def __init__(self, element: StoryElement, act: StoryElement | None, leaf: WaitFor | None) -> None:
+    def __init__(self, element: StoryElement, act: StoryElement | None, leaf: WaitForTrigger | None) -> None:
         self._element = element
         self._around = _Subject(act, None, act.start_leaf) if act is not None else None
         self._history = _history(leaf)
@@ -98,7 +98,7 @@ class _Subject:
             word = "stop"
         if self._history is None:
             without = f"it has no {word} trigger"
-            starts = self._times(Transition.START)
+            starts = self._times(ElementTransition.START)
             if element.kind == STORYBOARD or any(without not in change.why for change in starts[:_SHOWN]):
                 yield f"  {without}"
             return
@@ -112,8 +112,8 @@ class _Subject:
     def _starts(self) -> Iterator[str]:
         element = self._element
         title = f"{element.kind} {element.name} ({'/'.join(element.record.path)})"
-        starts = self._times(Transition.START)
-        skips = self._times(Transition.SKIP)
+        starts = self._times(ElementTransition.START)
+        skips = self._times(ElementTransition.SKIP)
         if starts:
             often = "" if len(starts) == 1 else f" {len(starts)} times"
             yield f"{title} started{often}:"
@@ -122,7 +122,7 @@ class _Subject:
         yield from (f"  at {change.time:.2f} s: {change.why or 'with what is around it'}" for change in starts[:_SHOWN])
         if skips:
             yield f"  it was skipped {_times(len(skips))}, first at {skips[0].time:.2f} s: {skips[0].why}"
-        if not starts and not any(change.after is State.STANDBY for change in self._changes):
+        if not starts and not any(change.after is ElementState.STANDBY for change in self._changes):
             yield from self._never_stood_by()
         elif not starts:
             yield f"  {self._wait()}"
@@ -136,8 +136,8 @@ class _Subject:
         yield from (f"  {line}" for line in self._around.lines())
 
     def _wait(self) -> str:
-        begin = next(change.time for change in self._changes if change.after is State.STANDBY)
-        stop = next((change for change in self._changes if change.transition is Transition.STOP), None)
+        begin = next(change.time for change in self._changes if change.after is ElementState.STANDBY)
+        stop = next((change for change in self._changes if change.transition is ElementTransition.STOP), None)
         if stop is None:
             return f"it stood by from {begin:.2f} s to the end of the run at {self._now:.2f} s"
         why = f" ({stop.why})" if stop.why else ""
@@ -145,16 +145,16 @@ class _Subject:
 
     def _how_it_ended(self) -> str:
         last = self._changes[-1] if self._changes else None
-        if last is None or last.after is not State.COMPLETE:
+        if last is None or last.after is not ElementState.COMPLETE:
             return f"was not ended by the storyboard; it lasted until {self._now:.2f} s"
-        how = "stopped" if last.transition is Transition.STOP else "ended with its last story"
+        how = "stopped" if last.transition is ElementTransition.STOP else "ended with its last story"
         return f"{how} at {last.time:.2f} s" + (f": {last.why}" if last.why else "")
 
-    def _times(self, transition: Transition) -> list[StateChange]:
+    def _times(self, transition: ElementTransition) -> list[StateChange]:
         return [change for change in self._changes if change.transition is transition]
 
 
-def _history(leaf: WaitFor | None) -> TriggerHistory | None:
+def _history(leaf: WaitForTrigger | None) -> TriggerHistory | None:
     """What is known of a leaf's trigger; one trigger has one witness, whoever asks."""
     if leaf is None:
         return None

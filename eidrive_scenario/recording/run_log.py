@@ -11,15 +11,15 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.link_words import OFF_THE_AIR, link_in_words
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.storyboard.elements import EMPTY
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
 STANDARD_OUTPUT = "-"
 _KINDS = {"maneuverGroup": "maneuver group"}
 _VERBS = {
-    Transition.START: "starts",
-    Transition.END: "ends",
-    Transition.STOP: "is stopped",
-    Transition.SKIP: "is skipped",
+    ElementTransition.START: "starts",
+    ElementTransition.END: "ends",
+    ElementTransition.STOP: "is stopped",
+    ElementTransition.SKIP: "is skipped",
     None: "stands by",
 }
 
@@ -43,7 +43,7 @@ class RunLog:
 
         And one for each message that a radio carried: when it was said, its fate, and what the radio did.
         """
-        started = {change.path for change in frame.changes if change.transition is Transition.START}
+        started = {change.path for change in frame.changes if change.transition is ElementTransition.START}
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {in_words(change)}\n")
@@ -75,6 +75,6 @@ class RunLog:
 def in_words(change: StateChange) -> str:
     """What became of an element, and why."""
     verb = _VERBS[change.transition]
-    if change.transition is Transition.END and change.after is State.STANDBY:
+    if change.transition is ElementTransition.END and change.after is ElementState.STANDBY:
         verb = "ends, and stands by again"
     return f"{verb}: {change.why}" if change.why and change.why != EMPTY else verb

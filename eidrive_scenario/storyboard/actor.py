@@ -8,7 +8,7 @@ from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.motion import Motion
-from eidrive_scenario.storyboard.trajectory import Layout, TrajectoryProgress
+from eidrive_scenario.storyboard.trajectory import TrajectoryCurve, TrajectoryProgress
 from eidrive_scenario.world.view import ActorState, WorldView
 
 STANDSTILL = 1e-3
@@ -17,7 +17,7 @@ STANDSTILL = 1e-3
 Entity = model.Vehicle | model.Pedestrian | model.MiscObject
 
 
-def is_ours(controller: model.Controller) -> bool:
+def is_agent_controller(controller: model.Controller) -> bool:
     """True for a controller that says `module=eidrive` in its properties."""
     properties = controller.properties.property if controller.properties is not None else ()
     return any(entry.name == "module" and entry.value == "eidrive" for entry in properties)
@@ -72,10 +72,10 @@ class Actor:
     def assign(self, controller: model.Controller) -> None:
         """Give it one more controller."""
         self._controllers = (*self._controllers, controller)
-        self._has_ours = self._has_ours or is_ours(controller)
+        self._has_ours = self._has_ours or is_agent_controller(controller)
 
     @property
-    def trajectory(self) -> Layout | None:
+    def trajectory(self) -> TrajectoryCurve | None:
         """What it is following."""
         return None if self.progress is None else self.progress.layout
 
@@ -94,14 +94,14 @@ class Actor:
     def observe(self, view: WorldView, row: int) -> None:
         """Keep the histories up to date with a new view."""
         state = view.states[row]
-        if state is self._seen and not self.motion.jumped and not self.motion.end_of_road:
+        if state is self._seen and not self.motion.teleported and not self.motion.end_of_road:
             return  # it rests, and has done so before
         self._seen = state
         x, y, speed = state.x, state.y, state.speed
-        if self._last is not None and not self.motion.jumped:
+        if self._last is not None and not self.motion.teleported:
             self.traveled += math.hypot(x - self._last[0], y - self._last[1])
         self._last = (x, y)
-        self.motion.jumped = False
+        self.motion.teleported = False
         if abs(speed) >= STANDSTILL:
             self.standing_since = None
         elif self.standing_since is None:
@@ -114,7 +114,7 @@ class Actor:
             self.motion.pose = pose_of(view, row)
             self.motion.speed = speed
 
-    def look_below(self, roads: RoadNetwork | None, view: WorldView) -> None:
+    def update_off_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
         """Keep up since when it is off the road with its reference point. Lanes `none` are no road."""
         here = None if roads is None else self.location(roads, view.tick)
         if roads is not None and here is not None and _on_road(roads, here):
@@ -122,7 +122,7 @@ class Actor:
         elif self.off_road_since is None:
             self.off_road_since = view.time
 
-    def appear(self) -> None:
+    def enter_world(self) -> None:
         """It enters the world: what has gone on there begins anew."""
         self.present = True
         self.standing_since = self.off_road_since = self.end_of_road_since = None
@@ -135,7 +135,7 @@ class Actor:
             self._found_at = tick
         return self._found
 
-    def forget_location(self) -> None:
+    def invalidate_location(self) -> None:
         """It has just been moved: look its place up anew."""
         self._found_at = -2
 

@@ -13,7 +13,7 @@ from eidrive_scenario.traffic.instances import Centre, Instance
 from eidrive_scenario.world.view import WorldView
 
 
-class StageTraffic:
+class BackgroundTrafficPort:
     """Background traffic of one run; without an instance there is none, and it costs nothing.
 
     centre     where an entity is and moves, None while it is not in the world
@@ -66,10 +66,10 @@ class StageTraffic:
             return
         changes = self.traffic.step(view, dt)
         for name, (spec, placement) in changes.additions.items():
-            commands.additions[name] = placement
-            commands.bodies[name] = spec
+            commands.spawns[name] = placement
+            commands.actor_specs[name] = spec
         commands.removals |= changes.removals
         commands.placements.update(changes.placements)
         for name in changes.additions:
             if name not in changes.placements:
-                commands.placements[name] = replace(commands.additions[name], teleport=True)
+                commands.placements[name] = replace(commands.spawns[name], teleport=True)

@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
 
 MOTION = Domain.LONGITUDINAL | Domain.LATERAL
 
@@ -23,7 +23,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     """One action for one actor (none for global actions).
 
     Configured in the constructor, which raises ScenarioError for what cannot be done; reset in `initialise`, which
-    runs when the action starts; one decision for the step of `stage.dt` seconds in `update`, which answers SUCCESS in
+    runs when the action starts; one decision for the step of `context.dt` seconds in `update`, which answers SUCCESS in
     the step that brings the action to its goal: it ends at the end of that step. In Init the step is 0 s long.
     """
 
@@ -41,14 +41,14 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def __init__(
         self,
         action: model.Element,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(type(action).__name__ if actor is None else f"{type(action).__name__} {actor}")
         self.action = action
-        self.stage = stage
+        self.context = context
         self.actor_name = actor
         self.parent_element = parent
         """The element around the action, where attributes of older or shared types stand (EntityAction)."""
@@ -64,7 +64,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         return False
 
     @property
-    def performer_missing(self) -> bool:
+    def is_actor_missing(self) -> bool:
         """Whether it would move an actor that is not in the world."""
         return bool(self.controls & MOTION) and self.actor_name is not None and not self.actor.present
 
@@ -78,7 +78,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """The actor that the action is about."""
         if self.actor_name is None:
             raise self.problem("has no actor", "put it into a ManeuverGroup with Actors")
-        return self.stage.actors[self.actor_name]
+        return self.context.actors[self.actor_name]
 
     def settle(self) -> None:
         """Finish the start in Init, once all its actions have started: places and speeds are known."""
@@ -102,20 +102,20 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         """The action in words."""
         return type(self.action).__name__
 
-    def give_up(self, who: Absent) -> str:
+    def abort(self, who: EntityAbsentError) -> str:
         """Stop, as somebody whom the action is about is not in the world; why, in words. The run warns of it."""
         self.stop(Status.INVALID)
-        self.stage.release(self)
+        self.context.release(self)
         why = f"{who} is not in the world"
-        self.stage.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").diagnostics
+        self.context.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").diagnostics
         return why
 
     def check_decision(self) -> None:
         """Raise InvalidResult if `update` returned no status, or left its actor with numbers that are not finite."""
         if self.status is Status.INVALID:
             raise InvalidResult(self, "update", "returned no Status (expected RUNNING, SUCCESS or FAILURE)")
-        names = self.stage.actors if self.actor_name is None else (self.actor_name,)
-        for actor in [self.stage.actors[name] for name in names if name in self.stage.actors]:
+        names = self.context.actors if self.actor_name is None else (self.actor_name,)
+        for actor in [self.context.actors[name] for name in names if name in self.context.actors]:
             left: dict[str, object] = {"motion.pose": actor.motion.pose, "motion.speed": actor.motion.speed}
             if actor.goal is not None:
                 left |= {f"goal.{name}": value for name, value in vars(actor.goal).items() if value is not None}

@@ -20,9 +20,9 @@ from eidrive_scenario.storyboard.elements import (
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.init_block import InitBlock
-from eidrive_scenario.storyboard.selections import AnyMember, Selections
-from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.selections import AnyMemberCondition, Selections
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 WRAPPERS = (
     model.Action,
@@ -47,10 +47,10 @@ WRAPPERS = (
 CRITERION = "criteria_"
 """Conditions with such names in the storyboard's stop trigger are criteria, as ScenarioRunner has them."""
 
-Place = tuple[str, ...]
+ElementPath = tuple[str, ...]
 
 
-class Cast(NamedTuple):
+class ActorBindings(NamedTuple):
     """Who acts in a maneuver group: by name, each once, which of them form selections, and whom its act selects."""
 
     actors: Sequence[str]
@@ -61,9 +61,9 @@ class Cast(NamedTuple):
 class Builder:
     """Builds one storyboard. What is wrong with the scenario is gathered, and raised in one go by `build`."""
 
-    def __init__(self, scenario: Scenario, stage: Stage, actions: Registry, conditions: Registry) -> None:
+    def __init__(self, scenario: Scenario, context: RuntimeContext, actions: Registry, conditions: Registry) -> None:
         self._scenario = scenario
-        self._stage = stage
+        self._context = context
         self._actions = actions
         self._conditions = conditions
         self._problems: list[Diagnostic] = []
@@ -73,16 +73,16 @@ class Builder:
     def build(self) -> tuple[InitBlock, StoryboardElement]:
         """The actions of Init and the tree. Raises ScenarioError with all that cannot be executed."""
         storyboard = self._scenario.storyboard
-        init = InitBlock(self._stage, self._init(storyboard.init.actions))
+        init = InitBlock(self._context, self._init(storyboard.init.actions))
         stories = [self._story(story) for story in storyboard.story]
         stop = self._wait("stop", _without_criteria(storyboard.stop_trigger))
-        root = StoryboardElement(self._stage, ("storyboard",), stories, stop=stop)
+        root = StoryboardElement(self._context, ("storyboard",), stories, stop=stop)
         for condition in self._made:
             try:
-                condition.bind(self._stage)
+                condition.bind(self._context)
             except ScenarioError as error:
                 self._problems += error.diagnostics
-        self._problems += self._stage.signals.problems
+        self._problems += self._context.signals.problems
         if self._problems:
             raise ScenarioError(sorted(dict.fromkeys(self._problems), key=lambda p: (p.source, p.line or 0)))
         return init, root
@@ -99,13 +99,13 @@ class Builder:
 
     def _story(self, story: model.Story) -> StoryNode:
         path = (story.name,)
-        return StoryNode(self._stage, path, [self._act(act, path) for act in story.act])
+        return StoryNode(self._context, path, [self._act(act, path) for act in story.act])
 
-    def _act(self, act: model.Act, above: Place) -> ActElement:
+    def _act(self, act: model.Act, above: ElementPath) -> ActElement:
         path = (*above, act.name)
         triggering = TriggeringEntities()
         return ActElement(
-            self._stage,
+            self._context,
             path,
             [self._group(group, path, triggering) for group in act.maneuver_group],
             start=self._wait("start", act.start_trigger),
@@ -113,32 +113,34 @@ class Builder:
             triggering=triggering,
         )
 
-    def _group(self, group: model.ManeuverGroup, above: Place, triggering: TriggeringEntities) -> ManeuverGroupElement:
+    def _group(
+        self, group: model.ManeuverGroup, above: ElementPath, triggering: TriggeringEntities
+    ) -> ManeuverGroupElement:
         path = (*above, group.name)
         members = [self._entities(ref.entity_ref) for ref in group.actors.entity_ref]
         actors = list(dict.fromkeys(name for names in members for name in names))
         selected = triggering if group.actors.select_triggering_entities else None
-        cast = Cast(actors, [names for names in members if len(names) > 1], selected)
+        cast = ActorBindings(actors, [names for names in members if len(names) > 1], selected)
         maneuvers = list(group.maneuver)
         for reference in group.catalog_reference:
             try:
-                maneuvers.append(self._stage.catalog_entry(reference, model.Maneuver, group))
+                maneuvers.append(self._context.catalog_entry(reference, model.Maneuver, group))
             except ScenarioError as error:
                 self._problems += error.diagnostics
         children = [self._maneuver(maneuver, path, cast) for maneuver in maneuvers]
-        return ManeuverGroupElement(self._stage, path, children, limit=group.maximum_execution_count)
+        return ManeuverGroupElement(self._context, path, children, limit=group.maximum_execution_count)
 
-    def _maneuver(self, maneuver: model.Maneuver, above: Place, cast: Cast) -> ManeuverElement:
+    def _maneuver(self, maneuver: model.Maneuver, above: ElementPath, cast: ActorBindings) -> ManeuverElement:
         path = (*above, maneuver.name)
         events = tuple(self._event(event, path, cast) for event in maneuver.event)
-        EventElement.compete(events)
-        return ManeuverElement(self._stage, path, events)
+        EventElement.resolve_priorities(events)
+        return ManeuverElement(self._context, path, events)
 
-    def _event(self, event: model.Event, above: Place, cast: Cast) -> EventElement:
+    def _event(self, event: model.Event, above: ElementPath, cast: ActorBindings) -> EventElement:
         path = (*above, event.name)
         limit = 1 if event.maximum_execution_count is None else event.maximum_execution_count
         return EventElement(
-            self._stage,
+            self._context,
             path,
             [self._action(action, path, cast) for action in event.action],
             priority=event.priority.value,
@@ -146,10 +148,10 @@ class Builder:
             limit=limit,
         )
 
-    def _action(self, action: model.Action, above: Place, cast: Cast) -> ActionElement:
+    def _action(self, action: model.Action, above: ElementPath, cast: ActorBindings) -> ActionElement:
         private = action.private_action is not None
         return ActionElement(
-            self._stage,
+            self._context,
             (*above, action.name),
             lambda actor: self._behaviours(action, actor),
             cast.actors if private else (None,),
@@ -167,7 +169,7 @@ class Builder:
                 one = self._selections.single(leaf)
                 for around in [one] if parent is leaf else self._selections.alternatives(parent):
                     made = construct(
-                        self._actions.load(name, ActionBehaviour), one, self._stage, actor=actor, parent=around
+                        self._actions.load(name, ActionBehaviour), one, self._context, actor=actor, parent=around
                     )
                     if not isinstance(made, ActionBehaviour):
                         raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
@@ -176,16 +178,16 @@ class Builder:
                 self._problems += error.diagnostics
         return behaviours
 
-    def _wait(self, name: str, trigger: model.Trigger | None) -> WaitFor | None:
+    def _wait(self, name: str, trigger: model.Trigger | None) -> WaitForTrigger | None:
         if trigger is None or not trigger.condition_group:
             return None
         groups = []
         for group in trigger.condition_group:
             monitors = [monitor for entry in group.condition if (monitor := self._monitor(entry)) is not None]
             groups.append(ConditionGroup(tuple(monitors)))
-        return WaitFor(name, Trigger(groups), self._stage)
+        return WaitForTrigger(name, Trigger(groups), self._context)
 
-    def _monitor(self, entry: model.Condition) -> ConditionMonitor | None:
+    def _monitor(self, entry: model.Condition) -> ConditionEvaluator | None:
         try:
             condition = self._condition(entry)
         except ScenarioError as error:
@@ -194,7 +196,7 @@ class Builder:
         if condition is None:
             return None
         self._made.append(condition)
-        return ConditionMonitor(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
+        return ConditionEvaluator(condition, name=entry.name, edge=entry.condition_edge.value, delay=entry.delay)
 
     def _condition(self, entry: model.Condition) -> Condition | None:
         by_entity = entry.by_entity_condition
@@ -215,7 +217,7 @@ class Builder:
         towards = [construct(make, one, names, rule) for one in self._selections.alternatives(leaf)]
         if not all(isinstance(one, EntityCondition) for one in towards):
             raise wrong
-        return towards[0] if len(towards) == 1 else AnyMember(leaf, names, rule, towards)
+        return towards[0] if len(towards) == 1 else AnyMemberCondition(leaf, names, rule, towards)
 
     def _known(self, name: str, registry: Registry, leaf: model.Element, otherwise: str) -> bool:
         """Whether something of that name is registered; if not, that is a problem."""

@@ -47,8 +47,8 @@ class Commands:
 
     placements: dict[str, Placement] = field(default_factory=dict)
     goals: dict[str, Goal] = field(default_factory=dict)
-    additions: dict[str, Placement] = field(default_factory=dict)
-    bodies: dict[str, ActorSpec] = field(default_factory=dict)
+    spawns: dict[str, Placement] = field(default_factory=dict)
+    actor_specs: dict[str, ActorSpec] = field(default_factory=dict)
     removals: set[str] = field(default_factory=set)
     driven: frozenset[str] = frozenset()
     overrides: Mapping[str, Overrides] = field(default_factory=dict)

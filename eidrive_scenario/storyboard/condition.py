@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 TOLERANCE = 1e-6
 """Two numbers nearer than this are equal to a Rule."""
@@ -29,7 +29,7 @@ COMPLEMENTS = {">": "≤", "≥": "<", "<": "≥", "≤": ">", "=": "≠", "≠"
 """By sign, the one that holds where it does not."""
 
 
-def compares(value: float, rule: model.Rule, limit: float) -> bool:
+def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
     """`value` against `limit` by a Rule of the standard; NaN compares to nothing."""
     if value != value:
         return False
@@ -49,7 +49,7 @@ def compares(value: float, rule: model.Rule, limit: float) -> bool:
     raise ValueError(f"unknown rule {rule!r}")
 
 
-def in_words(rule: model.Rule) -> str:
+def describe_rule(rule: model.Rule) -> str:
     """A Rule as the sign that one would write."""
     return WORDS[rule.value]
 
@@ -80,22 +80,22 @@ class Condition(ABC):
     def __init__(self, element: model.Element) -> None:
         self.element = element
 
-    def bind(self, stage: Stage) -> None:  # noqa: B027 - most refer to nothing
+    def bind(self, context: RuntimeContext) -> None:  # noqa: B027 - most refer to nothing
         """Look up what the element refers to, once, before the first tick. Raises ScenarioError."""
 
     @abstractmethod
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """True where the condition holds now."""
 
     @abstractmethod
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """The condition in words, with the values of now."""
 
     def describe(self) -> str:
         """The condition in words, without values."""
         return type(self.element).__name__
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """The quantities that it compares now, if it compares any."""
         return ()
 
@@ -129,21 +129,21 @@ class EntityCondition(Condition):
         self.fulfilled: tuple[str, ...] = ()
         """The entities that fulfilled it when it was last asked."""
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
-        holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, stage.view
-        self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(stage, name)])
+        holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, context.view
+        self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(context, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
 
-    def _checked_holds_for(self, stage: Stage, entity: str) -> bool:
-        held: object = self.holds_for(stage, entity)
+    def _checked_holds_for(self, context: RuntimeContext, entity: str) -> bool:
+        held: object = self.holds_for(context, entity)
         return held if held is True or held is False else truth(self, held)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """What is true of those that fulfil it, or of all."""
         names = self.fulfilled or self.entities
         return ", ".join(
-            self.explain_for(stage, name) if name in stage.view else f"{name} is not in the world" for name in names
+            self.explain_for(context, name) if name in context.view else f"{name} is not in the world" for name in names
         )
 
     def describe(self) -> str:
@@ -151,12 +151,12 @@ class EntityCondition(Condition):
         joined = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
         return f"{joined}: {self.describe_for()}"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """The quantity of each entity that is in the world."""
-        found = [(name, self.quantity(stage, name)) for name in self.entities if name in stage.view]
+        found = [(name, self.quantity(context, name)) for name in self.entities if name in context.view]
         return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in found if value is not None)
 
-    def quantity(self, stage: Stage, entity: str) -> float | None:
+    def quantity(self, context: RuntimeContext, entity: str) -> float | None:
         """What it compares for this entity, which is in the world; NaN where that is undefined now, None if nothing."""
         return None
 
@@ -166,11 +166,11 @@ class EntityCondition(Condition):
         return element.rule, element.value
 
     @abstractmethod
-    def holds_for(self, stage: Stage, entity: str) -> bool:
+    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
         """True where the condition holds for this entity, which is in the world."""
 
     @abstractmethod
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """The condition in words for this entity, with the values of now."""
 
     def describe_for(self) -> str:
@@ -181,29 +181,29 @@ class EntityCondition(Condition):
 class QuantityCondition(EntityCondition):
     """A condition that compares a quantity of each entity with a limit."""
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
+    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
         """Compare it."""
         rule, limit = self.threshold()
-        return compares(self.quantity(stage, entity), rule, limit)
+        return satisfies_rule(self.quantity(context, entity), rule, limit)
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """The quantity, the limit, and how they compare; on a falling edge that is not what the rule asks for."""
         rule, limit = self.threshold()
-        quantity = self.quantity(stage, entity)
+        quantity = self.quantity(context, entity)
         if quantity != quantity:
-            return f"{entity}: {self.what()} undefined, not {in_words(rule)} {limit:g} {self.unit}"
-        sign = relation(rule, compares(quantity, rule, limit))
+            return f"{entity}: {self.what()} undefined, not {describe_rule(rule)} {limit:g} {self.unit}"
+        sign = relation(rule, satisfies_rule(quantity, rule, limit))
         return f"{entity}: {self.what()} {quantity:.2f} {self.unit} {sign} {limit:g} {self.unit}"
 
     def describe_for(self) -> str:
         """The quantity by its name, the rule and the limit."""
         rule, limit = self.threshold()
-        return f"{self.what()} {in_words(rule)} {limit:g} {self.unit}"
+        return f"{self.what()} {describe_rule(rule)} {limit:g} {self.unit}"
 
     def what(self) -> str:
         """What the quantity is called."""
         return type(self.element).__name__
 
     @abstractmethod
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """What it compares for this entity, which is in the world; NaN where that is undefined now."""

@@ -7,8 +7,8 @@ import math
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
@@ -24,10 +24,10 @@ CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
 """The ways that an algorithm chooses, where it is not the shortest."""
 
 
-def box_of(stage: Stage, name: str) -> Box:
+def entity_box(context: RuntimeContext, name: str) -> Box:
     """The bounding box of an actor where it stands now."""
-    pose = stage.pose(name)
-    bounds = stage.actors[name].entity.bounding_box
+    pose = context.pose(name)
+    bounds = context.actors[name].entity.bounding_box
     centre, size = bounds.center, bounds.dimensions
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     return (
@@ -41,22 +41,22 @@ def box_of(stage: Stage, name: str) -> Box:
     )
 
 
-def kind_of(kind: model.RelativeDistanceType | None) -> str:
+def resolve_distance_type(kind: model.RelativeDistanceType | None) -> str:
     """longitudinal, lateral or euclidianDistance, which is what a missing word means."""
     if kind is None or kind is model.RelativeDistanceType.CARTESIAN_DISTANCE:
         return "euclidianDistance"
     return str(kind.value)
 
 
-def frame_of(system: model.CoordinateSystem | None) -> str:
+def resolve_coordinate_system(system: model.CoordinateSystem | None) -> str:
     """entity (also where none is said), lane, road, trajectory or world."""
     return "entity" if system is None else str(system.value)
 
 
 def distance(
-    stage: Stage,
+    context: RuntimeContext,
     a: str,
-    b: str | Place,
+    b: str | ResolvedPosition,
     *,
     frame: str,
     kind: str,
@@ -71,34 +71,34 @@ def distance(
     it follows; without one ahead.
     """
     if kind == "euclidianDistance":
-        return _straight(stage, a, b, freespace)
-    here = Place(stage.pose(a), stage.location(a) if frame in ("lane", "road") else None)
-    along, across = _offsets(stage, a, here, b, frame, algorithm)
+        return _straight(context, a, b, freespace)
+    here = ResolvedPosition(context.pose(a), context.location(a) if frame in ("lane", "road") else None)
+    along, across = _offsets(context, a, here, b, frame, algorithm)
     value = along if kind == "longitudinal" else across
     if not freespace or math.isnan(value):
         return value
-    return _between(stage, a, b, frame, kind, value)
+    return _between(context, a, b, frame, kind, value)
 
 
-def same_way(stage: Stage, a: str, b: str, frame: str) -> float:
+def same_way(context: RuntimeContext, a: str, b: str, frame: str) -> float:
     """Return +1.0 where actor `b` points the way that `a` does, -1.0 where it comes towards it or away from it.
 
     In the frames of lane and road that is along the road between them, else by their headings.
     """
-    turn = stage.pose(b).h - stage.pose(a).h
-    if frame in ("lane", "road") and stage.roads is not None:
-        here, there = stage.location(a), stage.location(b)
-        runs = None if here is None or there is None else stage.roads.orientation(here, there)
+    turn = context.pose(b).h - context.pose(a).h
+    if frame in ("lane", "road") and context.roads is not None:
+        here, there = context.location(a), context.location(b)
+        runs = None if here is None or there is None else context.roads.orientation(here, there)
         if runs is not None and here is not None and there is not None:
-            lines = [stage.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
+            lines = [context.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
             turn += lines[0] - lines[1] + (0.0 if runs > 0 else math.pi)
     return 1.0 if math.cos(turn) >= 0.0 else -1.0
 
 
 def closing_speed(
-    stage: Stage,
+    context: RuntimeContext,
     a: str,
-    b: str | Place,
+    b: str | ResolvedPosition,
     *,
     frame: str,
     kind: str,
@@ -109,68 +109,73 @@ def closing_speed(
     NaN where the frame gives no distance. Both keep their velocities of this view, along roads and trajectories too; a
     place does not move.
     """
-    mine, theirs = _velocity(stage, a), _velocity(stage, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
-    here, there = Place(stage.pose(a), stage.location(a)), _place(stage, b)
+    mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
+    here, there = ResolvedPosition(context.pose(a), context.location(a)), _place(context, b)
     if kind == "euclidianDistance":
         apart = math.dist(here.pose[:3], there.pose[:3])
         ways = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
         return sum((b - a) * (v - w) for a, b, v, w in ways) / apart if apart > 0.0 else 0.0
     axis = 0 if kind == "longitudinal" else 1
-    now = _offsets(stage, a, here, there, frame, algorithm)[axis]
-    moved = _moved(stage, here, mine), _moved(stage, there, theirs)
-    then = _offsets(stage, a, *moved, frame, algorithm)[axis]
+    now = _offsets(context, a, here, there, frame, algorithm)[axis]
+    moved = _moved(context, here, mine), _moved(context, there, theirs)
+    then = _offsets(context, a, *moved, frame, algorithm)[axis]
     return math.copysign(1.0, now) * (now - then) / INSTANT
 
 
-def _velocity(stage: Stage, name: str) -> tuple[float, float, float]:
-    x, y, z = stage.view.velocity[stage.view.row(name)].tolist()
+def _velocity(context: RuntimeContext, name: str) -> tuple[float, float, float]:
+    x, y, z = context.view.velocity[context.view.row(name)].tolist()
     return x, y, z
 
 
-def _moved(stage: Stage, place: Place, velocity: tuple[float, float, float]) -> Place:
+def _moved(context: RuntimeContext, place: ResolvedPosition, velocity: tuple[float, float, float]) -> ResolvedPosition:
     """Where somebody is an instant later."""
     x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
-    location = stage.roads.locate_at(x, y, place.location) if stage.roads is not None else None
-    return Place(place.pose._replace(x=x, y=y), location)
+    location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
+    return ResolvedPosition(place.pose._replace(x=x, y=y), location)
 
 
-def _place(stage: Stage, target: str | Place) -> Place:
-    return Place(_pose(stage, target), _location(stage, target))
+def _place(context: RuntimeContext, target: str | ResolvedPosition) -> ResolvedPosition:
+    return ResolvedPosition(_pose(context, target), _location(context, target))
 
 
-def _straight(stage: Stage, a: str, b: str | Place, freespace: bool) -> float:
+def _straight(context: RuntimeContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
     if not freespace:
-        return math.dist(stage.pose(a)[:3], _pose(stage, b)[:3])
+        return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
     if isinstance(b, str):
-        return box_distance(box_of(stage, a), box_of(stage, b))
+        return box_distance(entity_box(context, a), entity_box(context, b))
     point: Box = (b.pose.x, b.pose.y, b.pose.z, 0.0, 0.0, 0.0, 0.0)
-    return box_distance(box_of(stage, a), point)
+    return box_distance(entity_box(context, a), point)
 
 
 def _offsets(
-    stage: Stage, a: str, mine: Place, b: str | Place, frame: str, algorithm: model.RoutingAlgorithm | None
+    context: RuntimeContext,
+    a: str,
+    mine: ResolvedPosition,
+    b: str | ResolvedPosition,
+    frame: str,
+    algorithm: model.RoutingAlgorithm | None,
 ) -> tuple[float, float]:
     """How far `b` is ahead and to the left of actor `a`, where that stands at `mine` [m]."""
-    here, there = mine.pose, _pose(stage, b)
-    if frame in ("lane", "road") and stage.roads is not None:
-        start, end = mine.location, _location(stage, b)
+    here, there = mine.pose, _pose(context, b)
+    if frame in ("lane", "road") and context.roads is not None:
+        start, end = mine.location, _location(context, b)
         if start is None or end is None:
             return math.nan, math.nan
         if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:
-            route = stage.actors[a].motion.route
-            found = None if route is None else stage.roads.distance(start, end, route=route)
+            route = context.actors[a].motion.route
+            found = None if route is None else context.roads.distance(start, end, route=route)
         else:
-            found = stage.roads.distance(start, end, CHAINS.get(algorithm, "shortest"))
+            found = context.roads.distance(start, end, CHAINS.get(algorithm, "shortest"))
         if found is None:
             return math.nan, math.nan
-        lane = stage.roads.pose(start)
+        lane = context.roads.pose(start)
         sign = 1.0 if math.cos(here.h - lane.h) >= 0.0 else -1.0
         return found[0] * sign, found[1] * sign
     if frame == "world":
         return there.x - here.x, there.y - here.y
-    progress = stage.actors[a].progress if frame == "trajectory" else None
+    progress = context.actors[a].progress if frame == "trajectory" else None
     if progress is not None:
-        return _along(progress, progress.at(stage.view.tick), here, there)
+        return _along(progress, progress.at(context.view.tick), here, there)
     dx, dy = there.x - here.x, there.y - here.y
     cos, sin = math.cos(here.h), math.sin(here.h)
     return dx * cos + dy * sin, dy * cos - dx * sin
@@ -185,20 +190,20 @@ def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose
     origin, tangent = trajectory.extended(station), trajectory.tangent(station)
     dx, dy, cos, sin = here.x - origin.x, here.y - origin.y, math.cos(tangent), math.sin(tangent)
     s, t = station + dx * cos + dy * sin, dy * cos - dx * sin
-    other_s, other_t = trajectory.beside(there.x, there.y, s)
+    other_s, other_t = trajectory.project(there.x, there.y, s)
     along = other_s - s
     if trajectory.closed and trajectory.length > 0.0:
         along = math.remainder(along, trajectory.length)
     return along * progress.way, (other_t - t) * progress.way
 
 
-def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value: float) -> float:
+def _between(context: RuntimeContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float) -> float:
     """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
-    axis = _axis(stage, a, frame)
-    mine = _reach(stage, a, axis, frame, kind)
+    axis = _axis(context, a, frame)
+    mine = _reach(context, a, axis, frame, kind)
     if isinstance(b, str):
-        like = axis if frame in ("entity", "world") else _axis(stage, b, frame, like=axis)
-        theirs = _reach(stage, b, like, frame, kind)
+        like = axis if frame in ("entity", "world") else _axis(context, b, frame, like=axis)
+        theirs = _reach(context, b, like, frame, kind)
     else:
         theirs = (0.0, 0.0)
     if value + theirs[0] > mine[1]:
@@ -208,29 +213,29 @@ def _between(stage: Stage, a: str, b: str | Place, frame: str, kind: str, value:
     return 0.0
 
 
-def _axis(stage: Stage, name: str, frame: str, like: float | None = None) -> float:
+def _axis(context: RuntimeContext, name: str, frame: str, like: float | None = None) -> float:
     """Heading of the longitudinal axis at an actor; turned round where it would point against `like`."""
     if frame == "world":
         return 0.0
-    heading = stage.pose(name).h
-    if frame in ("lane", "road") and stage.roads is not None:
-        here = stage.location(name)
+    heading = context.pose(name).h
+    if frame in ("lane", "road") and context.roads is not None:
+        here = context.location(name)
         if here is not None:
-            lane = stage.roads.pose(here).h
+            lane = context.roads.pose(here).h
             heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
     if like is not None and math.cos(heading - like) < 0.0:
         heading += math.pi
     return heading
 
 
-def _reach(stage: Stage, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
+def _reach(context: RuntimeContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
     """How far the box of an actor reaches from its reference point along an axis or the road: least and most [m]."""
-    if frame in ("lane", "road") and stage.roads is not None:
-        here = stage.location(name)
-        if here is not None and stage.roads.curvature(here.road, here.s) != 0.0:
-            return _reach_along(stage, stage.roads, name, here, axis, kind)
-    bounds = stage.actors[name].entity.bounding_box
-    turn = stage.pose(name).h - axis
+    if frame in ("lane", "road") and context.roads is not None:
+        here = context.location(name)
+        if here is not None and context.roads.curvature(here.road, here.s) != 0.0:
+            return _reach_along(context, context.roads, name, here, axis, kind)
+    bounds = context.actors[name].entity.bounding_box
+    turn = context.pose(name).h - axis
     cos, sin = math.cos(turn), math.sin(turn)
     x, y = bounds.center.x, bounds.center.y
     length, width = 0.5 * bounds.dimensions.length, 0.5 * bounds.dimensions.width
@@ -242,10 +247,10 @@ def _reach(stage: Stage, name: str, axis: float, frame: str, kind: str) -> tuple
 
 
 def _reach_along(
-    stage: Stage, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
+    context: RuntimeContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
 ) -> tuple[float, float]:
     """The reach along a road that bends: from corner to corner of the box in road coordinates."""
-    x, y, _, length, width, _, yaw = box_of(stage, name)
+    x, y, _, length, width, _, yaw = entity_box(context, name)
     cos, sin = math.cos(yaw), math.sin(yaw)
     sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
     reached = []
@@ -258,13 +263,13 @@ def _reach_along(
     return min(reached, default=0.0), max(reached, default=0.0)
 
 
-def _pose(stage: Stage, target: str | Place) -> Pose:
-    return stage.pose(target) if isinstance(target, str) else target.pose
+def _pose(context: RuntimeContext, target: str | ResolvedPosition) -> Pose:
+    return context.pose(target) if isinstance(target, str) else target.pose
 
 
-def _location(stage: Stage, target: str | Place) -> LaneLocation | None:
+def _location(context: RuntimeContext, target: str | ResolvedPosition) -> LaneLocation | None:
     if isinstance(target, str):
-        return stage.location(target)
-    if target.location is None and stage.roads is not None:
-        return stage.roads.locate_at(target.pose.x, target.pose.y)
+        return context.location(target)
+    if target.location is None and context.roads is not None:
+        return context.roads.locate_at(target.pose.x, target.pose.y)
     return target.location

@@ -1,11 +1,13 @@
-"""The state machine of the standard: storyboard, stories, acts, maneuver groups, maneuvers, events, actions.
+"""State machines of the storyboard elements: storyboard, story, act, maneuver group, maneuver, event, action.
 
-A tick (`play`) begins with the actions that the last step brought to their goal: they end, and with them, from the
-bottom up, what has nothing left to do. Then two phases take turns. The triggers judge (`judge`): elements stop and
-start, from the top down, as far as they come. The running actions decide on the next step (`decide`), each once; those
-that only set a value end at once. Where a phase changed a state the triggers judge again, so that a chain of elements
-falls through in one tick: no transition consumes simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1).
-An element starts at most once in a tick, which bounds the turns.
+`tick_tree` executes one tick:
+
+1. Actions that the last step completed end, and with them, bottom up, the elements whose children are complete.
+2. `evaluate_triggers` stops and starts elements, top down.
+3. `update_children` lets each running action decide on the next step, once per tick. Actions that only set a value end.
+
+Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
+simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1). An element starts at most once in a tick, which bounds the loop.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from eidrive_scenario.storyboard.progress import ElementRecord
-from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.states import State, Transition
-from eidrive_scenario.storyboard.trigger import WaitFor
+from eidrive_scenario.storyboard.element_states import ElementRecord
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition
+from eidrive_scenario.storyboard.trigger import WaitForTrigger
 
 EMPTY = "it has no start trigger"
 
@@ -35,120 +37,129 @@ class StoryElement(Composite):
 
     def __init__(
         self,
-        stage: Stage,
+        context: RuntimeContext,
         path: tuple[str, ...],
         children: Sequence[StoryElement] = (),
         *,
-        start: WaitFor | None = None,
-        stop: WaitFor | None = None,
+        start: WaitForTrigger | None = None,
+        stop: WaitForTrigger | None = None,
         limit: int = 1,
     ) -> None:
         self.start_leaf, self.stop_leaf = start, stop
         leaves: list[Behaviour] = [leaf for leaf in (start, stop) if leaf is not None]
         super().__init__(path[-1], [*leaves, *children])
-        self.stage = stage
+        self.context = context
         self.elements = tuple(children)
         self.limit = limit
         self.executions = 0
         self._tried_at: int | None = None
         """The tick in which it last started or was skipped."""
-        self.record: ElementRecord = stage.progress.enrol(self.kind, path)
+        self.record: ElementRecord = context.progress.register(self.kind, path)
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> ElementState | None:
         """None while those above it do not run."""
         return self.record.state
 
-    def stand_by(self) -> None:
+    def enter_standby(self) -> None:
         """Wait for the start trigger; the parent has begun to run. What may never be executed is complete."""
         self.executions = 0
         self._arm()
         if self.limit < 1:
-            self._change(Transition.SKIP, State.COMPLETE, "its maximumExecutionCount is 0")
+            self._change(ElementTransition.SKIP, ElementState.COMPLETE, "its maximumExecutionCount is 0")
 
-    def judge(self) -> None:
+    def evaluate_triggers(self) -> None:
         """First phase of a turn: stop, start, and let the children do the same.
 
         A stop trigger is asked from the tick after the start on, that of the storyboard from the first tick.
         """
         record = self.record
-        if record.state is State.COMPLETE:
+        if record.state is ElementState.COMPLETE:
             return
-        tried = self._tried_at == self.stage.progress.tick
-        if record.state is State.RUNNING and not tried and self.stop_leaf is not None and self.stop_leaf.fires():
-            self.halt(self.stop_leaf.trigger.why)
+        tried = self._tried_at == self.context.progress.tick
+        if (
+            record.state is ElementState.RUNNING
+            and not tried
+            and self.stop_leaf is not None
+            and self.stop_leaf.is_fired()
+        ):
+            self.stop_element(self.stop_leaf.trigger.why)
             return
-        if record.state is State.STANDBY and not tried and (self.start_leaf is None or self.start_leaf.fires()):
-            self.begin(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
-        if record.state is State.RUNNING:
+        if (
+            record.state is ElementState.STANDBY
+            and not tried
+            and (self.start_leaf is None or self.start_leaf.is_fired())
+        ):
+            self.start(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
+        if record.state is ElementState.RUNNING:
             for element in self.elements:
-                if element.record.state is not State.COMPLETE:
-                    element.judge()
+                if element.record.state is not ElementState.COMPLETE:
+                    element.evaluate_triggers()
 
-    def begin(self, why: str = "") -> None:
+    def start(self, why: str = "") -> None:
         """standby -> running; the children stand by, or start where they have no trigger."""
-        self._tried_at = self.stage.progress.tick
+        self._tried_at = self.context.progress.tick
         self.executions += 1
-        self._change(Transition.START, State.RUNNING, why)
+        self._change(ElementTransition.START, ElementState.RUNNING, why)
         for element in self.elements:
-            element.stand_by()
+            element.enter_standby()
 
-    def halt(self, why: str = "") -> None:
+    def stop_element(self, why: str = "") -> None:
         """Stop at once, with all that is below."""
         for element in self.elements:
-            if element.state in (State.STANDBY, State.RUNNING):
-                element.halt(why)
-        self._change(Transition.STOP, State.COMPLETE, why)
+            if element.state in (ElementState.STANDBY, ElementState.RUNNING):
+                element.stop_element(why)
+        self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
         self.stop(Status.INVALID)
 
-    def finish(self) -> None:
+    def end(self) -> None:
         """running -> complete, or standby where it may be executed again."""
         if self.executions < self.limit:
-            self._change(Transition.END, State.STANDBY)
+            self._change(ElementTransition.END, ElementState.STANDBY)
             self._arm()
         else:
-            self._change(Transition.END, State.COMPLETE)
+            self._change(ElementTransition.END, ElementState.COMPLETE)
 
-    def arrive(self) -> None:
+    def complete_finished(self) -> None:
         """What the last step brought to its goal ends."""
-        if self.state is State.RUNNING:
+        if self.state is ElementState.RUNNING:
             for element in self.elements:
-                element.arrive()
-            self.settle()
+                element.complete_finished()
+            self.complete_if_done()
 
-    def decide(self) -> None:
+    def update_children(self) -> None:
         """Second phase of a turn: the running children decide; all of them complete, so is this one."""
         self.status = Status.RUNNING
-        if self.record.state is State.RUNNING:
+        if self.record.state is ElementState.RUNNING:
             for element in self.elements:
-                if element.record.state is State.RUNNING:
-                    element.decide()
-            self.settle()
-        if self.record.state is State.COMPLETE:
+                if element.record.state is ElementState.RUNNING:
+                    element.update_children()
+            self.complete_if_done()
+        if self.record.state is ElementState.COMPLETE:
             self.status = Status.SUCCESS
 
     def tick(self) -> Iterator[Behaviour]:
-        """`decide` as py_trees asks for it."""
-        self.decide()
+        """`update_children` as py_trees asks for it."""
+        self.update_children()
         yield self
 
-    def settle(self) -> None:
+    def complete_if_done(self) -> None:
         """End if all children are complete; what has none has no end of its own, and runs until it is stopped."""
-        if self.record.state is not State.RUNNING or not self.elements:
+        if self.record.state is not ElementState.RUNNING or not self.elements:
             return
         for element in self.elements:
-            if element.record.state is not State.COMPLETE:
+            if element.record.state is not ElementState.COMPLETE:
                 return
-        self.finish()
+        self.end()
 
     def _arm(self) -> None:
         for leaf in (self.start_leaf, self.stop_leaf):
             if leaf is not None:
                 leaf.stop(Status.INVALID)
-        self._change(None, State.STANDBY)
+        self._change(None, ElementState.STANDBY)
 
-    def _change(self, transition: Transition | None, after: State, why: str = "") -> None:
-        self.stage.progress.change(self.record, transition, after, why)
+    def _change(self, transition: ElementTransition | None, after: ElementState, why: str = "") -> None:
+        self.context.progress.change(self.record, transition, after, why)
 
 
 class StoryboardElement(StoryElement):
@@ -156,35 +167,35 @@ class StoryboardElement(StoryElement):
 
     kind = "storyboard"
 
-    def play(self, init: Behaviour | None = None) -> None:
+    def tick_tree(self, init: Behaviour | None = None) -> None:
         """One tick of the whole tree, and of the actions that Init left running."""
-        progress = self.stage.progress
+        progress = self.context.progress
         if self.state is None:
-            self.stand_by()
-            self.begin()
+            self.enter_standby()
+            self.start()
             self._tried_at = None
-        if self.stage.arriving:
-            self.stage.arriving = False
-            self.arrive()
+        if self.context.completes_this_step:
+            self.context.completes_this_step = False
+            self.complete_finished()
         seen = -1
         while seen != len(progress.changes):
             seen = len(progress.changes)
-            self.judge()
-            if self.state is not State.RUNNING:
+            self.evaluate_triggers()
+            if self.state is not ElementState.RUNNING:
                 return
             if init is not None:
                 init.tick_once()
                 init = None
-            self.decide()
+            self.update_children()
             if seen == len(progress.changes):
-                waiting, self.stage.waiting = self.stage.waiting, []
+                waiting, self.context.pending_actions = self.context.pending_actions, []
                 for action in waiting:
-                    action.give_up()
+                    action.abort()
 
-    def settle(self) -> None:
+    def complete_if_done(self) -> None:
         """End with the last story, if nothing else would end the storyboard."""
         if self.stop_leaf is None:
-            super().settle()
+            super().complete_if_done()
 
 
 class StoryNode(StoryElement):
@@ -207,22 +218,22 @@ class ActElement(StoryElement):
 
     def __init__(
         self,
-        stage: Stage,
+        context: RuntimeContext,
         path: tuple[str, ...],
         groups: Sequence[ManeuverGroupElement],
         *,
-        start: WaitFor | None = None,
-        stop: WaitFor | None = None,
+        start: WaitForTrigger | None = None,
+        stop: WaitForTrigger | None = None,
         triggering: TriggeringEntities | None = None,
     ) -> None:
-        super().__init__(stage, path, groups, start=start, stop=stop)
+        super().__init__(context, path, groups, start=start, stop=stop)
         self._triggering = triggering or TriggeringEntities()
 
-    def begin(self, why: str = "") -> None:
+    def start(self, why: str = "") -> None:
         """standby -> running; whoever triggered it acts in it."""
         if self.start_leaf is not None:
             self._triggering.names = self.start_leaf.trigger.triggering
-        super().begin(why)
+        super().start(why)
 
 
 class ManeuverGroupElement(StoryElement):

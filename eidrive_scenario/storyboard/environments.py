@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.world.environment import Environment
 
 
-def changed(before: Environment, given: model.Environment, now: float) -> Environment:
+def merge_environment(before: Environment, given: model.Environment, now: float) -> Environment:
     """What holds after an EnvironmentAction at `now` [s]. A time of day that it gives starts the clock anew."""
     after = replace(before, name=given.name)
     if given.time_of_day is not None:

@@ -8,9 +8,9 @@ from py_trees.common import Status
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.elements import StoryElement, TriggeringEntities
-from eidrive_scenario.storyboard.stage import Absent, Holder, Stage
-from eidrive_scenario.storyboard.states import State, Transition
-from eidrive_scenario.storyboard.trigger import WaitFor
+from eidrive_scenario.storyboard.runtime_context import DomainHolder, EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition
+from eidrive_scenario.storyboard.trigger import WaitForTrigger
 
 
 class EventElement(StoryElement):
@@ -25,46 +25,46 @@ class EventElement(StoryElement):
 
     def __init__(
         self,
-        stage: Stage,
+        context: RuntimeContext,
         path: tuple[str, ...],
         actions: Sequence[ActionElement],
         *,
         priority: str,
-        start: WaitFor | None = None,
+        start: WaitForTrigger | None = None,
         limit: int = 1,
     ) -> None:
-        super().__init__(stage, path, actions, start=start, limit=limit)
+        super().__init__(context, path, actions, start=start, limit=limit)
         self.priority = priority
         self._running: dict[EventElement, None] = {}
         """The running events of the maneuver, in the order in which they started."""
 
-    def begin(self, why: str = "") -> None:
+    def start(self, why: str = "") -> None:
         """Start by priority."""
-        self._tried_at = self.stage.progress.tick
+        self._tried_at = self.context.progress.tick
         alone = self.priority == "parallel"
         running = [] if alone else list(self._running)
         if running and self.priority == "skip":
             self.executions += 1
-            after = State.STANDBY if self.executions < self.limit else State.COMPLETE
-            self._change(Transition.SKIP, after, f"{running[0].name} is running")
+            after = ElementState.STANDBY if self.executions < self.limit else ElementState.COMPLETE
+            self._change(ElementTransition.SKIP, after, f"{running[0].name} is running")
             return
         if self.priority in ("override", "overwrite"):
             for rival in running:
-                rival.halt(f"{self.name} overrides it")
+                rival.stop_element(f"{self.name} overrides it")
         self.executions += 1
-        self._change(Transition.START, State.RUNNING, why)
+        self._change(ElementTransition.START, ElementState.RUNNING, why)
         for action in sorted(self.elements, key=_takes_time):
-            action.begin()
+            action.start()
 
-    def _change(self, transition: Transition | None, after: State, why: str = "") -> None:
+    def _change(self, transition: ElementTransition | None, after: ElementState, why: str = "") -> None:
         super()._change(transition, after, why)
-        if after is State.RUNNING:
+        if after is ElementState.RUNNING:
             self._running[self] = None
         else:
             self._running.pop(self, None)
 
     @staticmethod
-    def compete(events: Iterable[EventElement]) -> None:
+    def resolve_priorities(events: Iterable[EventElement]) -> None:
         """Let the priorities of these events count against each other."""
         running: dict[EventElement, None] = {}
         for event in events:
@@ -81,7 +81,7 @@ class ActionElement(StoryElement):
 
     def __init__(
         self,
-        stage: Stage,
+        context: RuntimeContext,
         path: tuple[str, ...],
         make: Callable[[str | None], list[ActionBehaviour]],
         actors: Sequence[str | None],
@@ -89,7 +89,7 @@ class ActionElement(StoryElement):
         triggering: TriggeringEntities | None = None,
         selections: Sequence[Collection[str]] = (),
     ) -> None:
-        super().__init__(stage, path)
+        super().__init__(context, path)
         self._make = make
         self._selections = selections
         self.triggering = triggering
@@ -99,7 +99,7 @@ class ActionElement(StoryElement):
         self.running: list[ActionBehaviour] = []
         self._there: list[ActionBehaviour] = []
         """Those that the step which goes on brings to their goal; they hold their domains until they are there."""
-        self._waiting: dict[Holder, tuple[ActionBehaviour, Absent]] = {}
+        self._waiting: dict[DomainHolder, tuple[ActionBehaviour, EntityAbsentError]] = {}
         """Those that start at this instant, but for somebody who is not in the world, and may be when all is done."""
         self._decided_at: int | None = None
         for actor in self.actors:
@@ -111,29 +111,29 @@ class ActionElement(StoryElement):
             self._made[actor] = self._make(actor)
         return self._made[actor]
 
-    def begin(self, why: str = "") -> None:
+    def start(self, why: str = "") -> None:
         """standby -> running, for the actors of the group and those whom it selects."""
         actors = self.actors
         if self.triggering is not None:
             actors = tuple(dict.fromkeys([*actors, *self.triggering.names]))
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
-        self.stand_by()
-        self._tried_at, self._decided_at = self.stage.progress.tick, None
+        self.enter_standby()
+        self._tried_at, self._decided_at = self.context.progress.tick, None
         self._there, self._waiting = [], {}
         self.executions += 1
-        self._change(Transition.START, State.RUNNING, why)
+        self._change(ElementTransition.START, ElementState.RUNNING, why)
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
-            self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
+            self.context.acquire_domain(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
                 self._let_decide(behaviour)
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
-            self.stage.release(behaviour)
+            self.context.release(behaviour)
         if not self.running and not actors:
-            self._change(Transition.END, State.COMPLETE)
+            self._change(ElementTransition.END, ElementState.COMPLETE)
 
-    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
         """That one, and those of the entities with which its actor forms a selection among the actors."""
         names = {held.actor_name for held in self.running if held is behaviour}
         for members in self._selections:
@@ -146,49 +146,49 @@ class ActionElement(StoryElement):
         """Whether any of its behaviours lasts longer than the instant at which it starts."""
         return not all(held.at_once for actor in self.actors for held in self.behaviours(actor))
 
-    def displace(self, behaviour: Holder, why: str) -> None:
+    def preempt(self, behaviour: DomainHolder, why: str) -> None:
         """A younger action took the domain of this behaviour. One that takes no time has its effect before that."""
         done = False
         for held in self.running:
             if held is behaviour:
-                if held.at_once and self._decided_at is None and self._tried_at == self.stage.progress.tick:
+                if held.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
                     self._let_decide(held)
                     done = held.status is Status.SUCCESS
                 held.stop(Status.INVALID)
         self.running = [other for other in self.running if other is not behaviour]
         self._there = [other for other in self._there if other is not behaviour]
         self._waiting.pop(behaviour, None)
-        if not self.running and self.state is State.RUNNING:
+        if not self.running and self.state is ElementState.RUNNING:
             if done:
-                self._change(Transition.END, State.COMPLETE)
+                self._change(ElementTransition.END, ElementState.COMPLETE)
             else:
-                self._change(Transition.STOP, State.COMPLETE, why)
+                self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
 
-    def halt(self, why: str = "") -> None:
+    def stop_element(self, why: str = "") -> None:
         """Stop all its behaviours."""
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
-            self.stage.release(behaviour)
+            self.context.release(behaviour)
         self.running, self._there, self._waiting = [], [], {}
-        self._change(Transition.STOP, State.COMPLETE, why)
+        self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
         self.status = Status.INVALID
 
-    def arrive(self) -> None:
+    def complete_finished(self) -> None:
         """The behaviours that the last step brought to their goal are done; the last one, and so is the action."""
-        if self.state is State.RUNNING:
+        if self.state is ElementState.RUNNING:
             there, self._there = self._there, []
             self._let_go(there)
 
-    def decide(self) -> None:
+    def update_children(self) -> None:
         """The behaviours decide, once per tick; what they bring about shows at the end of the step: there they end."""
         self.status = Status.RUNNING
-        now = self.stage.progress.tick
+        now = self.context.progress.tick
         if self._decided_at != now:
             self._decided_at = now
             self._decide(self.running)
         elif self._waiting:
             self._decide([behaviour for behaviour, _ in self._waiting.values()])
-        if self.state is State.COMPLETE:
+        if self.state is ElementState.COMPLETE:
             self.status = Status.SUCCESS
 
     def _decide(self, behaviours: Sequence[ActionBehaviour]) -> None:
@@ -197,37 +197,37 @@ class ActionElement(StoryElement):
             self._let_decide(behaviour)
             if behaviour.status in (Status.SUCCESS, Status.FAILURE):
                 (done if behaviour.immediate else self._there).append(behaviour)
-        self.stage.arriving = self.stage.arriving or bool(self._there)
+        self.context.completes_this_step = self.context.completes_this_step or bool(self._there)
         self._let_go(done)
 
     def _let_decide(self, behaviour: ActionBehaviour) -> None:
         self._waiting.pop(behaviour, None)
         try:
-            if behaviour.status is not Status.RUNNING and behaviour.performer_missing:
-                raise Absent(behaviour.actor_name)
+            if behaviour.status is not Status.RUNNING and behaviour.is_actor_missing:
+                raise EntityAbsentError(behaviour.actor_name)
             behaviour.tick_once()
             if behaviour.third_party or behaviour.status is Status.INVALID:
                 behaviour.check_decision()
-        except Absent as who:
-            if self._tried_at == self.stage.progress.tick:
+        except EntityAbsentError as who:
+            if self._tried_at == self.context.progress.tick:
                 behaviour.stop(Status.INVALID)
                 self._waiting[behaviour] = behaviour, who
-                self.stage.waiting.append(self)
+                self.context.pending_actions.append(self)
             else:
-                self.displace(behaviour, behaviour.give_up(who))
+                self.preempt(behaviour, behaviour.abort(who))
 
-    def give_up(self) -> None:
+    def abort(self) -> None:
         """Stop what waited in vain for somebody to enter the world at this instant."""
         waiting, self._waiting = self._waiting, {}
         for behaviour, who in waiting.values():
-            self.displace(behaviour, behaviour.give_up(who))
+            self.preempt(behaviour, behaviour.abort(who))
 
     def _let_go(self, done: Sequence[ActionBehaviour]) -> None:
         for behaviour in done:
             self.running.remove(behaviour)
-            self.stage.release(behaviour)
-        if not self.running and self.state is State.RUNNING:
-            self._change(Transition.END, State.COMPLETE)
+            self.context.release(behaviour)
+        if not self.running and self.state is ElementState.RUNNING:
+            self._change(ElementTransition.END, ElementState.COMPLETE)
 
 
 def _takes_time(action: StoryElement) -> bool:

@@ -7,10 +7,10 @@ import math
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.motion import ResolvedPosition
 from eidrive_scenario.storyboard.orientations import oriented
 from eidrive_scenario.storyboard.position_errors import roads_of
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 FAR = 1e4
 """Above and below all roads [m]."""
@@ -18,23 +18,23 @@ APART = 0.5
 """Roads whose surfaces differ by less are on one level [m]."""
 
 
-def geo_position(frame: model.GeoPosition, stage: Stage, actor: str | None) -> Place:
+def geo_position(frame: model.GeoPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
     """Resolve a GeoPosition by the road network's projection.
 
     Relative angles, and missing ones, refer to the lane there.
     """
-    roads = roads_of(frame, stage)
-    x, y = plane_coordinates(frame, roads, stage)
+    roads = roads_of(frame, context)
+    x, y = plane_coordinates(frame, roads, context)
     height = frame.altitude if frame.altitude is not None else frame.height
     z = height_of_level(frame, roads, x, y) if height is None else height - roads.header.offset[2]
     here = roads.locate_at(x, y, z=z)
     base = roads.pose(here) if here is not None else Pose(x, y, 0.0, 0.0, 0.0, 0.0)
-    return Place(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
+    return ResolvedPosition(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
 
-def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, stage: Stage) -> tuple[float, float]:
+def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: RuntimeContext) -> tuple[float, float]:
     """x and y [m] of a GeoPosition. Raises ScenarioError if the road network does not say where it lies."""
-    latitude, longitude = _angles(frame, stage)
+    latitude, longitude = _angles(frame, context)
     try:
         return roads.geographic(latitude, longitude)
     except InputError as error:
@@ -69,7 +69,7 @@ def _surface(roads: RoadNetwork, x: float, y: float, z: float) -> float | None:
     return None if here is None else roads.pose(here).z
 
 
-def _angles(frame: model.GeoPosition, stage: Stage) -> tuple[float, float]:
+def _angles(frame: model.GeoPosition, context: RuntimeContext) -> tuple[float, float]:
     """Latitude and longitude [rad]: since 1.2 in degrees, before that in radians.
 
     Older values beyond what radians can be are degrees that somebody wrote in their place.
@@ -84,7 +84,7 @@ def _angles(frame: model.GeoPosition, stage: Stage) -> tuple[float, float]:
             told = (
                 f"GeoPosition has latitude {latitude:g}, longitude {longitude:g}: taken as degrees, as radians end at π"
             )
-            stage.warnings.append(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
+            context.warnings.append(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
     else:
         remedy = "give latitudeDeg and longitudeDeg"
         raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", remedy, frame.source, frame.line))

@@ -9,15 +9,15 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.stage import Absent, Holder, Stage
+from eidrive_scenario.storyboard.runtime_context import DomainHolder, EntityAbsentError, RuntimeContext
 
 
 class InitBlock(Composite):
     """The actions of Init. Those that need time go on until they end or a younger action takes their domain."""
 
-    def __init__(self, stage: Stage, behaviours: Sequence[ActionBehaviour]) -> None:
+    def __init__(self, context: RuntimeContext, behaviours: Sequence[ActionBehaviour]) -> None:
         super().__init__("Init", list(behaviours))
-        self.stage = stage
+        self.context = context
         self.actions = tuple(behaviours)
         self.running: list[ActionBehaviour] = list(behaviours)
 
@@ -41,21 +41,21 @@ class InitBlock(Composite):
             behaviour.tick_once()
             if behaviour.third_party or behaviour.status is Status.INVALID:
                 behaviour.check_decision()
-        except Absent:
+        except EntityAbsentError:
             behaviour.stop(Status.INVALID)
             return False
         if behaviour.status is Status.RUNNING:
-            self.stage.occupy(behaviour.actor_name, behaviour.controls, self, behaviour)
+            self.context.acquire_domain(behaviour.actor_name, behaviour.controls, self, behaviour)
         else:
             self.running.remove(behaviour)
         return True
 
-    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
         """Those of one action: of a selection, else the one alone."""
         actions = [other.action for other in self.running if other is behaviour]
         return [other for other in self.running if any(other.action is action for action in actions)]
 
-    def displace(self, behaviour: Holder, why: str) -> None:
+    def preempt(self, behaviour: DomainHolder, why: str) -> None:
         """A younger action took the domain."""
         for held in self.running:
             if held is behaviour:
@@ -74,9 +74,9 @@ class InitBlock(Composite):
                 behaviour.tick_once()
                 if behaviour.third_party or behaviour.status is Status.INVALID:
                     behaviour.check_decision()
-            except Absent as who:
-                behaviour.give_up(who)
+            except EntityAbsentError as who:
+                behaviour.abort(who)
             if behaviour.status is not Status.RUNNING:
                 self.running.remove(behaviour)
-                self.stage.release(behaviour)
+                self.context.release(behaviour)
         self.status = Status.RUNNING if self.running else Status.SUCCESS

@@ -25,14 +25,14 @@ APART = 0.01
 """A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
 
 
-class Place(NamedTuple):
+class ResolvedPosition(NamedTuple):
     """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
 
     pose: Pose
     location: LaneLocation | None = None
 
 
-class Steering(NamedTuple):
+class LateralStep(NamedTuple):
     """The lateral motion of one step: the offset from the centre of its lane at the end of the step [m].
 
     offset   left of the lane's driving direction positive
@@ -45,8 +45,8 @@ class Steering(NamedTuple):
 
     offset: float
     heading: float | None = None
-    slows: bool = True
-    way: float | None = None
+    shortens_distance: bool = True
+    distance: float | None = None
     rate: float | None = None
 
 
@@ -65,10 +65,10 @@ class Motion:
         self._route: Route | None = None
         self._visit = 0
         self._route_lanes = RouteLanes(roads) if roads is not None else None
-        self.choose: Choose | None = None
+        self.branch_selector: Choose | None = None
         """Picks a branch at forks that the route leaves open; None takes the straightest."""
         self.end_of_road = False
-        self._steering: Steering | None = None
+        self._steering: LateralStep | None = None
         self._next_pose: Pose | None = None
         self._landing = False
         self._rail: Callable[[float], Pose] | None = None
@@ -76,7 +76,7 @@ class Motion:
         self._lift = 0.0
         self._crosses = False
         self._teleport = False
-        self.jumped = False
+        self.teleported = False
         """True from a teleport until the view that shows it."""
 
     @property
@@ -91,9 +91,9 @@ class Motion:
     def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
         """The place so many metres further along the lane [m], by the way that it takes; None where the lane ends."""
         assert self.roads is not None
-        return self.roads.advance(place, distance, route=self._route, choose=self.choose, visit=self._visit)
+        return self.roads.advance(place, distance, route=self._route, choose=self.branch_selector, visit=self._visit)
 
-    def put(self, place: Place) -> None:
+    def teleport(self, place: ResolvedPosition) -> None:
         """Place it there at once; its speed stays. The next view shows it there, so the step that begins is used up."""
         self.pose = place.pose
         self._adopt(place.location)
@@ -101,35 +101,35 @@ class Motion:
         self.end_of_road = False
         if self._route_lanes is not None:
             self._route_lanes.forget()
-        self._teleport = self.jumped = True
+        self._teleport = self.teleported = True
 
-    def settle(self) -> None:
+    def initialize(self) -> None:
         """Come to rest at the place before the first view, which shows it there: the next step moves it."""
         self._teleport = False
         self.step(0.0)
 
-    def steer(self, steering: Steering) -> None:
+    def set_lateral_step(self, steering: LateralStep) -> None:
         """Lateral motion of the step that begins now."""
         self._steering = steering
 
-    def go_to(
+    def move_to(
         self, pose: Pose, *, land: bool = False, jump: bool = False, rail: Callable[[float], Pose] | None = None
     ) -> None:
         """The pose at the end of the step that begins now, wherever it is (a trajectory).
 
         With `land` the actor looks for its lane there, to follow it from then on; where there are no roads at all it
         has nothing left to follow, and stops. With `jump` it is put there: the way is none that it covers. `rail`
-        returns the pose after another distance than that of its speed, for `carry`.
+        returns the pose after another distance than that of its speed, for `move_along_lane`.
         """
         self._next_pose, self._rail = pose, rail
         self._landing = land
-        self.jumped = self.jumped or jump
+        self.teleported = self.teleported or jump
 
-    def carry(self, distance: float) -> None:
+    def move_along_lane(self, distance: float) -> None:
         """Move by a distance along the lane or trajectory in this step, whatever speed and heading say [m]."""
         self._carried = distance
 
-    def relate_to_lane(self, lane: int) -> LaneLocation | None:
+    def set_reference_lane(self, lane: int) -> LaneLocation | None:
         """Express the place on the road by another lane of the same road; the answer has its offset."""
         here = self.location
         if here is not None and self.roads is not None and here.lane != lane:
@@ -140,12 +140,12 @@ class Motion:
             self.location = here
         return here
 
-    def take_over(self, pose: Pose, speed: float) -> None:
+    def resume_from(self, pose: Pose, speed: float) -> None:
         """Go on from where another one brought the actor."""
         self.pose, self.speed = pose, speed
-        self.land()
+        self.snap_to_lane()
 
-    def land(self) -> None:
+    def snap_to_lane(self) -> None:
         """Find the lane again after free motion; the actor follows it at the angle at which it arrived.
 
         One that is beside the road, and does not point along it, goes on in its heading.
@@ -183,7 +183,7 @@ class Motion:
             self.location = None
             self.end_of_road = False
             if self._landing:
-                self.land()
+                self.snap_to_lane()
                 if self.roads is None:
                     self.speed = 0.0
         elif distance == 0.0 and steering is None:
@@ -194,14 +194,14 @@ class Motion:
             self._freely(distance)
         x, y, z, h, p, r = self.pose
         across = distance == 0.0 or target is not None or carried is not None
-        return Placement(x, y, z, h, p, r, self.speed, target is not None and self.jumped, across)
+        return Placement(x, y, z, h, p, r, self.speed, target is not None and self.teleported, across)
 
     def placement(self) -> Placement:
         """Where it is now."""
         x, y, z, h, p, r = self.pose
         return Placement(x, y, z, h, p, r, self.speed, True)
 
-    def _along_lane(self, distance: float, steering: Steering | None, dt: float) -> None:
+    def _along_lane(self, distance: float, steering: LateralStep | None, dt: float) -> None:
         assert self.roads is not None
         assert self.location is not None
         here, left, total = self.location, 0.0, distance
@@ -209,9 +209,9 @@ class Motion:
         if steering is not None:
             left = steering.offset - here.offset * way
             here = here._replace(offset=steering.offset * way, t=here.t + left * way)
-            if steering.way is not None:
-                distance = total = math.copysign(steering.way, distance)
-            if steering.slows:
+            if steering.distance is not None:
+                distance = total = math.copysign(steering.distance, distance)
+            if steering.shortens_distance:
                 distance = math.copysign(math.sqrt(max(0.0, distance * distance - left * left)), distance)
         if distance != 0.0:
             there = self.ahead(here, distance * self.direction)
@@ -234,7 +234,7 @@ class Motion:
         pose = self.pose_on(here, self.heading)
         self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
 
-    def _to_route(self, distance: float) -> Steering | None:
+    def _to_route(self, distance: float) -> LateralStep | None:
         """How to change to a lane that leads on along the route, where this one does not."""
         assert self._route is not None
         assert self._route_lanes is not None
@@ -244,9 +244,9 @@ class Motion:
         if found is None:
             return None
         lane, offset, done = found
-        self.relate_to_lane(lane)
+        self.set_reference_lane(lane)
         way = self.roads.driving_direction(self.location.road, lane)
-        return Steering(offset * way, heading=0.0 if done else None)
+        return LateralStep(offset * way, heading=0.0 if done else None)
 
     def _begin_lap(self, before: LaneLocation, after: LaneLocation) -> None:
         """Where a step passes the start of the route's lap, the lap is the route from then on."""
@@ -258,13 +258,13 @@ class Motion:
         if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
             self.route = lap
 
-    def _turn(self, steering: Steering, left: float, distance: float, total: float, dt: float) -> float:
+    def _turn(self, steering: LateralStep, left: float, distance: float, total: float, dt: float) -> float:
         """The angle to the lane where `distance` along it and `left` make up a step of `total` metres in dt seconds."""
         if steering.heading is not None:
             return steering.heading
         if steering.rate is not None:
             left = steering.rate * dt
-            if steering.slows:
+            if steering.shortens_distance:
                 distance = math.copysign(math.sqrt(max(0.0, total * total - left * left)), total)
         if distance == 0.0 or left == 0.0:
             return 0.0
@@ -281,7 +281,9 @@ class Motion:
     def _last_place(self, here: LaneLocation, distance: float) -> LaneLocation:
         """Where the lane ends, in a section inside its road or at the road's end, within the distance [m]."""
         assert self.roads is not None
-        last = self.roads.advance(here, distance, route=self._route, choose=self.choose, visit=self._visit, to_end=True)
+        last = self.roads.advance(
+            here, distance, route=self._route, choose=self.branch_selector, visit=self._visit, to_end=True
+        )
         assert last is not None
         return last
 

@@ -7,19 +7,19 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 
-def roads_of(frame: model.Element, stage: Stage) -> RoadNetwork:
+def roads_of(frame: model.Element, context: RuntimeContext) -> RoadNetwork:
     """Return the road network. Raise ScenarioError if the scenario has none."""
-    if stage.roads is None:
+    if context.roads is None:
         raise position_error(frame, "needs a road network", "name one in RoadNetwork/LogicFile, or use a WorldPosition")
-    return stage.roads
+    return context.roads
 
 
-def road_origin(frame: Any, stage: Stage) -> LaneLocation:
+def road_origin(frame: Any, context: RuntimeContext) -> LaneLocation:
     """Return the place on the road of the entity that `frame` refers to. Raise ScenarioError if it is on none."""
-    here = stage.location(frame.entity_ref)
+    here = context.location(frame.entity_ref)
     if here is None:
         raise position_error(frame, f"starts from {frame.entity_ref}, which is not on a road")
     return here

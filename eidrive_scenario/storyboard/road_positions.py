@@ -7,31 +7,33 @@ import math
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
-from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.motion import ResolvedPosition
 from eidrive_scenario.storyboard.orientations import oriented
 from eidrive_scenario.storyboard.position_errors import position_error, road_origin, roads_of
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 
-def road_position(frame: model.RoadPosition, stage: Stage, actor: str | None) -> Place:
+def road_position(frame: model.RoadPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
     """Resolve a RoadPosition. Raise ScenarioError if the road does not exist."""
-    roads = roads_of(frame, stage)
-    return in_road(roads, frame.road_id, _on_road(frame, stage, roads), frame.t, frame.orientation)
+    roads = roads_of(frame, context)
+    return in_road(roads, frame.road_id, _on_road(frame, context, roads), frame.t, frame.orientation)
 
 
-def relative_road_position(frame: model.RelativeRoadPosition, stage: Stage, actor: str | None) -> Place:
+def relative_road_position(
+    frame: model.RelativeRoadPosition, context: RuntimeContext, actor: str | None
+) -> ResolvedPosition:
     """Resolve a position that lies `ds` along the reference line from an entity and `dt` to its left."""
-    roads, origin = roads_of(frame, stage), road_origin(frame, stage)
-    here = along_reference(roads, origin, frame.ds, stage.actors[frame.entity_ref].motion.route)
+    roads, origin = roads_of(frame, context), road_origin(frame, context)
+    here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
     if here is None:
         raise position_error(frame, f"leads {frame.ds:g} m from {frame.entity_ref}, beyond the end of the road")
     return in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
 
 
-def lane_position(frame: model.LanePosition, stage: Stage, actor: str | None) -> Place:
+def lane_position(frame: model.LanePosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
     """Resolve a LanePosition. Raise ScenarioError if the road or lane does not exist there."""
-    roads = roads_of(frame, stage)
-    s = _on_road(frame, stage, roads)
+    roads = roads_of(frame, context)
+    s = _on_road(frame, context, roads)
     lane = lane_id(frame, frame.lane_id)
     known = roads.lane_ids(frame.road_id, s)
     if lane not in known and lane != 0:
@@ -42,14 +44,16 @@ def lane_position(frame: model.LanePosition, stage: Stage, actor: str | None) ->
     return in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
 
 
-def relative_lane_position(frame: model.RelativeLanePosition, stage: Stage, actor: str | None) -> Place:
+def relative_lane_position(
+    frame: model.RelativeLanePosition, context: RuntimeContext, actor: str | None
+) -> ResolvedPosition:
     """Resolve a position relative to the lane of an entity.
 
     `ds` runs along the reference line, `dsLane` along the lane as the entity faces; lanes count to its left.
     """
-    roads, origin = roads_of(frame, stage), road_origin(frame, stage)
-    route = stage.actors[frame.entity_ref].motion.route
-    ahead = facing(stage, frame.entity_ref, origin)
+    roads, origin = roads_of(frame, context), road_origin(frame, context)
+    route = context.actors[frame.entity_ref].motion.route
+    ahead = facing(context, frame.entity_ref, origin)
     if frame.ds_lane is not None:
         there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead, route=route)
     else:
@@ -94,26 +98,26 @@ def count_lanes(lane: int, steps: int) -> int:
     return target
 
 
-def facing(stage: Stage, name: str, here: LaneLocation) -> int:
+def facing(context: RuntimeContext, name: str, here: LaneLocation) -> int:
     """+1 where an actor points along the driving direction of its lane, -1 where against it."""
-    if stage.roads is None:
+    if context.roads is None:
         return 1
-    lane = stage.roads.lane_pose_at(here.road, here.lane, here.s, here.offset).h
-    along = math.cos(stage.pose(name).h - lane) * stage.roads.driving_direction(here.road, here.lane)
+    lane = context.roads.lane_pose_at(here.road, here.lane, here.s, here.offset).h
+    along = math.cos(context.pose(name).h - lane) * context.roads.driving_direction(here.road, here.lane)
     return 1 if along >= 0.0 else -1
 
 
 def in_lane(
     roads: RoadNetwork, road: str, lane: int, s: float, offset: float, orientation: model.Orientation | None
-) -> Place:
+) -> ResolvedPosition:
     """Return the place at lane coordinates; an orientation counts from the lane."""
     here = roads.location(road, lane, s, offset)
-    return Place(oriented(orientation, roads.pose(here)), here)
+    return ResolvedPosition(oriented(orientation, roads.pose(here)), here)
 
 
 def in_road(
     roads: RoadNetwork, road: str, s: float, t: float, orientation: model.Orientation | None, lane: int | None = None
-) -> Place:
+) -> ResolvedPosition:
     """Return the place at road coordinates, related to `lane` or else to the lane there.
 
     An orientation counts from the reference line; without one the place points along the lane's driving direction.
@@ -123,10 +127,10 @@ def in_road(
         here = roads.location(road, lane, s, t - roads.location(road, lane, s).t)
     surface = roads.road_pose_at(road, s, t)
     along = orientation is not None or roads.driving_direction(road, here.lane) > 0
-    return Place(oriented(orientation, surface if along else surface.turned(math.pi)), here)
+    return ResolvedPosition(oriented(orientation, surface if along else surface.turned(math.pi)), here)
 
 
-def _on_road(frame: model.RoadPosition | model.LanePosition, stage: Stage, roads: RoadNetwork) -> float:
+def _on_road(frame: model.RoadPosition | model.LanePosition, context: RuntimeContext, roads: RoadNetwork) -> float:
     """The position's s; one that lies beyond an end of its road means that end, with a warning."""
     road, s = frame.road_id, frame.s
     if road not in roads.roads:
@@ -137,8 +141,8 @@ def _on_road(frame: model.RoadPosition | model.LanePosition, stage: Stage, roads
     if abs(on_road - s) > 1e-3:
         message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
         problem = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
-        if problem not in stage.warnings:
-            stage.warnings.append(problem)
+        if problem not in context.warnings:
+            context.warnings.append(problem)
     return on_road
 
 

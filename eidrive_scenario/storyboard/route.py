@@ -18,16 +18,16 @@ from eidrive_scenario.roads import (
     fastest,
     fewest_junctions,
 )
-from eidrive_scenario.storyboard.motion import Place
+from eidrive_scenario.storyboard.motion import ResolvedPosition
 
 HERE = 0.01
 """Who is this near to the first waypoint of a closed route is on it [m]."""
 
 
-def route_of(
+def build_route(
     route: model.Route,
     roads: RoadNetwork | None,
-    resolve: Callable[[model.Position], Place],
+    resolve: Callable[[model.Position], ResolvedPosition],
     start: LaneLocation | None = None,
     *,
     seed: int = 0,

@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.storyboard.condition import EntityCondition, Measure
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 E = TypeVar("E", bound=model.Element)
 
 REFERENCES = ("entity_ref", "master_entity_ref", "trailer_ref")
 """Attributes that name an entity."""
 
-NOBODY = ""
+EMPTY_MEMBER = ""
 """What stands in a list of entities for a group without members: an empty list would mean all entities."""
 
 TYPES: Mapping[type[model.Element], str] = {
@@ -99,13 +99,15 @@ class Selections:
         if not isinstance(listed, tuple):
             return element
         refs = [
-            replace(ref, entity_ref=member) for ref in listed for member in self.members(ref.entity_ref) or [NOBODY]
+            replace(ref, entity_ref=member)
+            for ref in listed
+            for member in self.members(ref.entity_ref) or [EMPTY_MEMBER]
         ]
         changes: dict[str, Any] = {"entity_ref": tuple(dict.fromkeys(refs))}
         return replace(element, **changes)
 
 
-class AnyMember(EntityCondition):
+class AnyMemberCondition(EntityCondition):
     """A condition that names a group: it holds for an entity if it holds towards any member, one condition each."""
 
     def __init__(
@@ -114,19 +116,19 @@ class AnyMember(EntityCondition):
         super().__init__(element, entities, rule)
         self.conditions = tuple(conditions)
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Bind them all."""
         for condition in self.conditions:
-            condition.bind(stage)
+            condition.bind(context)
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
+    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
         """Ask all, so that their histories stay whole."""
-        return any([condition.holds_for(stage, entity) for condition in self.conditions])
+        return any([condition.holds_for(context, entity) for condition in self.conditions])
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """What is true of the first member towards which it holds, or of all."""
-        holding = [condition for condition in self.conditions if condition.holds_for(stage, entity)]
-        told = [condition.explain_for(stage, entity) for condition in holding[:1] or self.conditions]
+        holding = [condition for condition in self.conditions if condition.holds_for(context, entity)]
+        told = [condition.explain_for(context, entity) for condition in holding[:1] or self.conditions]
         return " or ".join(told) or f"{entity}: {self.describe_for()}"
 
     def describe_for(self) -> str:
@@ -134,9 +136,9 @@ class AnyMember(EntityCondition):
         told = [condition.describe_for() for condition in self.conditions]
         return " or ".join(told) or f"{super().describe_for()} towards a selection without members"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """Those of all."""
-        return tuple(measure for condition in self.conditions for measure in condition.measures(stage))
+        return tuple(measure for condition in self.conditions for measure in condition.measures(context))
 
 
 def _renamed(element: E, names: Mapping[str, str]) -> E:

@@ -77,7 +77,7 @@ def signal_cycles(
     return cycles
 
 
-def wrong(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
+def cycle_errors(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
     """What makes no sense in the declarations."""
     for cycle in cycles.values():
         if (cycle.element.delay or 0.0) < 0.0:
@@ -90,7 +90,7 @@ def wrong(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
             yield _problem(cycle, "is its own reference, directly or over others", "take a reference out")
 
 
-def odd(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
+def cycle_warnings(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
     """What the standard does not allow in the declarations, and yet can be understood."""
     for cycle in cycles.values():
         leader, reference = cycle.leader, cycle.element.reference

@@ -10,7 +10,7 @@ from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.signal_states import USUAL, lamp_colours, must_stop
-from eidrive_scenario.storyboard.signal_cycles import SignalCycle, odd, signal_cycles, wrong
+from eidrive_scenario.storyboard.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
 SAME_PLACE = 2.0
 """ScenarioRunner's `pos=x,y` means the signal that is at most this far from the point [m]."""
@@ -29,8 +29,8 @@ class Signals:
         }
         controllers = declared.traffic_signal_controller if declared is not None else ()
         self.cycles: Mapping[str, SignalCycle] = signal_cycles(controllers, roads)
-        self.problems = tuple(wrong(self.cycles))
-        self.warnings = () if self.problems else tuple(odd(self.cycles))
+        self.problems = tuple(cycle_errors(self.cycles))
+        self.warnings = () if self.problems else tuple(cycle_warnings(self.cycles))
         self._states: dict[str, str] = {}
         self._running: dict[str, int | None] = {}
         self._spelled: dict[str, str] = {}

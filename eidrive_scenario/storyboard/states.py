@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 
-class State(Enum):
+class ElementState(Enum):
     """Where an element is in its life."""
 
     STANDBY = "standbyState"
@@ -14,7 +14,7 @@ class State(Enum):
     COMPLETE = "completeState"
 
 
-class Transition(Enum):
+class ElementTransition(Enum):
     """How it came there; visible to conditions in the step in which it happens and until the next evaluation."""
 
     START = "startTransition"
@@ -33,8 +33,8 @@ class StateChange:
     path: str
     kind: str
     """storyboard, story, act, maneuverGroup, maneuver, event or action."""
-    before: State
-    transition: Transition | None
-    after: State
+    before: ElementState
+    transition: ElementTransition | None
+    after: ElementState
     why: str = ""
     """What fired, in words, where a trigger did."""

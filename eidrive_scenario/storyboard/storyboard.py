@@ -15,12 +15,12 @@ from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
 from eidrive_scenario.storyboard.builder import Builder
 from eidrive_scenario.storyboard.commands import Commands
+from eidrive_scenario.storyboard.controller_model import build_controller_models, unassigned_controller_warnings
 from eidrive_scenario.storyboard.external import ExternalObjects
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.stage import GivenPose, Stage
-from eidrive_scenario.storyboard.stand_in import left_alone, stand_ins
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.storyboard.trailers import declared_trailer, pairs, pose_behind, refuse_circles
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.runtime_context import ExternalPose, RuntimeContext
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.trailers import check_acyclic, declared_trailer, pairs, pose_behind
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -47,16 +47,18 @@ class Storyboard:
     ) -> None:
         self.scenario = scenario
         self.dt = dt
-        self.stage = Stage(scenario, roads, dt=dt, seed=seed, nobody=_empty_view())
-        builder = Builder(scenario, self.stage, actions or registry("actions"), conditions or registry("conditions"))
+        self.context = RuntimeContext(scenario, roads, dt=dt, seed=seed, empty_view=_empty_view())
+        builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
-        for name, actor in self.stage.actors.items():
+        for name, actor in self.context.actors.items():
             actor.trailer = declared_trailer(scenario.entities[name])
-        refuse_circles(self.stage.actors)
+        check_acyclic(self.context.actors)
         self._external = ExternalObjects(scenario, roads)
-        self.stage.warnings += self._external.warnings
-        self._stand_ins = stand_ins(self.stage.actors, self.stage, controllers or {}, registry("controllers"))
-        self.stage.warnings += left_alone(self.stage.actors, controllers or {})
+        self.context.warnings += self._external.warnings
+        self._stand_ins = build_controller_models(
+            self.context.actors, self.context, controllers or {}, registry("controllers")
+        )
+        self.context.warnings += unassigned_controller_warnings(self.context.actors, controllers or {})
         self.ended: str | None = None
         """Why the run is over, as far as the storyboard has a say; None while it goes on."""
 
@@ -68,58 +70,58 @@ class Storyboard:
     @property
     def changes(self) -> tuple[StateChange, ...]:
         """What changed its state in the last tick."""
-        return tuple(self.stage.progress.changes)
+        return tuple(self.context.progress.changes)
 
     def give_pose(self, name: str, pose: Pose, speed: float) -> None:
         """Where an entity is after the next step, and its speed [m/s]. Raises SettingError if none waits for it."""
-        waiting = [stand_in.actor.name for stand_in in self._stand_ins if stand_in.takes_poses]
+        waiting = [stand_in.actor.name for stand_in in self._stand_ins if stand_in.accepts_external_poses]
         if name not in waiting:
             what = f"nobody waits for poses of {name!r}"
             raise SettingError(Diagnostic(what, "let the stand-in `external` play its controller", "set_pose"))
-        self.stage.given_poses[name] = GivenPose(pose, speed)
+        self.context.external_poses[name] = ExternalPose(pose, speed)
 
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
-        self.stage.signals.advance(0.0)
+        self.context.signals.advance(0.0)
         self.init.start()
         for name, placed in self._external.places().items():
-            if not self.stage.actors[name].present:
-                self.stage.enter(name, Place(placed.pose))
+            if not self.context.actors[name].present:
+                self.context.add_actor(name, ResolvedPosition(placed.pose))
         self._bring_trailers()
-        for actor in self.stage.actors.values():
-            actor.motion.settle()
-        self._refresh(self.stage.commands)
-        return self._finished(self.stage.commands)
+        for actor in self.context.actors.values():
+            actor.motion.initialize()
+        self._refresh(self.context.commands)
+        return self._finished(self.context.commands)
 
     def tick(self, view: WorldView) -> Commands:
         """Judge the triggers by this view, let the actions decide, and move what is scripted over to the next one."""
-        self.stage.begin(view, self.dt)
-        self.stage.signals.advance(view.time)
-        self.root.play(self.init)
-        if self.root.state is State.COMPLETE and self.ended is None:
-            self.ended = STOPPED if self.root.record.transitions[-1][1] is Transition.STOP else COMPLETE
-        commands = self.stage.commands
+        self.context.begin_tick(view, self.dt)
+        self.context.signals.advance(view.time)
+        self.root.tick_tree(self.init)
+        if self.root.state is ElementState.COMPLETE and self.ended is None:
+            self.ended = STOPPED if self.root.record.transitions[-1][1] is ElementTransition.STOP else COMPLETE
+        commands = self.context.commands
         trains = self._bring_trailers()
         self._refresh(commands)
         for stand_in in self._stand_ins:
             if stand_in.actor.present and not stand_in.actor.driven:
                 stand_in.step()
         drawn = {back.name for _, back in trains}
-        for name, actor in self.stage.actors.items():
+        for name, actor in self.context.actors.items():
             if not actor.present or name in drawn:
                 continue
             if not actor.driven:
                 commands.placements[name] = actor.motion.step(self.dt)
-            elif actor.motion.jumped:
+            elif actor.motion.teleported:
                 commands.placements[name] = actor.motion.placement()
         _check_placements(commands.placements)
         for front, back in trains:
             if front.present and back.present:
-                back.motion.pose = pose_behind(front, back, straight=front.motion.jumped)
-                back.motion.jumped, back.motion.speed = front.motion.jumped, front.motion.speed
-                commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.jumped)
-        passed_over = [name for name, look in self.stage.appearances.items() if not look.visibility.traffic]
-        self.stage.traffic.step(view.without(passed_over), self.dt, commands)
+                back.motion.pose = pose_behind(front, back, straight=front.motion.teleported)
+                back.motion.teleported, back.motion.speed = front.motion.teleported, front.motion.speed
+                commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
+        passed_over = [name for name, look in self.context.appearances.items() if not look.visibility.traffic]
+        self.context.traffic.step(view.without(passed_over), self.dt, commands)
         return self._finished(commands)
 
     def _bring_trailers(self) -> list[tuple[Actor, Actor]]:
@@ -127,29 +129,29 @@ class Storyboard:
 
         Who draws whom, from the front of each train to its end.
         """
-        trains = list(pairs(self.stage.actors))
+        trains = list(pairs(self.context.actors))
         for front, back in trains:
-            if front.present and (not back.present or self.stage.view.tick < 0):
+            if front.present and (not back.present or self.context.view.tick < 0):
                 back.motion.speed = front.motion.speed
-                self.stage.enter(back.name, Place(pose_behind(front, back, straight=True)))
+                self.context.add_actor(back.name, ResolvedPosition(pose_behind(front, back, straight=True)))
         return trains
 
     def _refresh(self, commands: Commands) -> None:
         """Who enters has the speed that later actions of the same tick gave it."""
-        for name in commands.additions:
+        for name in commands.spawns:
             body = self._external.body(name)
             if body is not None:
-                commands.bodies[name] = body
-            commands.additions[name] = self.stage.actors[name].motion.placement()
+                commands.actor_specs[name] = body
+            commands.spawns[name] = self.context.actors[name].motion.placement()
 
     def _finished(self, commands: Commands) -> Commands:
-        stage = self.stage
-        driven = [name for name, actor in stage.actors.items() if actor.present and actor.driven]
+        context = self.context
+        driven = [name for name, actor in context.actors.items() if actor.present and actor.driven]
         commands.driven = frozenset(driven)
-        commands.goals = {name: goal for name in driven if (goal := stage.actors[name].goal) is not None}
-        commands.overrides = {name: dict(held) for name, held in stage.overrides.items() if held}
-        commands.signals, commands.appearances = stage.signals.states, stage.appearances
-        commands.monitors = stage.monitors
+        commands.goals = {name: goal for name in driven if (goal := context.actors[name].goal) is not None}
+        commands.overrides = {name: dict(held) for name, held in context.overrides.items() if held}
+        commands.signals, commands.appearances = context.signals.states, context.appearances
+        commands.monitors = context.monitors
         return commands
 
 

@@ -41,7 +41,7 @@ def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
             actor = back
 
 
-def refuse_circles(actors: Mapping[str, Actor]) -> None:
+def check_acyclic(actors: Mapping[str, Actor]) -> None:
     """Raises ScenarioError for those that draw themselves, directly or over others."""
     problems = []
     for name, actor in actors.items():

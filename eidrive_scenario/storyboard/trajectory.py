@@ -28,7 +28,7 @@ Resolve = Callable[[model.Position], Pose]
 
 
 @dataclass(frozen=True)
-class Layout:
+class TrajectoryCurve:
     """A trajectory as points with headings, by arc length.
 
     s         arc length of each point [m];  poses  of each point
@@ -138,7 +138,7 @@ class Layout:
             speed = 2.0 * mean - speed
         return (*speeds, speed)
 
-    def beside(self, x: float, y: float, ahead_of: float | None = None) -> tuple[float, float]:
+    def project(self, x: float, y: float, ahead_of: float | None = None) -> tuple[float, float]:
         """Arc length of the place that is nearest to a point, and how far to the left of it the point lies [m].
 
         An open trajectory goes straight on beyond its ends. Where it comes by several times, the first time after
@@ -188,7 +188,7 @@ class TrajectoryProgress:
     way     +1 where the actor's own forward direction leads towards the end, -1 where it drives tail first
     """
 
-    def __init__(self, layout: Layout, s: float) -> None:
+    def __init__(self, layout: TrajectoryCurve, s: float) -> None:
         self.layout = layout
         self.way = 1
         self._tick, self._before, self._after = -2, s, s
@@ -202,7 +202,7 @@ class TrajectoryProgress:
         return self._after if tick > self._tick else self._before
 
 
-def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> Layout:
+def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> TrajectoryCurve:
     """A trajectory in the world. `resolve` gives the pose that a position means now.
 
     A clothoid spline that does not say where it starts begins at `start`.
@@ -218,12 +218,12 @@ def lay_out(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None =
     return _nurbs(shape, trajectory.closed, resolve)
 
 
-def _passed(course: Course, closed: bool) -> Layout:
+def _passed(course: Course, closed: bool) -> TrajectoryCurve:
     s, poses, times = course
-    return Layout(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
+    return TrajectoryCurve(tuple(s), tuple(poses), times, closed, tangents=tuple(pose.h for pose in poses))
 
 
-def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
+def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> TrajectoryCurve:
     corners = [resolve(vertex.position) for vertex in shape.vertex]
     times = [vertex.time for vertex in shape.vertex]
     if closed and math.hypot(corners[0].x - corners[-1].x, corners[0].y - corners[-1].y) > 1e-3:
@@ -234,11 +234,11 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Layout:
         s = [0.0]
         for a, b in pairwise(corners):
             s.append(s[-1] + math.hypot(b.x - a.x, b.y - a.y))
-        return Layout(tuple(s), tuple(corners), clock, closed, given=True)
+        return TrajectoryCurve(tuple(s), tuple(corners), clock, closed, given=True)
     return _along_corners(corners, clock, closed)
 
 
-def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> Layout:
+def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, closed: bool) -> TrajectoryCurve:
     """A polyline whose heading is that of its lines, and turns evenly within ROUNDING of a corner or half the line."""
     spans = [math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(corners)]
     lines = [
@@ -257,10 +257,10 @@ def _along_corners(corners: Sequence[Pose], times: tuple[float, ...] | None, clo
             s.append(stations[-1] + share * span)
             poses.append(_blend(a, b, share)._replace(h=line + turn))
         stations.append(stations[-1] + span)
-    return Layout(tuple(s), tuple(poses), times, closed, stations=tuple(stations))
+    return TrajectoryCurve(tuple(s), tuple(poses), times, closed, stations=tuple(stations))
 
 
-def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
+def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurve:
     """A rational B-spline; it looks where its control points do, if they say (1.3.1, 6.9), else along the curve.
 
     The curve passes through its first and last control points only, and the standard does not say where on it the time
@@ -282,11 +282,11 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> Layout:
     s = [0.0, *accumulate(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(poses))]
     times = _times([point.time for point in shape.control_point])
     if times is None:
-        return Layout(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
+        return TrajectoryCurve(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
     metres = 1 + int(rough)
     stations = [math.floor((number + 1) / count * metres) / metres * count for number in curve.peaks(count)]
     clock = np.interp(np.arange(count + 1), stations, times)
-    return Layout(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given, tangents=tangents)
+    return TrajectoryCurve(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given, tangents=tangents)
 
 
 def has_heading(position: model.Position) -> bool:

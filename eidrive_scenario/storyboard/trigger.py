@@ -12,12 +12,12 @@ from py_trees.common import Status
 
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.storyboard.condition import Condition, truth
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 TINY = 1e-6
 
 
-class ConditionMonitor:
+class ConditionEvaluator:
     """A condition with its edge and delay.
 
     An edge needs a value before it: the first evaluation yields none. It lasts for the rest of its tick, so that it
@@ -49,14 +49,14 @@ class ConditionMonitor:
         self._history: deque[tuple[float, bool, str, tuple[str, ...]]] = deque()
         self._delayed: tuple[bool, str] = (False, "")
 
-    def evaluate(self, stage: Stage) -> bool:
+    def evaluate(self, context: RuntimeContext) -> bool:
         """Ask the condition and answer with edge and delay; again in one tick only where it may have changed since."""
-        again = self._asked_at == stage.progress.tick
+        again = self._asked_at == context.progress.tick
         if again and not self.condition.instant:
             return self.result
-        self._asked_at = stage.progress.tick
+        self._asked_at = context.progress.tick
         self.evaluations += 1
-        held: object = self.condition.holds(stage)
+        held: object = self.condition.holds(context)
         result = self._edge(held if held is True or held is False else truth(self.condition, held))
         if again and self.edge != "none" and self._pulse:
             return self.result
@@ -66,22 +66,22 @@ class ConditionMonitor:
         if self.delay <= 0.0:
             self.result, self.triggering = result, who
         else:
-            self.result = self._late(stage, result, who)
+            self.result = self._late(context, result, who)
         return self.result
 
-    def _late(self, stage: Stage, result: bool, who: tuple[str, ...]) -> bool:
+    def _late(self, context: RuntimeContext, result: bool, who: tuple[str, ...]) -> bool:
         """Return the result of the delay ago; each true one is kept with the values of its own instant."""
         if result or self._recorded:
             self._recorded = result
-            self._history.append((stage.time, result, self._words(stage) if result else "", who))
-        while self._history and self._history[0][0] <= stage.time - self.delay + TINY:
+            self._history.append((context.time, result, self._words(context) if result else "", who))
+        while self._history and self._history[0][0] <= context.time - self.delay + TINY:
             _, value, text, self.triggering = self._history.popleft()
             self._delayed = (value, text)
         return self._delayed[0]
 
-    def _words(self, stage: Stage) -> str:
+    def _words(self, context: RuntimeContext) -> str:
         """Return the condition with its values of now."""
-        text: object = self.condition.explain(stage)
+        text: object = self.condition.explain(context)
         if not isinstance(text, str):
             raise InvalidResult(self.condition, "explain", f"returned {text!r} (expected a text)")
         return text if self.value or self.edge == "none" else f"{text} (falling edge)"
@@ -94,10 +94,10 @@ class ConditionMonitor:
             return False
         return self.edge == "risingOrFalling" or (self.edge == "rising") == value
 
-    def why(self, stage: Stage) -> str:
+    def why(self, context: RuntimeContext) -> str:
         """What made it true, in words, with the values of that instant; to be asked where it just was true."""
         if self.delay <= 0.0:
-            return self._words(stage)
+            return self._words(context)
         return f"{self._delayed[1]}, {self.delay:g} s ago"
 
     def describe(self) -> str:
@@ -111,18 +111,18 @@ class ConditionMonitor:
 class ConditionGroup:
     """An AND over conditions at one instant."""
 
-    monitors: tuple[ConditionMonitor, ...]
+    monitors: tuple[ConditionEvaluator, ...]
 
-    def evaluate(self, stage: Stage) -> bool:
+    def evaluate(self, context: RuntimeContext) -> bool:
         """True where all are; each is asked every time, as edges and delays live on what they saw before."""
-        results = [monitor.evaluate(stage) for monitor in self.monitors]
+        results = [monitor.evaluate(context) for monitor in self.monitors]
         return bool(results) and all(results)
 
 
-class Witness(Protocol):
+class TriggerObserver(Protocol):
     """Looks on as one trigger is asked."""
 
-    def saw(self, stage: Stage) -> None:
+    def on_evaluated(self, context: RuntimeContext) -> None:
         """The trigger has been asked."""
 
 
@@ -132,22 +132,22 @@ class Trigger:
     def __init__(self, groups: Sequence[ConditionGroup]) -> None:
         self.groups = tuple(groups)
         self.why = ""
-        self.witness: Witness | None = None
+        self.witness: TriggerObserver | None = None
         self.triggering: tuple[str, ...] = ()
         """The entities that fulfilled the conditions of the groups that fired."""
 
     def __bool__(self) -> bool:
         return bool(self.groups)
 
-    def evaluate(self, stage: Stage) -> bool:
+    def evaluate(self, context: RuntimeContext) -> bool:
         """True where it fires; `why` then says what did it."""
-        fired = [group for group in self.groups if group.evaluate(stage)]
+        fired = [group for group in self.groups if group.evaluate(context)]
         if fired:
-            self.why = " and ".join(monitor.why(stage) for monitor in fired[0].monitors)
+            self.why = " and ".join(monitor.why(context) for monitor in fired[0].monitors)
             names = [name for group in fired for monitor in group.monitors for name in monitor.triggering]
             self.triggering = tuple(dict.fromkeys(names))
         if self.witness is not None:
-            self.witness.saw(stage)
+            self.witness.on_evaluated(context)
         return bool(fired)
 
     def reset(self) -> None:
@@ -161,13 +161,13 @@ class Trigger:
         return " or ".join(" and ".join(m.describe() for m in group.monitors) for group in self.groups)
 
 
-class WaitFor(py_trees.behaviour.Behaviour):
+class WaitForTrigger(py_trees.behaviour.Behaviour):
     """The leaf at which a trigger meets the tree: runs until it fires."""
 
-    def __init__(self, name: str, trigger: Trigger, stage: Stage) -> None:
+    def __init__(self, name: str, trigger: Trigger, context: RuntimeContext) -> None:
         super().__init__(name)
         self.trigger = trigger
-        self.stage = stage
+        self.context = context
 
     def initialise(self) -> None:
         """Forget what was seen in an earlier life."""
@@ -176,9 +176,9 @@ class WaitFor(py_trees.behaviour.Behaviour):
 
     def update(self) -> Status:
         """Ask the trigger."""
-        return Status.SUCCESS if self.trigger.evaluate(self.stage) else Status.RUNNING
+        return Status.SUCCESS if self.trigger.evaluate(self.context) else Status.RUNNING
 
-    def fires(self) -> bool:
+    def is_fired(self) -> bool:
         """What `tick_once` does, without its ceremony: triggers are asked in every tick of a run."""
         self.initialise()
         self.status = self.update()

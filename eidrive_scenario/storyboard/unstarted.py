@@ -9,7 +9,7 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Element, Maneuver
 from eidrive_scenario.storyboard.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.events import EventElement
-from eidrive_scenario.storyboard.states import Transition
+from eidrive_scenario.storyboard.states import ElementTransition
 
 _SHOWN = 5
 """Elements that are named; of more, the number is given."""
@@ -30,7 +30,7 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     problems = []
     for element in found[:_SHOWN]:
         source, line = places.get(element.record.path, (str(scenario.path or ""), None))
-        skipped = sum(transition is Transition.SKIP for _, transition in element.record.transitions)
+        skipped = sum(transition is ElementTransition.SKIP for _, transition in element.record.transitions)
         why = "its start trigger was not fulfilled" if element.start_leaf is not None else "nothing started it"
         if skipped:
             why = f"it was skipped {skipped} times by its priority" if skipped > 1 else "it was skipped by its priority"
@@ -52,7 +52,7 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
 def _unstarted(element: StoryElement) -> Iterator[StoryElement]:
     if element.limit < 1:
         return
-    started = any(transition is Transition.START for _, transition in element.record.transitions)
+    started = any(transition is ElementTransition.START for _, transition in element.record.transitions)
     if isinstance(element, ActElement | EventElement) and not started:
         yield element
     elif started and not isinstance(element, EventElement):

@@ -101,14 +101,14 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         storyboard = Storyboard(scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": stand_in})
         world, played = KinematicWorld(scenario, dt), Played(dt)
         first = storyboard.initial()
-        world.add(first.additions)
+        world.add(first.spawns)
         for _ in range(round(seconds / dt) + 1):
             played.rows.append(dict(world.placements))
             commands = storyboard.tick(world.view())
             played.changes += storyboard.changes
             played.commands.append(commands)
             world.remove(commands.removals)
-            world.add(commands.additions)
+            world.add(commands.spawns)
             world.move(commands.placements)
         return played
 

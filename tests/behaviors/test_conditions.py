@@ -8,7 +8,7 @@ import pytest
 from eidrive_behaviors.conditions.values import agrees
 from street_scene import after
 
-from eidrive_scenario.api import compares, model
+from eidrive_scenario.api import model, satisfies_rule
 
 NOTHING = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traffic="true"/></PrivateAction>'
 
@@ -363,6 +363,6 @@ def test_texts_compare_as_numbers_where_both_are(text: str | None, rule: str, li
     ],
 )
 def test_rules_have_a_small_tolerance(rule: str, below: bool, same: bool, above: bool) -> None:
-    answers = [compares(value, model.Rule(rule), 3.0) for value in (2.9, 3.0 + 1e-9, 3.1)]
+    answers = [satisfies_rule(value, model.Rule(rule), 3.0) for value in (2.9, 3.0 + 1e-9, 3.1)]
     assert answers == [below, same, above]
-    assert not compares(float("nan"), model.Rule(rule), 3.0)
+    assert not satisfies_rule(float("nan"), model.Rule(rule), 3.0)

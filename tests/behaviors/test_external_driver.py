@@ -53,7 +53,7 @@ def test_it_is_where_it_is_put_in_the_next_view(simulation: Simulation) -> None:
         assert view.position[row].tolist() == pytest.approx([123.0, -5.5, 0.0])
         assert float(view.yaw[row]) == pytest.approx(0.2)
         assert float(view.speed[row]) == pytest.approx(7.0)
-        where = simulation.storyboard.stage.location("Ego")
+        where = simulation.storyboard.context.location("Ego")
         assert where is not None
         assert where.lane == -2
         view = simulation.tick()[0].view
@@ -78,6 +78,6 @@ def test_a_stand_in_for_a_controller_that_no_entity_has_is_told(simulation: Simu
     scenario = simulation.scenario
     simulation.close()
     with Simulation(scenario, settings=RunSettings(controllers={"joystik": "external"})) as other:
-        (warning,) = map(str, other.storyboard.stage.warnings)
+        (warning,) = map(str, other.storyboard.context.warnings)
     assert "'joystick' of Ego is not known" in warning
     assert "the stand-in for 'joystik' found no controller of that name" in warning

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from eidrive_behaviors.actions.following import Tracker, speed_tracker
+from eidrive_behaviors.actions.following import RateLimitedValue, speed_limiter
 from street_scene import private
 
 from eidrive_scenario.api import Placement, model
@@ -62,7 +62,7 @@ def test_a_jerk_that_the_performance_states_is_kept() -> None:
     car = model.Performance(
         max_speed=70, max_acceleration=2, max_deceleration=8, max_acceleration_rate=4, max_deceleration_rate=4
     )
-    tracker = speed_tracker(vehicle(car), 20.0, backwards=False)
+    tracker = speed_limiter(vehicle(car), 20.0, backwards=False)
     dt = 0.01
     speeds, rates = [20.0], [0.0]
     while tracker.value != 30.0 or tracker.rate != 0.0:
@@ -91,7 +91,7 @@ def vehicle(performance: model.Performance) -> model.Vehicle:
 
 @pytest.mark.parametrize(("start", "rate"), [(-5.0, 3.0), (0.0, 0.0), (7.0, -2.0)])
 def test_a_tracker_settles_on_a_moving_value_within_its_bound(start: float, rate: float) -> None:
-    tracker, dt = Tracker(start, rate, up=2.0, down=3.0), 0.02
+    tracker, dt = RateLimitedValue(start, rate, up=2.0, down=3.0), 0.02
     tracker.advance(0.0, dt)
     for tick in range(1, 800):
         before = tracker.rate

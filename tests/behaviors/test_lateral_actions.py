@@ -235,7 +235,7 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Any
     warnings: list[str] = []
 
     def look(simulation: Any, frame: Any) -> None:
-        warnings[:] = [str(problem) for problem in simulation.storyboard.stage.warnings]
+        warnings[:] = [str(problem) for problem in simulation.storyboard.context.warnings]
 
     if later:
         played = run(3, ("Ego", action, after(0.45)), driven=False, during=look)
@@ -280,7 +280,7 @@ def test_an_action_of_init_that_a_younger_one_ends_leaves_its_trajectory(run: An
     followed: dict[float, bool] = {}
 
     def look(simulation: Any, frame: Any) -> None:
-        followed[round(frame.view.time, 3)] = simulation.storyboard.stage.actors["Ego"].trajectory is not None
+        followed[round(frame.view.time, 3)] = simulation.storyboard.context.actors["Ego"].trajectory is not None
 
     aside = offset('<AbsoluteTargetLaneOffset value="1"/>')
     init = f'<Private entityRef="Ego">{trajectory(CORNER, "<None/>")}</Private>'

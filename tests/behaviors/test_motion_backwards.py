@@ -192,4 +192,4 @@ ENDS: dict[float, bool] = {}
 
 
 def _note_end(simulation: Any, frame: Any) -> None:
-    ENDS[round(frame.view.time, 3)] = simulation.storyboard.stage.actors["Ego"].end_of_road_since is not None
+    ENDS[round(frame.view.time, 3)] = simulation.storyboard.context.actors["Ego"].end_of_road_since is not None

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from eidrive_behaviors.controllers.reference_driver import DriverSettings, Phase, ReferenceDriver
-from eidrive_behaviors.controllers.road_ahead import Ahead
-from eidrive_behaviors.controllers.safety_models import Fsm, Own, Regulation, Rss
+from eidrive_behaviors.controllers.reference_driver import DriverPhase, ReferenceDriver, ReferenceDriverSettings
+from eidrive_behaviors.controllers.road_ahead import LeadObject
+from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss
 
 DT = 0.01
 
 
-def ahead(**more: Any) -> Ahead:
+def ahead(**more: Any) -> LeadObject:
     """Somebody in the own lane, 30 m ahead, 5 m/s slower."""
     values: dict[str, Any] = {
         "name": "lead",
@@ -30,11 +30,11 @@ def ahead(**more: Any) -> Ahead:
         "across": 0.0,
         "walks": False,
     }
-    return Ahead(**{**values, **more})
+    return LeadObject(**{**values, **more})
 
 
-def own(speed: float = 20.0, acceleration: float = 0.0) -> Own:
-    return Own(speed, acceleration, DT)
+def own(speed: float = 20.0, acceleration: float = 0.0) -> EgoKinematics:
+    return EgoKinematics(speed, acceleration, DT)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_a_cut_in_begins_at_0_375_m_and_is_dangerous_below_2_s() -> None:
 def test_by_distance_it_evaluates_a_cut_in_over_0_72_m() -> None:
     """At 2 m/s that takes 0.36 s in place of 0.4 s."""
     near = {"lanes": 1, "nearing": 2.0, "closing": 10.0, "gap": 19.0, "aside": 1.0, "towards": 0.5}
-    driver = ReferenceDriver(DriverSettings(distance=0.72))
+    driver = ReferenceDriver(ReferenceDriverSettings(distance=0.72))
     decided = course(driver, 200, lambda step: ahead(across=3.0 - 0.02 * step, **near))
     assert decided.index(next(one for one in decided if one is not None)) == 37 + 75
 
@@ -151,7 +151,7 @@ def test_who_leaves_the_lane_reveals_who_stands_there() -> None:
     for _ in range(116):
         decided = driver.decide(own(), [leaving, standing])
     assert driver.lead is standing
-    assert driver.phase is Phase.BRAKING
+    assert driver.phase is DriverPhase.BRAKING
     assert decided is not None
 
 

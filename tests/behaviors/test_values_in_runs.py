@@ -9,7 +9,7 @@ from street_scene import NOTHING, after, everywhere, private
 
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.states import Transition
+from eidrive_scenario.storyboard.states import ElementTransition
 
 
 @pytest.mark.element("EnvironmentAction")
@@ -132,7 +132,9 @@ def test_a_pedestrian_waves_and_a_loop_goes_on(run: Any) -> None:
     played = run(1, ("Ego", wave))
     held = played.frames[-1].appearances["Ego"]
     assert (held.motion, held.animations["motion"].gestures) == ("standing", ("wavingRightArm",))
-    assert not any(c.element == "action 0" and c.transition is Transition.END for f in played.frames for c in f.changes)
+    assert not any(
+        c.element == "action 0" and c.transition is ElementTransition.END for f in played.frames for c in f.changes
+    )
 
 
 @pytest.mark.element("VisibilityAction")

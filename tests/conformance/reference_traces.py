@@ -143,7 +143,7 @@ def _names(simulation: Simulation) -> dict[str, str]:
     """Trailers that are described inside of what draws them, as the reference calls them: its name and a `+`."""
     declared = {one.name for one in simulation.scenario.document.entities.scenario_object}
     names: dict[str, str] = {}
-    for front, back in pairs(simulation.storyboard.stage.actors):
+    for front, back in pairs(simulation.storyboard.context.actors):
         if back.name not in declared:
             names[back.name] = f"{names.get(front.name, front.name)}+"
     return names

@@ -107,7 +107,7 @@ def test_scenarios_for_carla_start_on_their_lanes_in_its_direction(name: str, en
     scenario = load_scenario(Path(CORPORA) / "scenario_runner" / f"{name}.xosc")
     with Simulation(scenario, settings=RunSettings(dt=0.05)) as simulation:
         simulation.tick()
-        stage = simulation.storyboard.stage
+        stage = simulation.storyboard.context
         here = stage.location(entity)
         assert here is not None
         assert (here.road, here.lane) == lane

@@ -86,7 +86,7 @@ def test_without_a_stand_in_an_unknown_controller_leaves_lane_and_speed(name: st
     scenario = load_scenario(source_of(Path(CORPORA), name))
     with Simulation(scenario, settings=RunSettings(dt=0.1)) as simulation:
         frames = [simulation.tick()[0] for _ in range(100)]
-        warnings = [str(warning) for warning in simulation.storyboard.stage.warnings]
+        warnings = [str(warning) for warning in simulation.storyboard.context.warnings]
     assert any("of Ego is not known: Ego keeps lane and speed" in warning for warning in warnings)
     row = frames[0].view.row("Ego")
     speeds = {round(float(frame.view.speed[row]), 6) for frame in frames[1:12]}

@@ -39,15 +39,15 @@ class VisibilityAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Say it."""
-        action, stage, name = self.action, self.stage, self.actor.name
-        before, chosen = stage.appearance(name), action.sensor_reference_set
+        action, context, name = self.action, self.context, self.actor.name
+        before, chosen = context.appearance(name), action.sensor_reference_set
         if chosen is None:
             seen = Visibility(action.graphics, action.traffic, action.sensors)
         else:
             named = {one.name: action.sensors for one in chosen.sensor_reference}
             others = before.visibility
             seen = Visibility(action.graphics, action.traffic, others.sensors, {**others.named, **named})
-        stage.look(name, replace(before, visibility=seen))
+        context.set_appearance(name, replace(before, visibility=seen))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -77,24 +77,24 @@ class LightStateAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Switch it."""
-        state, stage, name = self.action.light_state, self.stage, self.actor.name
+        state, context, name = self.action.light_state, self.context, self.actor.name
         usual = LightState(self._light, self._mode)
         light = replace(
             usual,
             intensity=state.luminous_intensity if state.luminous_intensity is not None else state.intensity,
             colour=rgb(state.color) if state.color is not None else None,
-            since=max(stage.time, 0.0),
+            since=max(context.time, 0.0),
             fade=self.action.transition_time or 0.0,
             on_for=usual.on_for if state.flashing_on_duration is None else state.flashing_on_duration,
             off_for=usual.off_for if state.flashing_off_duration is None else state.flashing_off_duration,
         )
-        before = stage.appearance(name)
-        stage.look(name, replace(before, lights={**before.lights, self._light: light}))
+        before = context.appearance(name)
+        context.set_appearance(name, replace(before, lights={**before.lights, self._light: light}))
         self._until = light.since + light.fade
 
     def update(self) -> Status:
         """Wait for the transition's end."""
-        over = self.stage.time > self._until - TINY and self._mode != model.LightMode.FLASHING.value
+        over = self.context.time > self._until - TINY and self._mode != model.LightMode.FLASHING.value
         return Status.SUCCESS if over else Status.RUNNING
 
     @property
@@ -133,24 +133,24 @@ class AnimationAction(ActionBehaviour):
     def initialise(self) -> None:
         """Begin it."""
         kind, what = self._kind_and_what()
-        stage, name = self.stage, self.actor.name
+        context, name = self.context, self.actor.name
         pedestrian = self.action.animation_type.pedestrian_animation
         animation = AnimationState(
             kind,
             what,
             state=self.action.animation_state.state if self.action.animation_state is not None else None,
-            since=max(stage.time, 0.0),
+            since=max(context.time, 0.0),
             duration=self.action.animation_duration,
             loop=bool(self.action.loop),
             gestures=tuple(one.gesture.value for one in pedestrian.pedestrian_gesture) if pedestrian else (),
         )
-        before = stage.appearance(name)
-        stage.look(name, replace(before, animations={**before.animations, self.resource: animation}))
+        before = context.appearance(name)
+        context.set_appearance(name, replace(before, animations={**before.animations, self.resource: animation}))
         self._until = math.inf if animation.loop else animation.since + (animation.duration or 0.0)
 
     def update(self) -> Status:
         """Wait for its end."""
-        return Status.SUCCESS if self.stage.time > self._until - TINY else Status.RUNNING
+        return Status.SUCCESS if self.context.time > self._until - TINY else Status.RUNNING
 
     def _kind_and_what(self) -> tuple[str, str]:
         kind = self.action.animation_type

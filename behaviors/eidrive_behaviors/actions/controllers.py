@@ -7,7 +7,17 @@ import math
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Actor, Goal, Override, Pose, Route, Stage, is_ours, model
+from eidrive_scenario.api import (
+    ActionBehaviour,
+    Actor,
+    Goal,
+    Override,
+    Pose,
+    Route,
+    RuntimeContext,
+    is_agent_controller,
+    model,
+)
 
 POINTS_APART = 2.0
 """Of a route that a controller takes over [m]."""
@@ -27,7 +37,7 @@ class ActivateControllerAction(ActionBehaviour):
     def update(self) -> Status:
         """Switch."""
         lateral, longitudinal = self.action.lateral, self.action.longitudinal
-        if self._means_another() and any(is_ours(controller) for controller in self.actor.controllers):
+        if self._means_another() and any(is_agent_controller(controller) for controller in self.actor.controllers):
             lateral, longitudinal = _left_to_ours(lateral, longitudinal)
         switch(self, lateral, longitudinal)
         return Status.SUCCESS
@@ -37,12 +47,12 @@ class ActivateControllerAction(ActionBehaviour):
         name = self.action.object_controller_ref or self.action.controller_ref
         if name is None:
             return False
-        entities = self.stage.scenario.document.entities
+        entities = self.context.scenario.document.entities
         objects = entities.scenario_object if entities is not None else ()
         held = next((one.object_controller for one in objects if one.name == self.actor.name), ())
         named = {one.name: controller for one, controller in zip(held, self.actor.controllers, strict=False)}
         named |= {controller.name: controller for controller in self.actor.controllers}
-        return name in named and not is_ours(named[name])
+        return name in named and not is_agent_controller(named[name])
 
     def describe(self) -> str:
         """Which domains."""
@@ -63,14 +73,14 @@ class AssignControllerAction(ActionBehaviour):
     def __init__(
         self,
         action: model.AssignControllerAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
+        super().__init__(action, context, actor=actor, parent=parent)
         self._controller = self._found()
-        if self._controller is not None and is_ours(self._controller):
+        if self._controller is not None and is_agent_controller(self._controller):
             raise self.problem(
                 "assigns an eidrive controller during the run",
                 "give it to the entity in ObjectController, and switch it by ActivateControllerAction",
@@ -88,7 +98,7 @@ class AssignControllerAction(ActionBehaviour):
         if holder.controller is not None:
             return holder.controller
         if holder.catalog_reference is not None:
-            return self.stage.catalog_entry(holder.catalog_reference, model.Controller, self.action)
+            return self.context.catalog_entry(holder.catalog_reference, model.Controller, self.action)
         return None
 
     def describe(self) -> str:
@@ -103,7 +113,7 @@ class OverrideControllerValueAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Hold or give back."""
-        held = self.stage.overrides.setdefault(self.actor.name, {})
+        held = self.context.overrides.setdefault(self.actor.name, {})
         for override in self._overrides():
             if override.active:
                 held[override.control] = override
@@ -159,7 +169,7 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
     if before is not actor.driven and actor.present:
         _join_lap(actor)
     if before and not actor.driven and actor.present:
-        actor.motion.land()
+        actor.motion.snap_to_lane()
     if actor.driven and not before and actor.present:
         onward = actor.motion.route.onward if actor.motion.route is not None else None
         lap = None if onward is None else onward.polyline(POINTS_APART)

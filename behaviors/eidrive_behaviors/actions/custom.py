@@ -16,7 +16,7 @@ class CustomCommandAction(ActionBehaviour):
     def update(self) -> Status:
         """Hand it on."""
         action = self.action
-        self.stage.commands.custom.append(
+        self.context.commands.custom.append(
             CustomCommand(action.type, action.content, action.line, action.source, action.scope)
         )
         return Status.SUCCESS

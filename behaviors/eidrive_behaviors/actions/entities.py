@@ -5,7 +5,7 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.teleport import position_in_words
-from eidrive_scenario.api import ActionBehaviour, model, resolve
+from eidrive_scenario.api import ActionBehaviour, model, resolve_position
 
 
 class AddEntityAction(ActionBehaviour):
@@ -17,7 +17,7 @@ class AddEntityAction(ActionBehaviour):
     def update(self) -> Status:
         """Bring it in."""
         name = self.parent_element.entity_ref
-        self.stage.enter(name, resolve(self.action.position, self.stage, name))
+        self.context.add_actor(name, resolve_position(self.action.position, self.context, name))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -33,7 +33,7 @@ class DeleteEntityAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Take it out."""
-        self.stage.leave(self.parent_element.entity_ref)
+        self.context.remove_actor(self.parent_element.entity_ref)
         return Status.SUCCESS
 
     def describe(self) -> str:

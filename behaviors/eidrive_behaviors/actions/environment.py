@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, changed_environment, model
+from eidrive_scenario.api import ActionBehaviour, merge_environment, model
 
 
 class EnvironmentAction(ActionBehaviour):
@@ -15,15 +15,15 @@ class EnvironmentAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set it."""
-        stage = self.stage
-        stage.environment = changed_environment(stage.environment, self._environment(), max(stage.time, 0.0))
-        stage.commands.environment = stage.environment
+        context = self.context
+        context.environment = merge_environment(context.environment, self._environment(), max(context.time, 0.0))
+        context.commands.environment = context.environment
         return Status.SUCCESS
 
     def _environment(self) -> model.Environment:
         if self.action.environment is not None:
             return self.action.environment
-        return self.stage.catalog_entry(self.action.catalog_reference, model.Environment, self.action)
+        return self.context.catalog_entry(self.action.catalog_reference, model.Environment, self.action)
 
     def describe(self) -> str:
         """Which one."""

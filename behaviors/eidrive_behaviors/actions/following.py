@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import Layout, Pose, model, turning_wheelbase, wrap_angle
+from eidrive_scenario.api import Pose, TrajectoryCurve, model, turning_wheelbase, wrap_angle
 
 TINY = 1e-9
 ON_PATH = 1e-3
@@ -18,7 +18,7 @@ PREVIEW = 0.5
 """How far ahead a vehicle off its trajectory looks for it [s]."""
 
 
-class Tracker:
+class RateLimitedValue:
     """A value that follows a moving one: its rate is bounded, and so is the rate's own rate of change.
 
     It closes in as fast as the bound still lets it settle: the time-optimal control of a double integrator (A. Bryson,
@@ -70,7 +70,7 @@ def closing_rate(gap: float, bound: float, dt: float) -> float:
     return gap / (steps * dt) + 0.5 * (steps - 1) * bound * dt
 
 
-class Pursuit:
+class PathPursuit:
     """A vehicle on its way along a trajectory: on it where its wheels can turn so far, else after it.
 
     Off the trajectory it steers for a point of it ahead, turning about its rear axle (pure pursuit; R. Coulter,
@@ -81,7 +81,7 @@ class Pursuit:
     on_path    whether it is on the trajectory
     """
 
-    def __init__(self, layout: Layout, s: float, pose: Pose, curvature: float, wheelbase: float) -> None:
+    def __init__(self, layout: TrajectoryCurve, s: float, pose: Pose, curvature: float, wheelbase: float) -> None:
         self.s, self.pose = s, pose
         self._layout, self._curvature, self._wheelbase = layout, curvature, wheelbase
         start = layout.at(s)
@@ -162,12 +162,12 @@ def wheelbase_of(vehicle: model.Vehicle) -> float:
     return front.position_x - vehicle.axles.rear_axle.position_x if front is not None else 0.0
 
 
-def speed_tracker(vehicle: model.Vehicle, speed: float, *, backwards: bool) -> Tracker:
+def speed_limiter(vehicle: model.Vehicle, speed: float, *, backwards: bool) -> RateLimitedValue:
     """Follows a speed [m/s] within the acceleration and, where the vehicle states it, the jerk of its Performance."""
     limits = vehicle.performance
     gain, loss = limits.max_acceleration, limits.max_deceleration
     gain_rate = math.inf if limits.max_acceleration_rate is None else limits.max_acceleration_rate
     loss_rate = math.inf if limits.max_deceleration_rate is None else limits.max_deceleration_rate
     if backwards:
-        return Tracker(speed, 0.0, up=loss_rate, down=gain_rate, lowest=-gain, highest=loss)
-    return Tracker(speed, 0.0, up=gain_rate, down=loss_rate, lowest=-loss, highest=gain)
+        return RateLimitedValue(speed, 0.0, up=loss_rate, down=gain_rate, lowest=-gain, highest=loss)
+    return RateLimitedValue(speed, 0.0, up=gain_rate, down=loss_rate, lowest=-loss, highest=gain)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import Tracker, follows, largest_curvature
+from eidrive_behaviors.actions.following import RateLimitedValue, follows, largest_curvature
 from eidrive_behaviors.actions.speed import dynamics_in_words
 from eidrive_scenario.api import (
     STEEPEST,
@@ -16,9 +16,9 @@ from eidrive_scenario.api import (
     Domain,
     Goal,
     LaneLocation,
-    Stage,
-    Steering,
-    ValueTransition,
+    LateralStep,
+    RuntimeContext,
+    TransitionProfile,
     count_lanes,
     facing,
     model,
@@ -49,26 +49,26 @@ class LaneChangeAction(ActionBehaviour):
     def __init__(
         self,
         action: model.LaneChangeAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
+        super().__init__(action, context, actor=actor, parent=parent)
         self._dynamics = action.lane_change_action_dynamics
-        self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
+        self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = action.lane_change_target.absolute_target_lane
         if target is not None and not target.value.removeprefix("-").isdecimal():
             raise self.problem(f"aims at lane {target.value!r}", "give the lane's number")
-        if stage.roads is None:
+        if context.roads is None:
             raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
-        self._roads = stage.roads
+        self._roads = context.roads
         self._lane = 0
-        self._tracker: Tracker | None = None
+        self._tracker: RateLimitedValue | None = None
 
     def initialise(self) -> None:
         """Find the target lane, and see the actor's place as an offset from its centre."""
-        here = self.stage.location(self.actor.name)
+        here = self.context.location(self.actor.name)
         if here is None:
             raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
         self._lane = self._target_lane(here)
@@ -78,28 +78,28 @@ class LaneChangeAction(ActionBehaviour):
                 f"its lanes there: {', '.join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))}",
             )
         if self.actor.motion.location is None:
-            self.actor.motion.land()
-        moved = self.actor.motion.relate_to_lane(self._lane) or here
+            self.actor.motion.snap_to_lane()
+        moved = self.actor.motion.set_reference_lane(self._lane) or here
         way = self._roads.driving_direction(moved.road, self._lane)
         start, target = moved.offset * way, (self.action.target_lane_offset or 0.0) * way
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            self._transition = ValueTransition.by_rate(shape, start, target, value)
+            self._transition = TransitionProfile.from_rate(shape, start, target, value)
         else:
-            self._transition = ValueTransition(shape, start, target, value)
+            self._transition = TransitionProfile(shape, start, target, value)
         self._offset = start
         self._followed_lane = moved.road, self._lane
         if follows(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
-            self._tracker = Tracker(start, sideways, up=math.inf, down=math.inf)
+            self._tracker = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
 
     def update(self) -> Status:
         """The offset at the end of the step."""
         if self.actor.driven:
             return self._ask_driver()
-        way = abs(self.actor.motion.speed) * self.stage.dt
+        way = abs(self.actor.motion.speed) * self.context.dt
         if self._transition.extent <= 0.0 and self._tracker is None:
-            self.actor.motion.steer(Steering(self._transition.target, 0.0, slows=False))
+            self.actor.motion.set_lateral_step(LateralStep(self._transition.target, 0.0, shortens_distance=False))
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
             return Status.RUNNING
@@ -114,7 +114,7 @@ class LaneChangeAction(ActionBehaviour):
             wanted, rate = self._offset + math.copysign(most, wanted - self._offset), None
         self._offset = wanted
         arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
-        self.actor.motion.steer(Steering(wanted, 0.0 if arrived else None, way=way, rate=rate))
+        self.actor.motion.set_lateral_step(LateralStep(wanted, 0.0 if arrived else None, distance=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 
     def _relate(self) -> None:
@@ -127,15 +127,15 @@ class LaneChangeAction(ActionBehaviour):
         if abs(offset - self._offset) <= SHIFTED:
             return
         left = max(transition.extent - transition.progress, TINY)
-        self._transition = ValueTransition(transition.shape, offset, transition.target, left)
+        self._transition = TransitionProfile(transition.shape, offset, transition.target, left)
         if self._tracker is not None:
-            self._tracker = Tracker(offset, self._tracker.rate, up=math.inf, down=math.inf)
+            self._tracker = RateLimitedValue(offset, self._tracker.rate, up=math.inf, down=math.inf)
         self._offset = offset
 
     def _next(self, way: float) -> float:
         transition = self._transition
         if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
-            return transition.advance(self.stage.dt)
+            return transition.advance(self.context.dt)
         before = transition.progress
         sideways = transition.advance(way) - self._offset
         along = math.sqrt(max(0.0, way * way - sideways * sideways))
@@ -147,16 +147,16 @@ class LaneChangeAction(ActionBehaviour):
         slope = self._transition.slope
         if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
             return slope
-        return way / self.stage.dt * slope / math.hypot(1.0, slope)
+        return way / self.context.dt * slope / math.hypot(1.0, slope)
 
-    def _followed(self, tracker: Tracker, wanted: float) -> float:
+    def _followed(self, tracker: RateLimitedValue, wanted: float) -> float:
         vehicle, speed = self.actor.entity, self.actor.motion.speed
         assert isinstance(vehicle, model.Vehicle)
         tracker.up = tracker.down = min(
             largest_curvature(vehicle) * speed * speed, vehicle.performance.max_deceleration
         )
         tracker.lowest, tracker.highest = -abs(speed), abs(speed)
-        return tracker.advance(wanted, self.stage.dt)
+        return tracker.advance(wanted, self.context.dt)
 
     def _target_lane(self, here: LaneLocation) -> int:
         target = self.action.lane_change_target
@@ -164,14 +164,14 @@ class LaneChangeAction(ActionBehaviour):
             return int(target.absolute_target_lane.value)
         assert target.relative_target_lane is not None
         name = target.relative_target_lane.entity_ref
-        reference = self.stage.location(name)
+        reference = self.context.location(name)
         if reference is None:
             raise self.problem(f"counts lanes from {name}, which is on no road")
-        left = facing(self.stage, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
+        left = facing(self.context, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
         return count_lanes(reference.lane, target.relative_target_lane.value * left)
 
     def _ask_driver(self) -> Status:
-        here = self.stage.location(self.actor.name)
+        here = self.context.location(self.actor.name)
         if here is None:
             return Status.RUNNING
         target = self.action.target_lane_offset or 0.0

@@ -11,8 +11,8 @@ from eidrive_scenario.api import (
     ActionBehaviour,
     Domain,
     LaneLocation,
-    Steering,
-    ValueTransition,
+    LateralStep,
+    TransitionProfile,
     facing,
     model,
     same_way,
@@ -39,7 +39,7 @@ class LaneOffsetAction(ActionBehaviour):
         """Lay the transition from the present offset."""
         motion = self.actor.motion
         if motion.location is None:
-            motion.land()
+            motion.snap_to_lane()
         if motion.location is None:
             raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
         self._lane = motion.location.road, motion.location.lane
@@ -51,9 +51,9 @@ class LaneOffsetAction(ActionBehaviour):
         start, target = here.offset * way, self._target(here) * way
         limit, shape = self.action.lane_offset_action_dynamics.max_lateral_acc, self._shape()
         if limit is None:
-            self._transition = ValueTransition(shape, start, target, 0.0)
+            self._transition = TransitionProfile(shape, start, target, 0.0)
         else:
-            self._transition = ValueTransition.by_bend(shape, start, target, limit)
+            self._transition = TransitionProfile.from_second_derivative(shape, start, target, limit)
         self._offset = start
 
     def update(self) -> Status:
@@ -65,7 +65,7 @@ class LaneOffsetAction(ActionBehaviour):
             self._lane = here.road, here.lane
             if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
                 self._lay(here)
-        transition, speed, dt = self._transition, self.actor.motion.speed, self.stage.dt
+        transition, speed, dt = self._transition, self.actor.motion.speed, self.context.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING
         if transition.done and self.action.continuous:
@@ -78,14 +78,14 @@ class LaneOffsetAction(ActionBehaviour):
         done = transition.done and not steep
         heading = 0.0 if done or abs(speed) < STANDING else None
         rate = None if steep else transition.slope
-        self.actor.motion.steer(Steering(offset, heading, slows=steep, rate=rate))
+        self.actor.motion.set_lateral_step(LateralStep(offset, heading, shortens_distance=steep, rate=rate))
         return Status.SUCCESS if done and not self.action.continuous else Status.RUNNING
 
     def _shape(self) -> model.DynamicsShape:
         return self.action.lane_offset_action_dynamics.dynamics_shape
 
     def _way(self, here: LaneLocation) -> int:
-        return 1 if self.stage.roads is None else self.stage.roads.driving_direction(here.road, here.lane)
+        return 1 if self.context.roads is None else self.context.roads.driving_direction(here.road, here.lane)
 
     def _target(self, here: LaneLocation) -> float:
         """The offset to reach, in the direction of t [m]."""
@@ -93,14 +93,14 @@ class LaneOffsetAction(ActionBehaviour):
         if target.absolute_target_lane_offset is not None:
             return target.absolute_target_lane_offset.value
         assert target.relative_target_lane_offset is not None
-        name, roads = target.relative_target_lane_offset.entity_ref, self.stage.roads
-        other = self.stage.location(name)
+        name, roads = target.relative_target_lane_offset.entity_ref, self.context.roads
+        other = self.context.location(name)
         if other is None or roads is None:
             raise self.problem(f"counts from {name}, which is on no road")
         found = roads.distance(here, other)
         if found is None:
             raise self.problem(f"counts from {name}, to which no road leads")
-        along = facing(self.stage, self.actor.name, here) * same_way(self.stage, self.actor.name, name, "lane")
+        along = facing(self.context, self.actor.name, here) * same_way(self.context, self.actor.name, name, "lane")
         left = target.relative_target_lane_offset.value * along
         return here.offset + (found[1] + left) * self._way(here)
 

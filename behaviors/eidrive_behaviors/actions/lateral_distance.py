@@ -7,7 +7,16 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS
-from eidrive_scenario.api import STEEPEST, ActionBehaviour, Domain, Steering, distance, frame_of, model, same_way
+from eidrive_scenario.api import (
+    STEEPEST,
+    ActionBehaviour,
+    Domain,
+    LateralStep,
+    distance,
+    model,
+    resolve_coordinate_system,
+    same_way,
+)
 
 REACHED = 0.01
 """So near to the wanted distance an action that is not continuous ends [m]."""
@@ -33,10 +42,10 @@ class LateralDistanceAction(ActionBehaviour):
         """Decide on the side."""
         self._rate = 0.0
         if self.actor.motion.location is None:
-            self.actor.motion.land()
+            self.actor.motion.snap_to_lane()
         displacement = self.action.displacement
-        frame = frame_of(self.action.coordinate_system)
-        left = same_way(self.stage, self.actor.name, self.action.entity_ref, frame)
+        frame = resolve_coordinate_system(self.action.coordinate_system)
+        left = same_way(self.context, self.actor.name, self.action.entity_ref, frame)
         if displacement is model.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY:
             self._side = left
         elif displacement is model.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY:
@@ -46,9 +55,9 @@ class LateralDistanceAction(ActionBehaviour):
 
     def update(self) -> Status:
         """The offset at the end of the step."""
-        motion, dt = self.actor.motion, self.stage.dt
-        here, roads = motion.location, self.stage.roads
-        if self.actor.driven or self.action.entity_ref not in self.stage.view or here is None or roads is None:
+        motion, dt = self.actor.motion, self.context.dt
+        here, roads = motion.location, self.context.roads
+        if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._side * self._wanted() + self._beside()
         if math.isnan(error):
@@ -60,7 +69,7 @@ class LateralDistanceAction(ActionBehaviour):
                 sideways = math.copysign(most, sideways)
                 self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
-        motion.steer(Steering(offset, None if abs(motion.speed) > 1e-6 else 0.0))
+        motion.set_lateral_step(LateralStep(offset, None if abs(motion.speed) > 1e-6 else 0.0))
         arrived = abs(error - sideways) < REACHED
         return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
 
@@ -85,15 +94,15 @@ class LateralDistanceAction(ActionBehaviour):
 
     def _beside(self) -> float:
         """How far the other's middle is to the left of the own one [m]."""
-        frame = frame_of(self.action.coordinate_system)
+        frame = resolve_coordinate_system(self.action.coordinate_system)
         me, other = self.actor.name, self.action.entity_ref
-        here, roads = self.actor.motion.location, self.stage.roads
+        here, roads = self.actor.motion.location, self.context.roads
         if frame == "entity" and here is not None and roads is not None:
             lane = roads.pose(here).h + (0.0 if self.actor.motion.direction > 0 else math.pi)
-            mine, theirs = self.stage.pose(me), self.stage.pose(other)
+            mine, theirs = self.context.pose(me), self.context.pose(other)
             beside = (theirs.y - mine.y) * math.cos(lane) - (theirs.x - mine.x) * math.sin(lane)
         else:
-            beside = distance(self.stage, me, other, frame=frame, kind="lateral", freespace=False)
+            beside = distance(self.context, me, other, frame=frame, kind="lateral", freespace=False)
         my_box, their_box = self._boxes()
         return beside + their_box.center.y - my_box.center.y
 
@@ -105,7 +114,7 @@ class LateralDistanceAction(ActionBehaviour):
         return apart
 
     def _boxes(self) -> tuple[model.BoundingBox, model.BoundingBox]:
-        actors = self.stage.actors
+        actors = self.context.actors
         return self.actor.entity.bounding_box, actors[self.action.entity_ref].entity.bounding_box
 
     def describe(self) -> str:

@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Domain, distance, frame_of, model, same_way
+from eidrive_scenario.api import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
 """Of the spring between actual and wanted distance, per m/s² of the largest acceleration [1/m]."""
@@ -39,7 +39,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     def update(self) -> Status:
         """The speed for the step."""
-        if not self.stage.actors[self.action.entity_ref].present or self.actor.driven:
+        if not self.context.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()
         if math.isnan(error):
@@ -53,13 +53,13 @@ class LongitudinalDistanceAction(ActionBehaviour):
         limits, motion = self.action.dynamic_constraints, self.actor.motion
         faster = _or_infinite(limits.max_acceleration if limits is not None else None)
         slower = _or_infinite(limits.max_deceleration if limits is not None else None)
-        other = self._same_way() * self.stage.speed(self.action.entity_ref)
+        other = self._same_way() * self.context.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
-            motion.carry(error + other * self.stage.dt)
+            motion.move_along_lane(error + other * self.context.dt)
             motion.speed = other
             return 0.0
         assert limits is not None
-        dt = self.stage.dt
+        dt = self.context.dt
         up, down = faster, slower
         more, less = _change(limits.max_acceleration_rate, dt), _change(limits.max_deceleration_rate, dt)
         if motion.speed < 0.0 or (motion.speed == 0.0 and error < 0.0):
@@ -82,21 +82,21 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     def _gap(self) -> float:
         return distance(
-            self.stage,
+            self.context,
             self.actor.name,
             self.action.entity_ref,
-            frame=frame_of(self.action.coordinate_system),
+            frame=resolve_coordinate_system(self.action.coordinate_system),
             kind="longitudinal",
             freespace=self.action.freespace,
         )
 
     def _same_way(self) -> float:
-        frame = frame_of(self.action.coordinate_system)
-        return same_way(self.stage, self.actor.name, self.action.entity_ref, frame)
+        frame = resolve_coordinate_system(self.action.coordinate_system)
+        return same_way(self.context, self.actor.name, self.action.entity_ref, frame)
 
     def _wanted(self) -> float:
         if self.action.time_gap is not None:
-            return self._side * self.action.time_gap * abs(self.stage.speed(self.action.entity_ref))
+            return self._side * self.action.time_gap * abs(self.context.speed(self.action.entity_ref))
         return self._side * (self.action.distance or 0.0)
 
     def describe(self) -> str:

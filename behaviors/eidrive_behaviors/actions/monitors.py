@@ -15,7 +15,7 @@ class SetMonitorAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set it."""
-        self.stage.monitors = {**self.stage.monitors, self.action.monitor_ref: self.action.value}
+        self.context.monitors = {**self.context.monitors, self.action.monitor_ref: self.action.value}
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -14,13 +14,13 @@ from eidrive_scenario.api import (
     Goal,
     Route,
     RouteError,
-    Stage,
-    any_branch,
+    RuntimeContext,
+    build_route,
     generator,
     model,
     random_route,
-    resolve,
-    route_of,
+    resolve_position,
+    uniform_branch_selector,
 )
 
 RANDOM_WAY = 5000.0
@@ -38,19 +38,19 @@ class AssignRouteAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Lay the route out, from where the actor is if there is a way from there."""
-        route = self.action.route or self.stage.catalog_entry(self.action.catalog_reference, model.Route, self.action)
-        here = self.stage.location(self.actor.name) if self.actor.present else None
-        roads, seed = self.stage.roads, self.stage.seed
+        route = self.action.route or self.context.catalog_entry(self.action.catalog_reference, model.Route, self.action)
+        here = self.context.location(self.actor.name) if self.actor.present else None
+        roads, seed = self.context.roads, self.context.seed
 
         def place(position: model.Position) -> object:
-            return resolve(position, self.stage, self.actor.name)
+            return resolve_position(position, self.context, self.actor.name)
 
         try:
-            found = route_of(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
+            found = build_route(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
         except EidriveError:
             if here is None:
                 raise
-            found = route_of(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
+            found = build_route(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
         follow(self, found)
         return Status.SUCCESS
 
@@ -69,11 +69,11 @@ class AcquirePositionAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Lay the route out. Raises ScenarioError where there is none."""
-        place = resolve(self.action.position, self.stage, self.actor.name)
-        here = self.stage.location(self.actor.name)
-        if self.stage.roads is not None and here is not None and place.location is not None:
+        place = resolve_position(self.action.position, self.context, self.actor.name)
+        here = self.context.location(self.actor.name)
+        if self.context.roads is not None and here is not None and place.location is not None:
             try:
-                route = self.stage.roads.route(here, place.location)
+                route = self.context.roads.route(here, place.location)
             except RouteError as error:
                 raise self.problem(f"finds {error.diagnostics[0].message}", error.diagnostics[0].hint) from None
             follow(self, route)
@@ -99,14 +99,14 @@ class RandomRouteAction(ActionBehaviour):
     def __init__(
         self,
         action: model.RandomRouteAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
+        super().__init__(action, context, actor=actor, parent=parent)
         self._starts = 0
-        if stage.roads is None:
+        if context.roads is None:
             raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
 
     def initialise(self) -> None:
@@ -115,10 +115,10 @@ class RandomRouteAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Forget the route, and choose at random."""
-        actor, roads = self.actor, self.stage.roads
-        choose = any_branch(generator(self.stage.seed, "random route", actor.name, self._starts))
-        actor.motion.route, actor.motion.choose = None, choose
-        here = self.stage.location(actor.name)
+        actor, roads = self.actor, self.context.roads
+        choose = uniform_branch_selector(generator(self.context.seed, "random route", actor.name, self._starts))
+        actor.motion.route, actor.motion.branch_selector = None, choose
+        here = self.context.location(actor.name)
         if actor.driven and roads is not None and here is not None:
             way = random_route(roads, here, RANDOM_WAY, choose)
             actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None)
@@ -132,7 +132,7 @@ class RandomRouteAction(ActionBehaviour):
 def follow(behaviour: ActionBehaviour, route: Route) -> None:
     """Make a route the actor's own."""
     actor = behaviour.actor
-    actor.motion.route, actor.motion.choose = route, None
+    actor.motion.route, actor.motion.branch_selector = route, None
     if actor.driven:
         lap = None if route.onward is None else route.onward.polyline(2.0)
         actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0), lap=lap)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Stage, model, suggestion
+from eidrive_scenario.api import ActionBehaviour, RuntimeContext, model, suggestion
 
 
 class TrafficSignalStateAction(ActionBehaviour):
@@ -19,19 +19,19 @@ class TrafficSignalStateAction(ActionBehaviour):
     def __init__(
         self,
         action: model.TrafficSignalStateAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
-        odd = stage.signals.unknown(action.name, action)
+        super().__init__(action, context, actor=actor, parent=parent)
+        odd = context.signals.unknown(action.name, action)
         if odd is not None:
-            stage.warnings.append(odd)
+            context.warnings.append(odd)
 
     def update(self) -> Status:
         """Set it."""
-        self.stage.signals.set_state(self.action.name, self.action.state)
+        self.context.signals.set_state(self.action.name, self.action.state)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -48,13 +48,13 @@ class TrafficSignalControllerAction(ActionBehaviour):
     def __init__(
         self,
         action: model.TrafficSignalControllerAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
-        cycle = stage.signals.cycles.get(action.traffic_signal_controller_ref)
+        super().__init__(action, context, actor=actor, parent=parent)
+        cycle = context.signals.cycles.get(action.traffic_signal_controller_ref)
         phases = [phase.name for phase in cycle.phases] if cycle is not None else [action.phase]
         if action.phase not in phases:
             raise self.problem(
@@ -64,8 +64,8 @@ class TrafficSignalControllerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Begin it."""
-        self.stage.signals.set_phase(
-            self.action.traffic_signal_controller_ref, self.action.phase, max(self.stage.time, 0.0)
+        self.context.signals.set_phase(
+            self.action.traffic_signal_controller_ref, self.action.phase, max(self.context.time, 0.0)
         )
         return Status.SUCCESS
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import Tracker, follows, speed_tracker
-from eidrive_scenario.api import ActionBehaviour, Domain, Goal, Stage, ValueTransition, model
+from eidrive_behaviors.actions.following import RateLimitedValue, follows, speed_limiter
+from eidrive_scenario.api import ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
 
 TINY = 1e-6
 REACHED = 0.2
@@ -29,14 +29,19 @@ class SpeedAction(ActionBehaviour):
     action: model.SpeedAction
 
     def __init__(
-        self, action: model.SpeedAction, stage: Stage, *, actor: str | None = None, parent: model.Element | None = None
+        self,
+        action: model.SpeedAction,
+        context: RuntimeContext,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
+        super().__init__(action, context, actor=actor, parent=parent)
         self._dynamics = action.speed_action_dynamics
         self._absolute = action.speed_action_target.absolute_target_speed
         self._relative = action.speed_action_target.relative_target_speed
-        self._transition = ValueTransition(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
-        self._tracker: Tracker | None = None
+        self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
+        self._tracker: RateLimitedValue | None = None
 
     @property
     def _continuous(self) -> bool:
@@ -56,17 +61,17 @@ class SpeedAction(ActionBehaviour):
         self._transition = self._laid(start, target)
         vehicle = self.actor.entity
         if follows(self._dynamics) and isinstance(vehicle, model.Vehicle):
-            self._tracker = speed_tracker(vehicle, start, backwards=start + target < 0.0)
+            self._tracker = speed_limiter(vehicle, start, backwards=start + target < 0.0)
 
-    def _laid(self, start: float, target: float) -> ValueTransition:
+    def _laid(self, start: float, target: float) -> TransitionProfile:
         limit = slope_limit(start, target, *self.actor.limits()[1:])
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
-            transition = ValueTransition.by_rate(shape, start, target, value)
+            transition = TransitionProfile.from_rate(shape, start, target, value)
         elif self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE:
-            transition = ValueTransition(shape, start, target, duration_over(start, target, value))
+            transition = TransitionProfile(shape, start, target, duration_over(start, target, value))
         else:
-            transition = ValueTransition(shape, start, target, value)
+            transition = TransitionProfile(shape, start, target, value)
         transition.limit_rate(limit)
         return transition
 
@@ -80,9 +85,9 @@ class SpeedAction(ActionBehaviour):
         if transition.done and transition.extent > 0.0:
             speed = self._approach(transition.target)
         else:
-            speed = transition.advance(self.stage.dt)
-        if self._tracker is not None and self.stage.dt > 0.0:
-            speed = self._tracker.advance(speed, self.stage.dt)
+            speed = transition.advance(self.context.dt)
+        if self._tracker is not None and self.context.dt > 0.0:
+            speed = self._tracker.advance(speed, self.context.dt)
         self.actor.motion.speed = speed
         reached = transition.done and abs(speed - transition.target) < TINY
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
@@ -98,22 +103,22 @@ class SpeedAction(ActionBehaviour):
         """The speed of the transition becomes the goal, with its slope; done when the vehicle itself is as fast."""
         transition = self._transition
         before = transition.value
-        speed = transition.advance(self.stage.dt)
-        slope = 0.0 if transition.done or self.stage.dt == 0.0 else (speed - before) / self.stage.dt
+        speed = transition.advance(self.context.dt)
+        slope = 0.0 if transition.done or self.context.dt == 0.0 else (speed - before) / self.context.dt
         self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
-        if self.actor.motion.jumped and transition.done:
+        if self.actor.motion.teleported and transition.done:
             self.actor.motion.speed = speed
             return Status.RUNNING if self._continuous else Status.SUCCESS
-        reached = transition.done and abs(self.stage.speed(self.actor.name) - transition.target) < REACHED
+        reached = transition.done and abs(self.context.speed(self.actor.name) - transition.target) < REACHED
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
     def _present(self) -> float:
-        return self.stage.speed(self.actor.name) if self.actor.driven else self.actor.motion.speed
+        return self.context.speed(self.actor.name) if self.actor.driven else self.actor.motion.speed
 
     def _approach(self, target: float) -> float:
         """The next speed after the transition, where a relative target moves on: as fast as the vehicle can."""
         present = self.actor.motion.speed
-        most = slope_limit(present, target, *self.actor.limits()[1:]) * self.stage.dt
+        most = slope_limit(present, target, *self.actor.limits()[1:]) * self.context.dt
         return present + min(max(target - present, -most), most)
 
     def _target(self) -> float:
@@ -122,7 +127,7 @@ class SpeedAction(ActionBehaviour):
             speed = self._absolute.value
         else:
             assert self._relative is not None
-            reference = self.stage.speed(self._relative.entity_ref)
+            reference = self.context.speed(self._relative.entity_ref)
             factor = self._relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
             speed = reference * self._relative.value if factor else reference + self._relative.value
         return math.copysign(min(abs(speed), top), speed)

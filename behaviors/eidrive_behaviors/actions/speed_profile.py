@@ -16,7 +16,7 @@ TINY = 1e-6
 
 
 @dataclass(frozen=True)
-class Piece:
+class SpeedSegment:
     """From `time` [s] on: speed [m/s], its slope [m/s²] and the slope's slope [m/s³]."""
 
     time: float
@@ -57,7 +57,7 @@ class SpeedProfileAction(ActionBehaviour):
 
     def update(self) -> Status:
         """The speed at the end of the step."""
-        self._elapsed += self.stage.dt
+        self._elapsed += self.context.dt
         index = max(0, bisect_right([piece.time for piece in self._pieces], self._elapsed + TINY) - 1)
         done = index == len(self._pieces) - 1
         speed = self._pieces[-1].speed if done else self._pieces[index].at(self._elapsed)
@@ -73,7 +73,7 @@ class SpeedProfileAction(ActionBehaviour):
         name = self.action.entity_ref
         if name is None and self.action.entity_ref_element is not None:
             name = self.action.entity_ref_element.entity_ref
-        base = self.stage.speed(name) if name is not None else 0.0
+        base = self.context.speed(name) if name is not None else 0.0
         top = self._limit("max_speed")
         corners = [(0.0, start)]
         for number, entry in enumerate(self.action.speed_profile_entry):
@@ -101,22 +101,22 @@ class SpeedProfileAction(ActionBehaviour):
         return f"speeds {', '.join(f'{entry.speed:g}' for entry in self.action.speed_profile_entry)} m/s in turn"
 
 
-def straight(corners: list[tuple[float, float]]) -> list[Piece]:
+def straight(corners: list[tuple[float, float]]) -> list[SpeedSegment]:
     """Straight lines from corner to corner, constant after the last."""
     pieces = []
     for (time, speed), (later, after) in pairwise(corners):
-        pieces.append(Piece(time, speed, (after - speed) / (later - time)))
-    return [*pieces, Piece(corners[-1][0], corners[-1][1], 0.0)]
+        pieces.append(SpeedSegment(time, speed, (after - speed) / (later - time)))
+    return [*pieces, SpeedSegment(corners[-1][0], corners[-1][1], 0.0)]
 
 
-def rounded(corners: list[tuple[float, float]], up: float, down: float) -> list[Piece] | None:
+def rounded(corners: list[tuple[float, float]], up: float, down: float) -> list[SpeedSegment] | None:
     """The profile with parabolas at its corners, slopes changing at `up` and `down` [m/s³]; None where they overlap."""
     if len(corners) < 2:
         return straight(corners)
     if len(corners) == 2:
         return _swung(corners[0], corners[1], up, down)
     lines = straight(corners)
-    pieces: list[Piece] = []
+    pieces: list[SpeedSegment] = []
     time, speed, slope = 0.0, corners[0][1], 0.0
     for number, line in enumerate(lines):
         bend = up if line.slope > slope else -down
@@ -130,14 +130,14 @@ def rounded(corners: list[tuple[float, float]], up: float, down: float) -> list[
         if start < time - TINY:
             return None
         speed += slope * (start - time)
-        pieces.append(Piece(start, speed, slope, bend))
+        pieces.append(SpeedSegment(start, speed, slope, bend))
         speed += slope * span + 0.5 * bend * span * span
         time, slope = start + span, line.slope
-        pieces.append(Piece(time, speed, slope))
+        pieces.append(SpeedSegment(time, speed, slope))
     return pieces
 
 
-def _swung(first: tuple[float, float], last: tuple[float, float], up: float, down: float) -> list[Piece]:
+def _swung(first: tuple[float, float], last: tuple[float, float], up: float, down: float) -> list[SpeedSegment]:
     """One change of speed that begins and ends without acceleration, in the given time or, if too short, the least.
 
     With slopes that change at j1 at the start and j2 at the end and a stretch of constant slope a between, the change
@@ -155,8 +155,8 @@ def _swung(first: tuple[float, float], last: tuple[float, float], up: float, dow
     v1 = first[1] + sign * 0.5 * start * t1 * t1
     v2 = v1 + sign * slope * (t2 - t1)
     return [
-        Piece(0.0, first[1], 0.0, sign * start),
-        Piece(t1, v1, sign * slope),
-        Piece(t2, v2, sign * slope, -sign * end),
-        Piece(span, last[1], 0.0),
+        SpeedSegment(0.0, first[1], 0.0, sign * start),
+        SpeedSegment(t1, v1, sign * slope),
+        SpeedSegment(t2, v2, sign * slope, -sign * end),
+        SpeedSegment(span, last[1], 0.0),
     ]

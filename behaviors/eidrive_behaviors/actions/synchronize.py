@@ -8,14 +8,14 @@ from enum import Enum
 from py_trees.common import Status
 
 from eidrive_scenario.api import (
-    Absent,
     ActionBehaviour,
     Domain,
-    Layout,
-    Place,
+    EntityAbsentError,
+    ResolvedPosition,
+    TrajectoryCurve,
     TrajectoryProgress,
     model,
-    resolve,
+    resolve_position,
     trajectory_of,
 )
 
@@ -26,7 +26,7 @@ HARD = 8.0
 """Deceleration where there is too little way for anything softer [m/s²]."""
 
 
-class Phase(Enum):
+class SynchronizationPhase(Enum):
     """Where the manoeuvre stands."""
 
     SWING = "swing"
@@ -53,12 +53,12 @@ class SynchronizeAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Begin with the first phase."""
-        self._phase = Phase.SWING
+        self._phase = SynchronizationPhase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
-        self._measured: tuple[Layout | None, ...] = ()
+        self._measured: tuple[TrajectoryCurve | None, ...] = ()
         """The trajectories along which the ways of both were measured last."""
-        self._same: dict[str, tuple[Layout, bool]] = {}
+        self._same: dict[str, tuple[TrajectoryCurve, bool]] = {}
         """By entity, the trajectory that it follows, and whether its target is a TrajectoryPosition on that one."""
         self._sense = 1.0
         """-1 while the actor drives backwards."""
@@ -67,18 +67,18 @@ class SynchronizeAction(ActionBehaviour):
 
     def update(self) -> Status:
         """The speed for the step."""
-        motion, dt, final = self.actor.motion, self.stage.dt, self._final_speed()
+        motion, dt, final = self.actor.motion, self.context.dt, self._final_speed()
         self._sense = -1.0 if motion.speed < 0.0 or (motion.speed == 0.0 and (final or 0.0) < 0.0) else 1.0
         try:
-            master_speed = self.stage.speed(self.action.master_entity_ref)
+            master_speed = self.context.speed(self.action.master_entity_ref)
             way = self._way(self.actor.name, self.action.target_position, self._sense)
             sense = math.copysign(1.0, master_speed)
             master_way = self._way(self.action.master_entity_ref, self.action.target_position_master, sense)
-        except Absent:
+        except EntityAbsentError:
             return Status.RUNNING
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
         measured = tuple(
-            self.stage.actors[name].trajectory for name in (self.actor.name, self.action.master_entity_ref)
+            self.context.actors[name].trajectory for name in (self.actor.name, self.action.master_entity_ref)
         )
         changed, self._measured = measured != self._measured, measured
         passed = not changed and (way > self._last[0] or master_way > self._last[1])
@@ -106,26 +106,26 @@ class SynchronizeAction(ActionBehaviour):
         steady = self._steady_way(final)
         if steady > 0.0 and final > TINY:
             if way - steady < TINY or time - steady / final < TINY:
-                self._phase = Phase.STEADY
+                self._phase = SynchronizationPhase.STEADY
             way, time = way - steady, time - steady / final
-        if self._phase is Phase.STEADY:
+        if self._phase is SynchronizationPhase.STEADY:
             return final
         if math.isinf(time):
             return 0.0
-        if self._phase is Phase.BRAKE:
+        if self._phase is SynchronizationPhase.BRAKE:
             after = max(0.0, speed - HARD * dt)
             if after == 0.0:
-                self._phase = Phase.SWING
+                self._phase = SynchronizationPhase.SWING
             return after
-        if self._phase is Phase.WAIT:
+        if self._phase is SynchronizationPhase.WAIT:
             if final < TINY or time >= 2.0 * way / final:
                 return 0.0
-            self._phase = Phase.LAST
+            self._phase = SynchronizationPhase.LAST
         on_line = 2.0 * way / time - final
-        if self._phase is Phase.LAST:
+        if self._phase is SynchronizationPhase.LAST:
             return max(0.0, on_line)
         if abs(speed - on_line) < ON_LINE:
-            self._phase = Phase.LAST
+            self._phase = SynchronizationPhase.LAST
             return speed
         return self._swing(way, time, speed, final, dt)
 
@@ -136,16 +136,16 @@ class SynchronizeAction(ActionBehaviour):
         if self._rising is None:
             self._rising = acceleration > 0.0
         elif self._rising != (acceleration > 0.0):
-            self._phase = Phase.LAST
+            self._phase = SynchronizationPhase.LAST
             return speed
         if 0.5 * (speed + final + acceleration * time) < 0.0:
             stop = 2.0 * speed * way / (speed * speed + final * final) if speed > TINY else 0.0
             if stop * speed > way:
-                self._phase = Phase.BRAKE
+                self._phase = SynchronizationPhase.BRAKE
                 return max(0.0, speed - HARD * dt)
             acceleration = -speed / stop if stop > TINY else 0.0
             if speed + acceleration * dt <= TINY:
-                self._phase = Phase.WAIT
+                self._phase = SynchronizationPhase.WAIT
                 return 0.0
         return speed + acceleration * dt
 
@@ -154,14 +154,14 @@ class SynchronizeAction(ActionBehaviour):
 
         `sense` is -1 for an entity that drives backwards.
         """
-        actor = self.stage.actors[name]
+        actor = self.context.actors[name]
         if actor.progress is not None:
             return self._along(actor.progress, name, position, sense)
-        place: Place = resolve(position, self.stage, name)
-        here = self.stage.pose(name)
+        place: ResolvedPosition = resolve_position(position, self.context, name)
+        here = self.context.pose(name)
         straight = math.hypot(place.pose.x - here.x, place.pose.y - here.y)
-        roads = self.stage.roads
-        start = self.stage.location(name)
+        roads = self.context.roads
+        start = self.context.location(name)
         if roads is None or start is None or place.location is None:
             return straight
         found = roads.distance(start, place.location)
@@ -169,19 +169,19 @@ class SynchronizeAction(ActionBehaviour):
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
         """The way along the trajectory that the entity follows, in the direction in which it moves."""
-        layout, here = progress.layout, progress.at(self.stage.view.tick)
+        layout, here = progress.layout, progress.at(self.context.view.tick)
         frame = position.chosen()
         known = self._same.get(name)
         if known is None or known[0] is not layout:
             on_it = isinstance(frame, model.TrajectoryPosition) and (
-                trajectory_of(frame, self.stage, name).poses == layout.poses
+                trajectory_of(frame, self.context, name).poses == layout.poses
             )
             self._same[name] = known = layout, on_it
         if known[1] and isinstance(frame, model.TrajectoryPosition):
             target = frame.s
         else:
-            place = resolve(position, self.stage, name).pose
-            target = layout.beside(place.x, place.y, here)[0]
+            place = resolve_position(position, self.context, name).pose
+            target = layout.project(place.x, place.y, here)[0]
         way = (target - here) * progress.way * sense
         return way % layout.length if layout.closed and layout.length > 0.0 else way
 
@@ -192,7 +192,7 @@ class SynchronizeAction(ActionBehaviour):
         if final.absolute_speed is not None:
             return final.absolute_speed.value
         assert final.relative_speed_to_master is not None
-        relative, master = final.relative_speed_to_master, self.stage.speed(self.action.master_entity_ref)
+        relative, master = final.relative_speed_to_master, self.context.speed(self.action.master_entity_ref)
         factor = relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
         return master * relative.value if factor else master + relative.value
 

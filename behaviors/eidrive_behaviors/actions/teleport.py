@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, model, resolve
+from eidrive_scenario.api import ActionBehaviour, model, resolve_position
 
 
 class TeleportAction(ActionBehaviour):
@@ -14,8 +14,8 @@ class TeleportAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Put it there."""
-        place = resolve(self.action.position, self.stage, self.actor.name)
-        self.stage.enter(self.actor.name, place)
+        place = resolve_position(self.action.position, self.context, self.actor.name)
+        self.context.add_actor(self.actor.name, place)
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -10,11 +10,11 @@ from eidrive_scenario.api import (
     ActionBehaviour,
     Diagnostic,
     InputError,
-    Place,
+    ResolvedPosition,
+    RuntimeContext,
     ScenarioError,
-    Stage,
     model,
-    resolve,
+    resolve_position,
     traffic,
 )
 
@@ -31,11 +31,16 @@ class TrafficInstanceAction(ActionBehaviour):
     immediate = True
 
     def __init__(
-        self, action: model.Element, stage: Stage, *, actor: str | None = None, parent: model.Element | None = None
+        self,
+        action: model.Element,
+        context: RuntimeContext,
+        *,
+        actor: str | None = None,
+        parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
+        super().__init__(action, context, actor=actor, parent=parent)
         self._instance: traffic.Instance | None = None
-        if stage.roads is None:
+        if context.roads is None:
             raise self.problem("needs lanes to drive on", "name an OpenDRIVE file in RoadNetwork/LogicFile")
         self.check()
 
@@ -47,7 +52,7 @@ class TrafficInstanceAction(ActionBehaviour):
     @property
     def background(self) -> traffic.BackgroundTraffic:
         """All background traffic of the run."""
-        return self.stage.traffic.traffic
+        return self.context.traffic.traffic
 
     def check(self) -> None:
         """Find what is wrong with the action before the run."""
@@ -64,7 +69,7 @@ class TrafficInstanceAction(ActionBehaviour):
         """Run as long as the instance does."""
         if self._instance is None:
             self._instance = self.make()
-            self.stage.traffic.start(self._instance)
+            self.context.traffic.start(self._instance)
         return Status.RUNNING if self._instance.active else Status.SUCCESS
 
     def terminate(self, new_status: Status) -> None:
@@ -81,7 +86,7 @@ class TrafficInstanceAction(ActionBehaviour):
     def mixture(self) -> traffic.Mixture:
         """Who the traffic is made of."""
         return traffic.Mixture(
-            self.stage.scenario,
+            self.context.scenario,
             getattr(self.action, "traffic_definition", None),
             getattr(self.action, "traffic_distribution", None),
         )
@@ -159,7 +164,7 @@ class TrafficSourceAction(TrafficInstanceAction):
 
     def make(self) -> traffic.Source:
         """The source. Raises ScenarioError where no lane is near."""
-        place: Place = resolve(self.action.position, self.stage, None)
+        place: ResolvedPosition = resolve_position(self.action.position, self.context, None)
         lanes, ground = self.background.fleet.lanes, self.background.ground
         x, y, radius = place.pose.x, place.pose.y, self.action.radius
         driving, walking = (
@@ -175,7 +180,7 @@ class TrafficSourceAction(TrafficInstanceAction):
             rate=self.action.rate,
             mixture=self._mixture,
             speed=self._speed(),
-            started=self.stage.time,
+            started=self.context.time,
         )
 
     def _speed(self) -> float | None:
@@ -198,7 +203,7 @@ class TrafficSinkAction(TrafficInstanceAction):
 
     def make(self) -> traffic.Sink:
         """The sink."""
-        place = resolve(self.action.position, self.stage, None)
+        place = resolve_position(self.action.position, self.context, None)
         return traffic.Sink(
             self.traffic_name,
             self.background.key(self.traffic_name),
@@ -231,7 +236,7 @@ class TrafficAreaAction(TrafficInstanceAction):
         if outline is None:
             covers = traffic.stretches_cover(self.background.fleet.lanes, self._stretches())
         else:
-            places = [resolve(position, self.stage, None).pose for position in outline.position]
+            places = [resolve_position(position, self.context, None).pose for position in outline.position]
             covers = traffic.polygon([(place.x, place.y) for place in places])
         return traffic.Area(
             self.traffic_name,
@@ -248,7 +253,7 @@ class TrafficAreaAction(TrafficInstanceAction):
         return status if self.action.continuous else Status.SUCCESS
 
     def _stretches(self) -> list[traffic.Stretch]:
-        assert self.stage.roads is not None
+        assert self.context.roads is not None
         found = []
         for entry in self.action.traffic_area.road_range:
             cursors = [
@@ -256,7 +261,7 @@ class TrafficAreaAction(TrafficInstanceAction):
                 for cursor in entry.road_cursor
             ]
             try:
-                found += traffic.road_range(self.stage.roads, cursors, entry.length)
+                found += traffic.road_range(self.context.roads, cursors, entry.length)
             except InputError as error:
                 found_problems = [
                     Diagnostic(one.message, one.hint, entry.source, entry.line) for one in error.diagnostics
@@ -278,7 +283,7 @@ class TrafficStopAction(ActionBehaviour):
 
     def update(self) -> Status:
         """End them."""
-        self.stage.traffic.stop(self.parent_element.traffic_name)
+        self.context.traffic.stop(self.parent_element.traffic_name)
         return Status.SUCCESS
 
     def describe(self) -> str:

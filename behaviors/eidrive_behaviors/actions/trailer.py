@@ -14,7 +14,7 @@ class ConnectTrailerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Couple it."""
-        for other in self.stage.actors.values():
+        for other in self.context.actors.values():
             if other.trailer == self.action.trailer_ref:
                 other.trailer = None
         self.actor.trailer = self.action.trailer_ref
@@ -34,9 +34,9 @@ class DisconnectTrailerAction(ActionBehaviour):
         """Uncouple it."""
         name, self.actor.trailer = self.actor.trailer, None
         if name is not None:
-            trailer = self.stage.actors[name].motion
+            trailer = self.context.actors[name].motion
             trailer.speed = 0.0
-            trailer.land()
+            trailer.snap_to_lane()
         return Status.SUCCESS
 
     def describe(self) -> str:

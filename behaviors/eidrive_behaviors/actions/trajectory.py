@@ -9,21 +9,21 @@ from functools import partial
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import Pursuit, Tracker, largest_curvature, wheelbase_of
+from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_scenario.api import (
-    Absent,
     ActionBehaviour,
     Domain,
+    EntityAbsentError,
     Goal,
-    Layout,
-    Place,
     Pose,
-    Stage,
+    ResolvedPosition,
+    RuntimeContext,
+    TrajectoryCurve,
     TrajectoryProgress,
     has_times,
-    lay_out,
     model,
-    resolve,
+    resolve_position,
+    sample_trajectory,
     wrap_angle,
 )
 
@@ -62,14 +62,14 @@ class FollowTrajectoryAction(ActionBehaviour):
     def __init__(
         self,
         action: model.FollowTrajectoryAction,
-        stage: Stage,
+        context: RuntimeContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
     ) -> None:
-        super().__init__(action, stage, actor=actor, parent=parent)
-        self._pursuit: Pursuit | None = None
-        self._run: Tracker | None = None
+        super().__init__(action, context, actor=actor, parent=parent)
+        self._pursuit: PathPursuit | None = None
+        self._run: RateLimitedValue | None = None
         self._followed: TrajectoryProgress | None = None
         self._trajectory = self._found()
         self._timing = action.time_reference.timing
@@ -79,7 +79,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
             )
             what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
-            stage.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").diagnostics
+            context.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").diagnostics
 
     @property
     def controls(self) -> Domain:
@@ -87,7 +87,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         return Domain.LATERAL if self._timing is None else Domain.LATERAL | Domain.LONGITUDINAL
 
     @property
-    def performer_missing(self) -> bool:
+    def is_actor_missing(self) -> bool:
         """Never: who is not in the world appears on the trajectory."""
         return False
 
@@ -96,13 +96,13 @@ class FollowTrajectoryAction(ActionBehaviour):
         present, motion = self.actor.present, self.actor.motion
         spline = self._trajectory.shape.clothoid_spline
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
-            raise Absent(self.actor.name)
-        self._layout: Layout = lay_out(self._trajectory, self._resolved, motion.pose)
+            raise EntityAbsentError(self.actor.name)
+        self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolved, motion.pose)
         self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self.actor.progress = self._followed = self._progress
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
-        self._started = self.stage.time
+        self._started = self.context.time
         follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
         self._drives = follow and not self._layout.given and isinstance(self.actor.entity, model.Vehicle)
         swings = follow and self._timing is not None and self._trajectory.shape.polyline is not None
@@ -135,7 +135,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             self._put = None
 
     def _enter(self, pose: Pose) -> None:
-        self.stage.enter(self.actor.name, Place(pose))
+        self.context.add_actor(self.actor.name, ResolvedPosition(pose))
         self._put = self.actor.motion.pose
 
     def _begin(self) -> None:
@@ -147,10 +147,12 @@ class FollowTrajectoryAction(ActionBehaviour):
         if self._drives and self._put is None and isinstance(vehicle, model.Vehicle):
             if self._timing is not None:
                 self._s = self._offset()
-            self._pursuit = Pursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
+            self._pursuit = PathPursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
             if self._timing is not None:
                 top, faster, slower = self.actor.limits()
-                self._run = Tracker(self._s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top)
+                self._run = RateLimitedValue(
+                    self._s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top
+                )
         start = layout.at(self._s)
         self._jumps = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > APART
 
@@ -183,7 +185,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         """The pose at the end of the step."""
         if self.actor.driven:
             return self._ask_driver()
-        motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
+        motion, dt, layout = self.actor.motion, self.context.dt, self._layout
         if dt > 0.0 and not self._begun:
             self._begin()
         if dt > 0.0:
@@ -203,20 +205,20 @@ class FollowTrajectoryAction(ActionBehaviour):
             if done:
                 after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
         before, self._s = self._s, after
-        self._progress.move(self.stage.view.tick, before, after)
+        self._progress.move(self.context.view.tick, before, after)
         pose = self._pose(after)
         if dt == 0.0 or not self.actor.present:
             self._enter(pose)
         else:
             rail = None if self._timing is not None else partial(self._carried, before)
-            motion.go_to(pose, land=done, jump=self._jumps, rail=rail)
+            motion.move_to(pose, land=done, jump=self._jumps, rail=rail)
         self._jumps = False
         return Status.SUCCESS if done else Status.RUNNING
 
     def _carried(self, before: float, distance: float) -> Pose:
         """Return the pose after a step of another length than that of the speed: a distance action without limits."""
         self._s = before + self._progress.way * distance
-        self._progress.move(self.stage.view.tick, before, self._s)
+        self._progress.move(self.context.view.tick, before, self._s)
         pose = self._pose(self._s)
         if self._pursuit is not None:
             self._pursuit.put(self._s, pose)
@@ -228,9 +230,9 @@ class FollowTrajectoryAction(ActionBehaviour):
             return self._progress.way
         return -1.0 if math.cos(self._layout.at(s).h - self._layout.tangent(s)) < -TINY else 1.0
 
-    def _drive(self, pursuit: Pursuit | None) -> Status:
+    def _drive(self, pursuit: PathPursuit | None) -> Status:
         """The pose at the end of the step of a vehicle that follows as far as it can."""
-        motion, dt, layout = self.actor.motion, self.stage.dt, self._layout
+        motion, dt, layout = self.actor.motion, self.context.dt, self._layout
         if pursuit is None or dt == 0.0:
             return Status.RUNNING
         way, before = self._progress.way, pursuit.s
@@ -246,9 +248,9 @@ class FollowTrajectoryAction(ActionBehaviour):
             motion.speed = way * self._run.rate
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
-        self._progress.move(self.stage.view.tick, before, pursuit.s)
+        self._progress.move(self.context.view.tick, before, pursuit.s)
         done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - TINY)
-        motion.go_to(pose, land=done, rail=None if self._run is not None else partial(self._carried, before))
+        motion.move_to(pose, land=done, rail=None if self._run is not None else partial(self._carried, before))
         return Status.SUCCESS if done else Status.RUNNING
 
     def _last_speed(self) -> float:
@@ -262,7 +264,7 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def _clock(self, dt: float) -> float:
         assert self._timing is not None
-        elapsed = self.stage.time + dt
+        elapsed = self.context.time + dt
         if self._timing.domain_absolute_relative is not model.ReferenceContext.RELATIVE:
             return (elapsed - self._timing.offset) / self._timing.scale
         return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
@@ -283,7 +285,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
 
     def _resolved(self, position: model.Position) -> Pose:
-        return resolve(position, self.stage, self.actor.name).pose
+        return resolve_position(position, self.context, self.actor.name).pose
 
     def _found(self) -> model.Trajectory:
         if self.action.trajectory is not None:
@@ -293,7 +295,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             if self.action.trajectory_ref.trajectory is not None:
                 return self.action.trajectory_ref.trajectory
             reference = self.action.trajectory_ref.catalog_reference
-        return self.stage.catalog_entry(reference, model.Trajectory, self.action)
+        return self.context.catalog_entry(reference, model.Trajectory, self.action)
 
     def describe(self) -> str:
         """Which one."""

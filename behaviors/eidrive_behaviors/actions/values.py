@@ -27,7 +27,7 @@ class ValueAction(ActionBehaviour):
     @property
     def values(self) -> dict[str, str]:
         """All of its kind."""
-        return self.stage.parameters if self.kind == "parameter" else self.stage.variables
+        return self.context.parameters if self.kind == "parameter" else self.context.variables
 
 
 class SetAction(ValueAction):
@@ -57,7 +57,7 @@ class ModifyAction(ValueAction):
 
     def describe(self) -> str:
         """Which one, how."""
-        return f"{in_words(self.action.rule)} {self.kind} {self.which}"
+        return f"{describe_modification(self.action.rule)} {self.kind} {self.which}"
 
 
 class ParameterSetAction(SetAction):
@@ -91,7 +91,7 @@ def modified(
     return f"{value:.15g}"
 
 
-def in_words(rule: model.ModifyRule | model.VariableModifyRule) -> str:
+def describe_modification(rule: model.ModifyRule | model.VariableModifyRule) -> str:
     """What a rule does."""
     if rule.add_value is not None:
         return f"add {rule.add_value.value:g} to"

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from eidrive_scenario.api import Pose, QuantityCondition, Stage, model, wrap_angle
+from eidrive_scenario.api import Pose, QuantityCondition, RuntimeContext, model, wrap_angle
 
 
-def angle_of(stage: Stage, entity: str, kind: model.AngleType) -> float:
+def angle_of(context: RuntimeContext, entity: str, kind: model.AngleType) -> float:
     """Heading, pitch or roll of an entity in the world [rad]."""
-    return _of(stage.pose(entity), kind)
+    return _of(context.pose(entity), kind)
 
 
-def reference_of(stage: Stage, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None) -> float:
+def reference_of(
+    context: RuntimeContext, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None
+) -> float:
     """The angle from which an AngleCondition counts [rad]: that of the lane, road or trajectory at the entity.
 
     Without a word it is 0, the world's. The entity's own axes are at no angle to themselves; the same is meant where it
@@ -22,18 +24,18 @@ def reference_of(stage: Stage, entity: str, kind: model.AngleType, system: model
     if system is None or system is model.CoordinateSystem.WORLD:
         return 0.0
     if system is model.CoordinateSystem.ENTITY:
-        return _of(stage.pose(entity), kind)
+        return _of(context.pose(entity), kind)
     if system is model.CoordinateSystem.TRAJECTORY:
-        pose, progress = stage.pose(entity), stage.actors[entity].progress
+        pose, progress = context.pose(entity), context.actors[entity].progress
         if progress is None:
             return _of(pose, kind)
-        station = progress.at(stage.view.tick)
+        station = progress.at(context.view.tick)
         return _of(progress.layout.at(station)._replace(h=progress.layout.tangent(station)), kind)
-    here = stage.location(entity)
-    if stage.roads is None or here is None:
+    here = context.location(entity)
+    if context.roads is None or here is None:
         return math.nan
     lane = system is model.CoordinateSystem.LANE
-    return _of(stage.roads.pose(here) if lane else stage.roads.road_pose_at(here.road, here.s), kind)
+    return _of(context.roads.pose(here) if lane else context.roads.road_pose_at(here.road, here.s), kind)
 
 
 def _of(pose: Pose, kind: model.AngleType) -> float:
@@ -46,24 +48,24 @@ class AngleWithin(QuantityCondition):
     element: model.AngleCondition | model.RelativeAngleCondition
     unit = "rad"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """How far the angle is from the value, the short way round the circle."""
-        return abs(wrap_angle(self.angle(stage, entity) - self.element.angle))
+        return abs(wrap_angle(self.angle(context, entity) - self.element.angle))
 
     def threshold(self) -> tuple[model.Rule, float]:
         """At most the tolerance."""
         return model.Rule.LESS_OR_EQUAL, self.element.angle_tolerance
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """The angle."""
-        return f"{entity}: {self.describe_for()}, it is {wrap_angle(self.angle(stage, entity)):.3f} rad"
+        return f"{entity}: {self.describe_for()}, it is {wrap_angle(self.angle(context, entity)):.3f} rad"
 
     def describe_for(self) -> str:
         """Value and tolerance."""
         return f"{self.what()} {self.element.angle:g} ± {self.element.angle_tolerance:g} rad"
 
     @abstractmethod
-    def angle(self, stage: Stage, entity: str) -> float:
+    def angle(self, context: RuntimeContext, entity: str) -> float:
         """The angle; NaN where there is none now."""
 
 
@@ -76,10 +78,10 @@ class AngleCondition(AngleWithin):
         """Which angle."""
         return str(self.element.angle_type.value)
 
-    def angle(self, stage: Stage, entity: str) -> float:
+    def angle(self, context: RuntimeContext, entity: str) -> float:
         """The angle to the axes at the entity."""
         kind = self.element.angle_type
-        return angle_of(stage, entity, kind) - reference_of(stage, entity, kind, self.element.coordinate_system)
+        return angle_of(context, entity, kind) - reference_of(context, entity, kind, self.element.coordinate_system)
 
 
 class RelativeAngleCondition(AngleWithin):
@@ -91,9 +93,9 @@ class RelativeAngleCondition(AngleWithin):
         """Which angle, and to whom."""
         return f"{self.element.angle_type.value} to {self.element.entity_ref}"
 
-    def angle(self, stage: Stage, entity: str) -> float:
+    def angle(self, context: RuntimeContext, entity: str) -> float:
         """The difference."""
-        if self.element.entity_ref not in stage.view:
+        if self.element.entity_ref not in context.view:
             return math.nan
         kind = self.element.angle_type
-        return angle_of(stage, entity, kind) - angle_of(stage, self.element.entity_ref, kind)
+        return angle_of(context, entity, kind) - angle_of(context, self.element.entity_ref, kind)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.api import EntityCondition, LaneLocation, Stage, box_of, facing, footprint, model
+from eidrive_scenario.api import EntityCondition, LaneLocation, RuntimeContext, entity_box, facing, footprint, model
 
 
 class RelativeClearanceCondition(EntityCondition):
@@ -18,17 +18,17 @@ class RelativeClearanceCondition(EntityCondition):
 
     element: model.RelativeClearanceCondition
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
+    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
         """Look for anybody in the area."""
-        here = stage.location(entity)
-        if here is None or stage.roads is None:
+        here = context.location(entity)
+        if here is None or context.roads is None:
             return False
-        return self._exists(stage, entity, here) and not self._within(stage, entity, here)
+        return self._exists(context, entity, here) and not self._within(context, entity, here)
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """Who is in the area."""
-        here = stage.location(entity)
-        found = self._within(stage, entity, here) if here is not None else []
+        here = context.location(entity)
+        found = self._within(context, entity, here) if here is not None else []
         return f"{entity}: {', '.join(found)} within its clearance" if found else f"{entity}: clear around"
 
     def describe_for(self) -> str:
@@ -36,48 +36,50 @@ class RelativeClearanceCondition(EntityCondition):
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return f"clear {ahead:g} m ahead, {behind:g} m behind"
 
-    def _within(self, stage: Stage, entity: str, here: LaneLocation) -> list[str]:
-        names = [ref.entity_ref for ref in self.element.entity_ref] or list(stage.view.names)
+    def _within(self, context: RuntimeContext, entity: str, here: LaneLocation) -> list[str]:
+        names = [ref.entity_ref for ref in self.element.entity_ref] or list(context.view.names)
         return [
-            name for name in names if name != entity and name in stage.view and self._blocks(stage, entity, here, name)
+            name
+            for name in names
+            if name != entity and name in context.view and self._blocks(context, entity, here, name)
         ]
 
-    def _blocks(self, stage: Stage, entity: str, here: LaneLocation, name: str) -> bool:
-        places = self._places(stage, name)
-        if not places or not any(self._in_range(stage, entity, here, there) for there in lanes_of(places)):
+    def _blocks(self, context: RuntimeContext, entity: str, here: LaneLocation, name: str) -> bool:
+        places = self._places(context, name)
+        if not places or not any(self._in_range(context, entity, here, there) for there in lanes_of(places)):
             return False
-        assert stage.roads is not None
-        found = [stage.roads.distance(here, there) for there in places]
-        turn = facing(stage, entity, here)
+        assert context.roads is not None
+        found = [context.roads.distance(here, there) for there in places]
+        turn = facing(context, entity, here)
         along = [offset[0] * turn for offset in found if offset is not None]
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return bool(along) and min(along) <= ahead and max(along) >= -behind
 
-    def _places(self, stage: Stage, name: str) -> list[LaneLocation]:
+    def _places(self, context: RuntimeContext, name: str) -> list[LaneLocation]:
         """Where somebody is: the reference point, with `freeSpace` the corners of the box too."""
-        there = stage.location(name)
+        there = context.location(name)
         if there is None:
             return []
         if not self.element.free_space:
             return [there]
-        assert stage.roads is not None
-        outline = footprint(np.array(box_of(stage, name))).tolist()
-        corners = (stage.roads.locate_at(x, y, there) for x, y in outline)
+        assert context.roads is not None
+        outline = footprint(np.array(entity_box(context, name))).tolist()
+        corners = (context.roads.locate_at(x, y, there) for x, y in outline)
         return [there, *(corner for corner in corners if corner is not None)]
 
-    def _exists(self, stage: Stage, entity: str, here: LaneLocation) -> bool:
-        assert stage.roads is not None
-        lanes = stage.roads.lane_ids(here.road, here.s, drivable=True)
-        return any(self._in_range(stage, entity, here, here._replace(lane=lane)) for lane in lanes)
+    def _exists(self, context: RuntimeContext, entity: str, here: LaneLocation) -> bool:
+        assert context.roads is not None
+        lanes = context.roads.lane_ids(here.road, here.s, drivable=True)
+        return any(self._in_range(context, entity, here, here._replace(lane=lane)) for lane in lanes)
 
-    def _in_range(self, stage: Stage, entity: str, here: LaneLocation, there: LaneLocation) -> bool:
-        assert stage.roads is not None
-        runs = stage.roads.orientation(here, there)
+    def _in_range(self, context: RuntimeContext, entity: str, here: LaneLocation, there: LaneLocation) -> bool:
+        assert context.roads is not None
+        runs = context.roads.orientation(here, there)
         if runs is None:
             return False
-        way = stage.roads.driving_direction(here.road, here.lane) * facing(stage, entity, here)
+        way = context.roads.driving_direction(here.road, here.lane) * facing(context, entity, here)
         lane = there.lane * runs
-        same = lane == here.lane or stage.roads.driving_direction(there.road, there.lane) * runs == way
+        same = lane == here.lane or context.roads.driving_direction(there.road, there.lane) * runs == way
         if not same and not self.element.opposite_lanes:
             return False
         steps = lane - here.lane

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.api import EntityCondition, Stage, box_of, model, overlap
+from eidrive_scenario.api import EntityCondition, RuntimeContext, entity_box, model, overlap
 
 TYPES: dict[str, type[model.Element]] = {
     "vehicle": model.Vehicle,
@@ -21,13 +21,13 @@ class CollisionCondition(EntityCondition):
 
     element: model.CollisionCondition
 
-    def holds_for(self, stage: Stage, entity: str) -> bool:
+    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
         """Look for touch."""
-        return bool(self._touched(stage, entity))
+        return bool(self._touched(context, entity))
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """Whom it touches."""
-        touched = self._touched(stage, entity)
+        touched = self._touched(context, entity)
         return f"{entity}: collides with {', '.join(touched)}" if touched else f"{entity}: touches nobody"
 
     def describe_for(self) -> str:
@@ -37,25 +37,25 @@ class CollisionCondition(EntityCondition):
         assert self.element.by_type is not None
         return f"collides with a {self.element.by_type.type.value}"
 
-    def _touched(self, stage: Stage, entity: str) -> list[str]:
-        box = box_of(stage, entity)
+    def _touched(self, context: RuntimeContext, entity: str) -> list[str]:
+        box = entity_box(context, entity)
         # Bodies that rebound within a step no longer overlap at its end: the contact that began counts too.
         begun: set[str] = set()
-        for contact in stage.view.contacts:
+        for contact in context.view.contacts:
             if entity in (contact.first, contact.second):
                 begun |= {contact.first, contact.second}
         named = [
             name
-            for name in self._others(stage)
-            if name != entity and (name in begun or overlap(box, box_of(stage, name)))
+            for name in self._others(context)
+            if name != entity and (name in begun or overlap(box, entity_box(context, name)))
         ]
-        return named if self.element.by_type is None else [*named, *self._traffic(stage, box, begun)]
+        return named if self.element.by_type is None else [*named, *self._traffic(context, box, begun)]
 
-    def _traffic(self, stage: Stage, box: Sequence[float], begun: set[str]) -> list[str]:
+    def _traffic(self, context: RuntimeContext, box: Sequence[float], begun: set[str]) -> list[str]:
         """Background traffic of the type that touches a box: it has no entities, but it counts as such."""
         assert self.element.by_type is not None
-        kind, view = self.element.by_type.type.value, stage.view
-        rows = [view.rows[name] for name in stage.traffic.names if name in view]
+        kind, view = self.element.by_type.type.value, context.view
+        rows = [view.rows[name] for name in context.traffic.names if name in view]
         if not rows or kind not in ("vehicle", "pedestrian"):
             return []
         boxes = view.boxes[rows]
@@ -68,11 +68,11 @@ class CollisionCondition(EntityCondition):
             and (view.names[row] in begun or (close and overlap(box, view.boxes[row])))
         ]
 
-    def _others(self, stage: Stage) -> list[str]:
+    def _others(self, context: RuntimeContext) -> list[str]:
         if self.element.entity_ref is not None:
             names = [self.element.entity_ref.entity_ref]
         else:
             assert self.element.by_type is not None
             kind = TYPES.get(self.element.by_type.type.value, model.Vehicle)
-            names = [name for name, actor in stage.actors.items() if isinstance(actor.entity, kind)]
-        return [name for name in names if name in stage.view]
+            names = [name for name, actor in context.actors.items() if isinstance(actor.entity, kind)]
+        return [name for name in names if name in context.view]

@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 
 from eidrive_scenario.api import (
-    Absent,
-    Place,
+    EntityAbsentError,
     QuantityCondition,
-    Stage,
+    ResolvedPosition,
+    RuntimeContext,
     distance,
-    frame_of,
-    kind_of,
     model,
-    resolve,
+    resolve_coordinate_system,
+    resolve_distance_type,
+    resolve_position,
 )
 
 Measured = (
@@ -37,15 +37,15 @@ class GapCondition(QuantityCondition):
     def __init__(self, element: Measured, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element, entities, rule)
         along = bool(getattr(element, "along_route", None))
-        self.frame = "road" if along else frame_of(element.coordinate_system)
-        self.kind = "longitudinal" if along else kind_of(element.relative_distance_type)
+        self.frame = "road" if along else resolve_coordinate_system(element.coordinate_system)
+        self.kind = "longitudinal" if along else resolve_distance_type(element.relative_distance_type)
 
-    def gap(self, stage: Stage, entity: str, target: str | Place) -> float:
+    def gap(self, context: RuntimeContext, entity: str, target: str | ResolvedPosition) -> float:
         """The distance [m], signed; NaN where there is none."""
         element = self.element
         try:
             return distance(
-                stage,
+                context,
                 entity,
                 target,
                 frame=self.frame,
@@ -53,15 +53,15 @@ class GapCondition(QuantityCondition):
                 freespace=element.freespace,
                 algorithm=element.routing_algorithm,
             )
-        except Absent:
+        except EntityAbsentError:
             return math.nan
 
 
-def place_of(stage: Stage, position: model.Position, entity: str) -> Place | None:
+def place_of(context: RuntimeContext, position: model.Position, entity: str) -> ResolvedPosition | None:
     """The place of a position now, None where it refers to an entity that is not in the world."""
     try:
-        return resolve(position, stage, entity)
-    except Absent:
+        return resolve_position(position, context, entity)
+    except EntityAbsentError:
         return None
 
 
@@ -75,10 +75,10 @@ class DistanceCondition(GapCondition):
         """What is compared."""
         return f"distance to {type(self.element.position.chosen()).__name__}"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The amount of the distance."""
-        place = place_of(stage, self.element.position, entity)
-        return math.nan if place is None else abs(self.gap(stage, entity, place))
+        place = place_of(context, self.element.position, entity)
+        return math.nan if place is None else abs(self.gap(context, entity, place))
 
 
 class RelativeDistanceCondition(GapCondition):
@@ -87,14 +87,18 @@ class RelativeDistanceCondition(GapCondition):
     element: model.RelativeDistanceCondition
     unit = "m"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The amount of the distance."""
-        return abs(self.gap(stage, entity, self.element.entity_ref))
+        return abs(self.gap(context, entity, self.element.entity_ref))
 
     def what(self) -> str:
         """Which distance, and to whom."""
         gap = " free" if self.element.freespace else ""
-        kind = kind_of(self.element.relative_distance_type).removesuffix("Distance").replace("euclidian", "straight")
+        kind = (
+            resolve_distance_type(self.element.relative_distance_type)
+            .removesuffix("Distance")
+            .replace("euclidian", "straight")
+        )
         return f"{kind}{gap} distance to {self.element.entity_ref}"
 
 
@@ -104,21 +108,21 @@ class ReachPositionCondition(QuantityCondition):
     element: model.ReachPositionCondition
     unit = "m"
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """The distance."""
-        gap = self.quantity(stage, entity)
+        gap = self.quantity(context, entity)
         return f"{entity}: {gap:.2f} m from the position, tolerance {self.element.tolerance:g} m"
 
     def describe_for(self) -> str:
         """The tolerance."""
         return f"within {self.element.tolerance:g} m of {type(self.element.position.chosen()).__name__}"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The distance between the reference point and the position; infinite where that is nowhere."""
-        place = place_of(stage, self.element.position, entity)
+        place = place_of(context, self.element.position, entity)
         if place is None:
             return math.inf
-        here = stage.pose(entity)
+        here = context.pose(entity)
         return math.hypot(place.pose.x - here.x, place.pose.y - here.y)
 
     def threshold(self) -> tuple[model.Rule, float]:

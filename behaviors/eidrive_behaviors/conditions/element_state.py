@@ -5,17 +5,17 @@ from __future__ import annotations
 from eidrive_scenario.api import (
     Condition,
     Diagnostic,
+    ElementState,
+    ElementStateObserver,
+    ElementTransition,
+    RuntimeContext,
     ScenarioError,
-    Stage,
-    State,
-    Transition,
-    Watch,
     model,
     suggestion,
 )
 
-STATES = {state.value: state for state in State}
-TRANSITIONS = {transition.value: transition for transition in Transition}
+STATES = {state.value: state for state in ElementState}
+TRANSITIONS = {transition.value: transition for transition in ElementTransition}
 
 
 class StoryboardElementStateCondition(Condition):
@@ -26,23 +26,23 @@ class StoryboardElementStateCondition(Condition):
 
     instant = True
     element: model.StoryboardElementStateCondition
-    _watch: Watch | None = None
+    _watch: ElementStateObserver | None = None
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Find the element. Raises ScenarioError if the storyboard has none of that name and type."""
         kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
-        self._watch = stage.progress.watch(kind, name)
+        self._watch = context.progress.observe_element(kind, name)
         if self._watch is None:
             raise ScenarioError(
                 Diagnostic(
                     f"the storyboard has no {kind} named {name!r}",
-                    suggestion(name, stage.progress.names(kind)),
+                    suggestion(name, context.progress.names(kind)),
                     self.element.source,
                     self.element.line,
                 )
             )
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Look at the element's state or at what it just went through."""
         if self._watch is None:
             return False
@@ -51,7 +51,7 @@ class StoryboardElementStateCondition(Condition):
             return self._watch.passed(TRANSITIONS[word])
         return self._watch.in_state(STATES[word])
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Which element, and what of it."""
         return self.describe()
 

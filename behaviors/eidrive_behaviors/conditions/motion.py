@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import QuantityCondition, Stage, model
+from eidrive_scenario.api import QuantityCondition, RuntimeContext, model
 from eidrive_scenario.api import WorldView as View
 
 
@@ -39,11 +39,11 @@ class SpeedCondition(QuantityCondition):
         """What is compared."""
         return f"{_named(self.element.direction)}speed"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The speed."""
         if self.element.direction is None:
-            return stage.speed(entity)
-        return along(velocity_of(stage.view, entity), stage.pose(entity).h, self.element.direction)
+            return context.speed(entity)
+        return along(velocity_of(context.view, entity), context.pose(entity).h, self.element.direction)
 
 
 class RelativeSpeedCondition(QuantityCondition):
@@ -56,16 +56,16 @@ class RelativeSpeedCondition(QuantityCondition):
         """What is compared."""
         return f"{_named(self.element.direction)}speed above that of {self.element.entity_ref}"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The difference."""
         other = self.element.entity_ref
-        if other not in stage.view:
+        if other not in context.view:
             return math.nan
         if self.element.direction is None:
-            return stage.speed(entity) - stage.speed(other)
-        mine, theirs = velocity_of(stage.view, entity), velocity_of(stage.view, other)
+            return context.speed(entity) - context.speed(other)
+        mine, theirs = velocity_of(context.view, entity), velocity_of(context.view, other)
         difference = [a - b for a, b in zip(mine, theirs, strict=True)]
-        return along(difference, stage.pose(other).h, self.element.direction)
+        return along(difference, context.pose(other).h, self.element.direction)
 
 
 class AccelerationCondition(QuantityCondition):
@@ -78,10 +78,10 @@ class AccelerationCondition(QuantityCondition):
         """What is compared."""
         return f"{_named(self.element.direction)}acceleration"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The acceleration."""
-        vector = stage.view.acceleration[stage.view.row(entity)].tolist()
-        return along(vector, stage.pose(entity).h, self.element.direction)
+        vector = context.view.acceleration[context.view.row(entity)].tolist()
+        return along(vector, context.pose(entity).h, self.element.direction)
 
 
 class StandStillCondition(QuantityCondition):
@@ -90,17 +90,17 @@ class StandStillCondition(QuantityCondition):
     element: model.StandStillCondition
     unit = "s"
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """How long it stands."""
-        return f"{entity}: {since(stage, stage.actors[entity].standing_since, 'standing', 'moving')}"
+        return f"{entity}: {since(context, context.actors[entity].standing_since, 'standing', 'moving')}"
 
     def describe_for(self) -> str:
         """The duration."""
         return f"stands still for {self.element.duration:g} s"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """How long it stands."""
-        return span(stage, stage.actors[entity].standing_since)
+        return span(context, context.actors[entity].standing_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
         """Longer than the duration."""
@@ -117,20 +117,20 @@ class TraveledDistanceCondition(QuantityCondition):
         """What is compared."""
         return "travelled"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The distance covered."""
-        return stage.actors[entity].traveled
+        return context.actors[entity].traveled
 
     def threshold(self) -> tuple[model.Rule, float]:
         """At least the distance."""
         return model.Rule.GREATER_OR_EQUAL, self.element.value
 
 
-def span(stage: Stage, start: float | None) -> float:
+def span(context: RuntimeContext, start: float | None) -> float:
     """How long something has gone on [s]; NaN where it does not."""
-    return math.nan if start is None else stage.time - start
+    return math.nan if start is None else context.time - start
 
 
-def since(stage: Stage, start: float | None, what: str, otherwise: str) -> str:
+def since(context: RuntimeContext, start: float | None, what: str, otherwise: str) -> str:
     """How long something has gone on, in words."""
-    return otherwise if start is None else f"{what} for {stage.time - start:.2f} s"
+    return otherwise if start is None else f"{what} for {context.time - start:.2f} s"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_behaviors.conditions.motion import since, span
-from eidrive_scenario.api import QuantityCondition, Stage, model
+from eidrive_scenario.api import QuantityCondition, RuntimeContext, model
 
 
 class EndOfRoadCondition(QuantityCondition):
@@ -12,19 +12,18 @@ class EndOfRoadCondition(QuantityCondition):
     element: model.EndOfRoadCondition
     unit = "s"
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """How long."""
-        return (
-            f"{entity}: {since(stage, stage.actors[entity].end_of_road_since, 'at the end of its road', 'on its way')}"
-        )
+        begin = context.actors[entity].end_of_road_since
+        return f"{entity}: {since(context, begin, 'at the end of its road', 'on its way')}"
 
     def describe_for(self) -> str:
         """The duration."""
         return f"at the end of its road for {self.element.duration:g} s"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """How long it is there."""
-        return span(stage, stage.actors[entity].end_of_road_since)
+        return span(context, context.actors[entity].end_of_road_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
         """At least the duration."""
@@ -37,22 +36,22 @@ class OffroadCondition(QuantityCondition):
     element: model.OffroadCondition
     unit = "s"
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Have it kept up since when they are off the road; runs without this condition need not pay for it."""
         for name in self.entities:
-            stage.actors[name].off_road_wanted = True
+            context.actors[name].off_road_wanted = True
 
-    def explain_for(self, stage: Stage, entity: str) -> str:
+    def explain_for(self, context: RuntimeContext, entity: str) -> str:
         """How long."""
-        return f"{entity}: {since(stage, stage.actors[entity].off_road_since, 'off the road', 'on the road')}"
+        return f"{entity}: {since(context, context.actors[entity].off_road_since, 'off the road', 'on the road')}"
 
     def describe_for(self) -> str:
         """The duration."""
         return f"off the road for {self.element.duration:g} s"
 
-    def quantity(self, stage: Stage, entity: str) -> float:
+    def quantity(self, context: RuntimeContext, entity: str) -> float:
         """How long it is off the road."""
-        return span(stage, stage.actors[entity].off_road_since)
+        return span(context, context.actors[entity].off_road_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
         """Longer than the duration."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import Condition, Diagnostic, ScenarioError, Stage, model, suggestion
+from eidrive_scenario.api import Condition, Diagnostic, RuntimeContext, ScenarioError, model, suggestion
 
 
 class TrafficSignalCondition(Condition):
@@ -11,20 +11,20 @@ class TrafficSignalCondition(Condition):
     instant = True
     element: model.TrafficSignalCondition
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Say what is odd about the signal's name."""
-        odd = stage.signals.unknown(self.element.name, self.element)
+        odd = context.signals.unknown(self.element.name, self.element)
         if odd is not None:
-            stage.warnings.append(odd)
+            context.warnings.append(odd)
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare its state."""
-        state = stage.signals.state(self.element.name)
+        state = context.signals.state(self.element.name)
         return state is not None and _plain(state) == _plain(self.element.state)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Its state."""
-        return f"signal {self.element.name} shows {stage.signals.state(self.element.name) or 'nothing'}"
+        return f"signal {self.element.name} shows {context.signals.state(self.element.name) or 'nothing'}"
 
     def describe(self) -> str:
         """The state."""
@@ -37,10 +37,10 @@ class TrafficSignalControllerCondition(Condition):
     instant = True
     element: model.TrafficSignalControllerCondition
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Look the phase up. Raises ScenarioError if the controller does not have it."""
         element = self.element
-        cycle = stage.signals.cycles.get(element.traffic_signal_controller_ref)
+        cycle = context.signals.cycles.get(element.traffic_signal_controller_ref)
         phases = [phase.name for phase in cycle.phases] if cycle is not None else [element.phase]
         if element.phase not in phases:
             what = f"{element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
@@ -53,14 +53,14 @@ class TrafficSignalControllerCondition(Condition):
                 )
             )
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare its phase."""
-        return stage.signals.phase(self.element.traffic_signal_controller_ref) == self.element.phase
+        return context.signals.phase(self.element.traffic_signal_controller_ref) == self.element.phase
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Its phase."""
         name = self.element.traffic_signal_controller_ref
-        return f"signal controller {name} is in {stage.signals.phase(name) or 'no phase'}"
+        return f"signal controller {name} is in {context.signals.phase(name) or 'no phase'}"
 
     def describe(self) -> str:
         """The phase."""

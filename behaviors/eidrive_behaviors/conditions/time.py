@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.api import Condition, Diagnostic, Measure, Stage, compares, in_words, model, relation
+from eidrive_scenario.api import (
+    Condition,
+    Diagnostic,
+    Measure,
+    RuntimeContext,
+    describe_rule,
+    model,
+    relation,
+    satisfies_rule,
+)
 
 
 class SimulationTimeCondition(Condition):
@@ -12,22 +21,22 @@ class SimulationTimeCondition(Condition):
 
     element: model.SimulationTimeCondition
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare the time of this view."""
-        return compares(stage.time, self.element.rule, self.element.value)
+        return satisfies_rule(context.time, self.element.rule, self.element.value)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """The time."""
-        sign = relation(self.element.rule, self.holds(stage))
-        return f"simulation time {stage.time:.2f} s {sign} {self.element.value:g} s"
+        sign = relation(self.element.rule, self.holds(context))
+        return f"simulation time {context.time:.2f} s {sign} {self.element.value:g} s"
 
     def describe(self) -> str:
         """Rule and limit."""
-        return f"simulation time {in_words(self.element.rule)} {self.element.value:g} s"
+        return f"simulation time {describe_rule(self.element.rule)} {self.element.value:g} s"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """The time."""
-        return (Measure("", stage.time, self.element.rule, self.element.value, "s"),)
+        return (Measure("", context.time, self.element.rule, self.element.value, "s"),)
 
 
 class TimeOfDayCondition(Condition):
@@ -41,32 +50,32 @@ class TimeOfDayCondition(Condition):
     instant = True
     element: model.TimeOfDayCondition
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Say so where nothing in the scenario states a time of day."""
-        scenario = stage.scenario
+        scenario = context.scenario
         trees = (scenario.document, *scenario.entries.values())
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
             what = "TimeOfDayCondition never holds: no environment of the scenario has a TimeOfDay"
             remedy = "give one by an EnvironmentAction in Init"
-            stage.warnings.append(Diagnostic(what, remedy, self.element.source, self.element.line))
+            context.warnings.append(Diagnostic(what, remedy, self.element.source, self.element.line))
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare the clock."""
-        now = stage.environment.clock(stage.time)
+        now = context.environment.clock(context.time)
         if now is None:
             return False
-        return compares((now - _like(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0)
+        return satisfies_rule((now - _like(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """The clock."""
-        now = stage.environment.clock(stage.time)
+        now = context.environment.clock(context.time)
         shown = "unknown" if now is None else now.isoformat()
-        sign = relation(self.element.rule, self.holds(stage))
+        sign = relation(self.element.rule, self.holds(context))
         return f"time of day {shown} {sign} {self.element.date_time.isoformat()}"
 
     def describe(self) -> str:
         """Rule and limit."""
-        return f"time of day {in_words(self.element.rule)} {self.element.date_time.isoformat()}"
+        return f"time of day {describe_rule(self.element.rule)} {self.element.date_time.isoformat()}"
 
 
 def _like(moment: datetime, other: datetime) -> datetime:

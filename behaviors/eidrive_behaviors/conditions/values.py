@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from eidrive_scenario.api import Condition, Measure, Stage, compares, in_words, model, relation
+from eidrive_scenario.api import Condition, Measure, RuntimeContext, describe_rule, model, relation, satisfies_rule
 
 WORDS = {"true": 1.0, "false": 0.0}
 """What a boolean counts as."""
@@ -17,7 +17,7 @@ def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
         return False
     first, second = _number(text), _number(limit)
     if first is not None and second is not None:
-        return compares(first, rule, second)
+        return satisfies_rule(first, rule, second)
     match rule.value:
         case "equalTo":
             return text == limit
@@ -50,23 +50,23 @@ class ParameterCondition(Condition):
     instant = True
     element: model.ParameterCondition
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare it."""
-        return agrees(stage.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+        return agrees(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Its value."""
-        value = stage.parameters.get(self.element.parameter_ref)
-        sign = relation(self.element.rule, self.holds(stage))
+        value = context.parameters.get(self.element.parameter_ref)
+        sign = relation(self.element.rule, self.holds(context))
         return f"parameter {self.element.parameter_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""
-        return f"parameter {self.element.parameter_ref} {in_words(self.element.rule)} {self.element.value}"
+        return f"parameter {self.element.parameter_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """Its value."""
-        return measured(stage.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+        return measured(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
 
 
 class VariableCondition(Condition):
@@ -75,23 +75,23 @@ class VariableCondition(Condition):
     instant = True
     element: model.VariableCondition
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare it."""
-        return agrees(stage.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+        return agrees(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Its value."""
-        value = stage.variables.get(self.element.variable_ref)
-        sign = relation(self.element.rule, self.holds(stage))
+        value = context.variables.get(self.element.variable_ref)
+        sign = relation(self.element.rule, self.holds(context))
         return f"variable {self.element.variable_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""
-        return f"variable {self.element.variable_ref} {in_words(self.element.rule)} {self.element.value}"
+        return f"variable {self.element.variable_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """Its value."""
-        return measured(stage.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+        return measured(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
 
 class UserDefinedValueCondition(Condition):
@@ -99,24 +99,24 @@ class UserDefinedValueCondition(Condition):
 
     element: model.UserDefinedValueCondition
 
-    def bind(self, stage: Stage) -> None:
+    def bind(self, context: RuntimeContext) -> None:
         """Let the stage know that the value is wanted."""
-        stage.wanted_values.setdefault(self.element.name, self.element)
+        context.requested_user_values.setdefault(self.element.name, self.element)
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         """Compare it."""
-        return agrees(stage.user_values(self.element.name), self.element.rule, self.element.value)
+        return agrees(context.user_values(self.element.name), self.element.rule, self.element.value)
 
-    def explain(self, stage: Stage) -> str:
+    def explain(self, context: RuntimeContext) -> str:
         """Its value."""
-        value = stage.user_values(self.element.name)
-        sign = relation(self.element.rule, self.holds(stage))
+        value = context.user_values(self.element.name)
+        sign = relation(self.element.rule, self.holds(context))
         return f"{self.element.name} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
         """Rule and limit."""
-        return f"{self.element.name} {in_words(self.element.rule)} {self.element.value}"
+        return f"{self.element.name} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, stage: Stage) -> tuple[Measure, ...]:
+    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """The value."""
-        return measured(stage.user_values(self.element.name), self.element.rule, self.element.value)
+        return measured(context.user_values(self.element.name), self.element.rule, self.element.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.controllers.properties import number
-from eidrive_scenario.api import Actor, Stage, StandIn, box_of, distance, model
+from eidrive_scenario.api import Actor, ControllerModel, RuntimeContext, distance, entity_box, model
 
 CLOSEST = 3.0
 """Gap to a standing vehicle [m]."""
@@ -21,7 +21,7 @@ OVERRULED = 1e-3
 """A speed that differs by more than this was set by somebody else [m/s]."""
 
 
-class AdaptiveCruise(StandIn):
+class AdaptiveCruise(ControllerModel):
     """Keeps the set speed on a free road, and 3 m and a time gap behind who is ahead in its lane.
 
     The law is that of esmini's ACC and ALKS controllers, so that scenarios which rely on them can be played: with the
@@ -31,21 +31,21 @@ class AdaptiveCruise(StandIn):
     `setSpeed` [m/s], and SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
     """
 
-    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
-        super().__init__(controller, stage, actor)
+    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
+        super().__init__(controller, context, actor)
         self.time_gap = number(controller, "timeGap", 1.5, least=0.0)
         self.aside = number(controller, "lateralDist", 5.0, least=0.0)
         self._alone = self.properties.get("mode") == "override"
         self._given = number(controller, "setSpeed", None)
 
-    def begin(self) -> None:
+    def on_activate(self) -> None:
         """Drive on with the speed of now."""
         self._last = self.actor.motion.speed
         self._set = self._last
         if self._given is not None and self._alone:
             self._set = self._given
 
-    def speed(self) -> float:
+    def compute_speed(self) -> float:
         """By the law."""
         now = self.actor.motion.speed
         if not self._alone and abs(now - self._last) > OVERRULED:
@@ -56,7 +56,7 @@ class AdaptiveCruise(StandIn):
 
     def _free(self) -> float:
         _, faster, slower = self.actor.limits()
-        now, dt = self._last, self.stage.dt
+        now, dt = self._last, self.context.dt
         acceleration = min(max((self._set - now) * SHARE * faster, -slower), SHARE * faster)
         then = now + acceleration * dt
         return self._set if abs(then - self._set) > abs(now - self._set) else then
@@ -69,21 +69,21 @@ class AdaptiveCruise(StandIn):
         wanted = CLOSEST + self.time_gap * abs(max(now, lead))
         open_by = min(1.0, gap / wanted - 1.0)
         acceleration = GAIN * open_by - open_by * (now - self._set) - (1.0 - open_by) * (now - min(self._set, lead))
-        then = now + min(max(acceleration, -slower), faster) * self.stage.dt
+        then = now + min(max(acceleration, -slower), faster) * self.context.dt
         return max(0.0, min(then, max(now, self._set)))
 
     def _ahead(self) -> tuple[float, float] | None:
         """Gap to [m] and speed of [m/s] the nearest one in the way."""
         found = [
-            (gap, self.stage.speed(name))
-            for name, other in self.stage.actors.items()
+            (gap, self.context.speed(name))
+            for name, other in self.context.actors.items()
             if other is not self.actor and other.present and (gap := self._gap(name)) is not None
         ]
         return min(found, default=None)
 
     def _gap(self, name: str) -> float | None:
-        stage, me = self.stage, self.actor.name
-        here, there, roads = stage.location(me), stage.location(name), stage.roads
+        context, me = self.context, self.actor.name
+        here, there, roads = context.location(me), context.location(name), context.roads
         if roads is not None and here is not None and there is not None:
             apart = roads.distance(here, there)
             slower = self.actor.limits()[2]
@@ -97,23 +97,23 @@ class AdaptiveCruise(StandIn):
 
     def _beside(self, across: float) -> bool:
         """True for a place that is further aside than half a lane."""
-        here, roads = self.stage.location(self.actor.name), self.stage.roads
+        here, roads = self.context.location(self.actor.name), self.context.roads
         return here is None or roads is None or abs(across) > 0.5 * roads.lane_width(here.road, here.lane, here.s)
 
     def _close(self, name: str) -> float | None:
         """The gap to who is right before the bumper in whatever lane, more to the right than to the left."""
         me = self.actor.name
         along, aside = (
-            distance(self.stage, me, name, frame="entity", kind=kind, freespace=True)
+            distance(self.context, me, name, frame="entity", kind=kind, freespace=True)
             for kind in ("longitudinal", "lateral")
         )
-        faster_by = max(0.0, self._last - self.stage.speed(name))
-        length = box_of(self.stage, name)[3]
+        faster_by = max(0.0, self._last - self.context.speed(name))
+        length = entity_box(self.context, name)[3]
         return along if 0.0 < along < 1.0 + length + 0.5 * faster_by and -0.5 < aside < 0.2 else None
 
     def _overhang(self, name: str) -> float:
         """From reference point to reference point, less the gap between the two [m]."""
-        mine, theirs = self.actor.entity.bounding_box, self.stage.actors[name].entity.bounding_box
-        turn = math.cos(self.stage.pose(self.actor.name).h - self.stage.pose(name).h)
+        mine, theirs = self.actor.entity.bounding_box, self.context.actors[name].entity.bounding_box
+        turn = math.cos(self.context.pose(self.actor.name).h - self.context.pose(name).h)
         rear = 0.5 * theirs.dimensions.length - math.copysign(theirs.center.x, turn)
         return 0.5 * mine.dimensions.length + mine.center.x + rear

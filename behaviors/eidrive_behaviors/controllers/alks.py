@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from eidrive_behaviors.controllers.properties import number
-from eidrive_behaviors.controllers.reference_driver import DriverSettings, ReferenceDriver
-from eidrive_behaviors.controllers.road_ahead import Ahead, RoadAhead
-from eidrive_behaviors.controllers.safety_models import Fsm, Own, Regulation, Rss, SafetyModel
-from eidrive_scenario.api import Actor, Diagnostic, ScenarioError, Stage, StandIn, model, suggestion
+from eidrive_behaviors.controllers.reference_driver import ReferenceDriver, ReferenceDriverSettings
+from eidrive_behaviors.controllers.road_ahead import LeadObject, RoadAhead
+from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss, SafetyModel
+from eidrive_scenario.api import Actor, ControllerModel, Diagnostic, RuntimeContext, ScenarioError, model, suggestion
 
 COMFORT = 2.0
 """Back to the set speed on a free road [m/s²]."""
@@ -21,7 +21,7 @@ OVERRULED = 1e-3
 MODELS = ("Regulation", "ReferenceDriver", "RSS", "FSM")
 
 
-class AlksDriver(StandIn):
+class AlksDriver(ControllerModel):
     """Keeps its lane, and brakes where one of four models says that the situation is critical.
 
     It plays esmini's ALKS_R157SM_Controller, by whose property `model` it is told which one: `Regulation`,
@@ -33,27 +33,27 @@ class AlksDriver(StandIn):
     `alwaysTrigOnScenario`.
     """
 
-    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
-        super().__init__(controller, stage, actor)
+    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
+        super().__init__(controller, context, actor)
         self._controller = controller
         self.model = self._chosen()
         self._cruises = self._says("cruise", True)
         slack = number(controller, "overlapTolerance", 0.1)
-        later = stage.step if self.properties.get("mode") == "override" else 0.0
-        self._road = RoadAhead(stage, actor, self.model.reach, tolerance=slack, later=later)
+        later = context.step if self.properties.get("mode") == "override" else 0.0
+        self._road = RoadAhead(context, actor, self.model.reach, tolerance=slack, later=later)
 
-    def begin(self) -> None:
+    def on_activate(self) -> None:
         """Drive on with the speed of now."""
         self._set = self._last = self.actor.motion.speed
         self._acceleration = 0.0
 
-    def speed(self) -> float:
+    def compute_speed(self) -> float:
         """By the model; where nothing is critical the set speed, or behind who is ahead."""
         now = self.actor.motion.speed
         if abs(now - self._last) > OVERRULED:
             self._set = now
-        own = Own(now, self._acceleration, self.stage.dt)
-        braking = self.model.decide(own, self._road.look())
+        own = EgoKinematics(now, self._acceleration, self.context.dt)
+        braking = self.model.decide(own, self._road.find_lead_objects())
         if braking is not None:
             self._acceleration = braking
             self._last = max(0.0, now + braking * own.dt)
@@ -62,7 +62,7 @@ class AlksDriver(StandIn):
             self._last = min(max(0.0, now + self._acceleration * own.dt), max(self._set, 0.0)) if self._cruises else now
         return self._last
 
-    def _cruising(self, own: Own, lead: Ahead | None) -> float:
+    def _cruising(self, own: EgoKinematics, lead: LeadObject | None) -> float:
         if lead is None:
             if abs(own.speed - self._set) < OVERRULED:
                 return 0.0
@@ -82,12 +82,12 @@ class AlksDriver(StandIn):
             raise self._problem(f"knows no model {name!r}", suggestion(name, MODELS))
         return memoryless[name](full_stop=full_stop)
 
-    def _driver(self, full_stop: bool) -> DriverSettings:
-        usual = DriverSettings()
+    def _driver(self, full_stop: bool) -> ReferenceDriverSettings:
+        usual = ReferenceDriverSettings()
         mode = self.properties.get("cutInPerceptionDelayMode", "Dist")
         if mode not in ("Dist", "Time"):
             raise self._problem(f"knows no cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
-        return DriverSettings(
+        return ReferenceDriverSettings(
             pedestrians=number(self._controller, "pedestrianRiskEvaluationTime", usual.pedestrians),
             distance=0.72 if mode == "Dist" else None,
             moved=number(self._controller, "lateralTrigDistance", None),

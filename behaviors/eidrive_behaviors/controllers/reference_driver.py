@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import ClassVar
 
-from eidrive_behaviors.controllers.road_ahead import Ahead
-from eidrive_behaviors.controllers.safety_models import FULL, JERK_TIME, REACTION, G, Own, SafetyModel
+from eidrive_behaviors.controllers.road_ahead import LeadObject
+from eidrive_behaviors.controllers.safety_models import FULL, JERK_TIME, REACTION, EgoKinematics, G, SafetyModel
 
 TINY = 1e-9
 WANDERING = 0.375
@@ -31,7 +31,7 @@ class Risk(Enum):
     DECELERATION = auto()
 
 
-class Phase(Enum):
+class DriverPhase(Enum):
     """Of the driver: not at risk, evaluating one, moving the foot, braking."""
 
     CALM = auto()
@@ -41,7 +41,7 @@ class Phase(Enum):
 
 
 @dataclass(frozen=True)
-class DriverSettings:
+class ReferenceDriverSettings:
     """What scenarios may say of the driver.
 
     evaluation    risk evaluation time [s]
@@ -72,16 +72,16 @@ class ReferenceDriver(SafetyModel):
 
     reach: ClassVar[float] = 100.0
 
-    def __init__(self, settings: DriverSettings | None = None) -> None:
-        self.settings = settings or DriverSettings()
-        self.phase = Phase.CALM
+    def __init__(self, settings: ReferenceDriverSettings | None = None) -> None:
+        self.settings = settings or ReferenceDriverSettings()
+        self.phase = DriverPhase.CALM
         self.risk = Risk.NONE
         self._left = 0.0
         self._perceived_at = 0.0
         self._emergency = False
         self._began: dict[str, float] = {}
 
-    def decide(self, own: Own, seen: list[Ahead]) -> float | None:
+    def decide(self, own: EgoKinematics, seen: list[LeadObject]) -> float | None:
         """One step of perceiving, reacting or braking."""
         self._watch(seen)
         self._focus(seen)
@@ -89,20 +89,20 @@ class ReferenceDriver(SafetyModel):
         lead = self._lead
         if lead is not None and lead.covers and lead.time_to_collision < self.settings.emergency:
             self._emergency = True
-        if self.phase is not Phase.BRAKING and not self._emergency:
+        if self.phase is not DriverPhase.BRAKING and not self._emergency:
             return None
         return self._braking(own)
 
-    def following_distance(self, own: Own, lead: Ahead) -> float:
+    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
         """Two seconds and two metres, the headway below which a lead is dangerous."""
         return 2.0 + DANGEROUS * own.speed
 
-    def _watch(self, seen: list[Ahead]) -> None:
+    def _watch(self, seen: list[LeadObject]) -> None:
         """Remember where those who move towards the lane began to."""
         self._began = {one.name: self._began.get(one.name, one.across) for one in seen if one.nearing > TINY}
 
-    def _focus(self, seen: list[Ahead]) -> None:
-        held = self.phase is not Phase.CALM and self.settings.full_stop
+    def _focus(self, seen: list[LeadObject]) -> None:
+        held = self.phase is not DriverPhase.CALM and self.settings.full_stop
         if held and self._lead is not None:
             name = self._lead.name
             self._lead = next((one for one in seen if one.name == name), self._lead)
@@ -113,9 +113,9 @@ class ReferenceDriver(SafetyModel):
         if changed and risk is not Risk.NONE:
             self.risk = risk
 
-    def _most_urgent(self, seen: list[Ahead]) -> tuple[Ahead | None, Risk]:
+    def _most_urgent(self, seen: list[LeadObject]) -> tuple[LeadObject | None, Risk]:
         """The nearest one that is in the lane or cuts in; behind one that leaves the lane who is met first."""
-        found: Ahead | None = None
+        found: LeadObject | None = None
         risk = Risk.NONE
         for one in seen:
             its = self._risk_of(one)
@@ -127,7 +127,7 @@ class ReferenceDriver(SafetyModel):
                 found = one
         return found, risk
 
-    def _risk_of(self, one: Ahead) -> Risk | None:
+    def _risk_of(self, one: LeadObject) -> Risk | None:
         """What the driver makes of one; None for one that is beside the lane and stays there."""
         if one.walks:
             return Risk.CUT_IN if one.nearing > TINY else None
@@ -137,58 +137,58 @@ class ReferenceDriver(SafetyModel):
             return Risk.DECELERATION if one.change < -HARD else Risk.NONE
         return Risk.CUT_IN if self._cuts_in(one) else None
 
-    def _cuts_in(self, one: Ahead) -> bool:
+    def _cuts_in(self, one: LeadObject) -> bool:
         if one.name not in self._began:
             return False
         if self.settings.moved is None:
             return one.towards > WANDERING
         return abs(one.across - self._began[one.name]) > self.settings.moved
 
-    def _advance(self, own: Own) -> None:
+    def _advance(self, own: EgoKinematics) -> None:
         lead = self._lead
         if lead is None or own.speed <= TINY:
-            self.phase, self.risk, self._emergency = Phase.CALM, Risk.NONE, False
-        elif self.phase is Phase.CALM:
+            self.phase, self.risk, self._emergency = DriverPhase.CALM, Risk.NONE, False
+        elif self.phase is DriverPhase.CALM:
             if self._at_risk(lead):
-                self.phase, self._perceived_at = Phase.PERCEIVING, lead.across
+                self.phase, self._perceived_at = DriverPhase.PERCEIVING, lead.across
                 self._left = self.settings.pedestrians if lead.walks else self.settings.evaluation
-        elif self.phase is Phase.PERCEIVING:
+        elif self.phase is DriverPhase.PERCEIVING:
             self._left -= own.dt
             if self._evaluated(lead):
-                self.phase, self._left = Phase.REACTING, REACTION
-        elif self.phase is Phase.REACTING:
+                self.phase, self._left = DriverPhase.REACTING, REACTION
+        elif self.phase is DriverPhase.REACTING:
             self._left -= own.dt
             if not self._dangerous(own, lead):
-                self.phase, self.risk = Phase.CALM, Risk.NONE
+                self.phase, self.risk = DriverPhase.CALM, Risk.NONE
             elif self._left < TINY:
-                self.phase = Phase.BRAKING
+                self.phase = DriverPhase.BRAKING
         elif not self.settings.full_stop and not self._dangerous(own, lead) and lead.closing < TINY:
-            self.phase, self.risk = Phase.CALM, Risk.NONE
+            self.phase, self.risk = DriverPhase.CALM, Risk.NONE
 
-    def _at_risk(self, lead: Ahead) -> bool:
+    def _at_risk(self, lead: LeadObject) -> bool:
         if self.risk is Risk.CUT_OUT:
             return lead.closing > TINY
         if self.risk is Risk.DECELERATION:
             return lead.change < -HARD
         return self.risk is Risk.CUT_IN and (lead.closing > TINY if lead.walks else self._cuts_in(lead))
 
-    def _evaluated(self, lead: Ahead) -> bool:
+    def _evaluated(self, lead: LeadObject) -> bool:
         if self.risk is Risk.CUT_IN and not lead.walks and self.settings.distance is not None:
             return abs(lead.across - self._perceived_at) > self.settings.distance
         return self._left < TINY
 
-    def _dangerous(self, own: Own, lead: Ahead) -> bool:
+    def _dangerous(self, own: EgoKinematics, lead: LeadObject) -> bool:
         if self.settings.always:
             return True
         if self.risk is Risk.CUT_IN:
             return lead.time_to_collision < DANGEROUS
         return lead.headway(own.speed) < DANGEROUS
 
-    def _braking(self, own: Own) -> float:
+    def _braking(self, own: EgoKinematics) -> float:
         then = own.acceleration
-        if self.phase is Phase.REACTING:
+        if self.phase is DriverPhase.REACTING:
             then = min(then, -RELEASE)
-        if self.phase is Phase.BRAKING:
+        if self.phase is DriverPhase.BRAKING:
             then -= FULL / JERK_TIME * own.dt
         if self._emergency:
             then -= EMERGENCY / JERK_TIME * own.dt

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eidrive_scenario.api import Actor, LaneLocation, Stage, model
+from eidrive_scenario.api import Actor, LaneLocation, RuntimeContext, model
 
 Span = tuple[float, float]
 """From, to [m]"""
 
 
 @dataclass(frozen=True)
-class Ahead:
+class LeadObject:
     """Somebody ahead, in coordinates of the road: s along the own driving direction, t to the left of it.
 
     name        of the entity
@@ -63,11 +63,13 @@ class RoadAhead:
     later      by how much the others are ahead of the actor in time [s]
     """
 
-    def __init__(self, stage: Stage, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0) -> None:
-        self._stage, self._actor, self._reach = stage, actor, reach
+    def __init__(
+        self, context: RuntimeContext, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0
+    ) -> None:
+        self._stage, self._actor, self._reach = context, actor, reach
         self._tolerance, self._later = tolerance, later
 
-    def look(self) -> list[Ahead]:
+    def find_lead_objects(self) -> list[LeadObject]:
         """Those ahead in this lane or the next ones, and pedestrians wherever they are; the nearest first."""
         here, roads = self._stage.location(self._actor.name), self._stage.roads
         if here is None or roads is None:
@@ -76,7 +78,7 @@ class RoadAhead:
         found = (self._seen(here, other) for other in others if other.name in self._stage.view)
         return sorted((one for one in found if one is not None), key=lambda one: one.gap)
 
-    def _seen(self, here: LaneLocation, other: Actor) -> Ahead | None:
+    def _seen(self, here: LaneLocation, other: Actor) -> LeadObject | None:
         roads, there = self._stage.roads, self._stage.location(other.name)
         apart = roads.distance(here, there) if roads is not None and there is not None else None
         if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
@@ -93,7 +95,7 @@ class RoadAhead:
         moved = (apart[0] + its_along * self._later, apart[1] + its_across * self._later)
         mine, theirs = self._box(self._actor, here), self._box(other, there, *moved)
         border = 0.5 * width - side * here.offset * way
-        return Ahead(
+        return LeadObject(
             name=other.name,
             gap=max(0.0, theirs[0][0] - mine[0][1]),
             aside=max(0.0, theirs[1][0] - mine[1][1], mine[1][0] - theirs[1][1]),

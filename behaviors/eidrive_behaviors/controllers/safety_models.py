@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from eidrive_behaviors.controllers.road_ahead import Ahead
+from eidrive_behaviors.controllers.road_ahead import LeadObject
 
 G = 9.81
 """Of R157's decelerations [m/s²]."""
@@ -25,7 +25,7 @@ REACTION = 0.75
 
 
 @dataclass(frozen=True)
-class Own:
+class EgoKinematics:
     """The car that decides: speed [m/s], acceleration of its last step [m/s²], length of a step [s]."""
 
     speed: float
@@ -40,19 +40,19 @@ class SafetyModel(ABC):
     """How far it looks [m]."""
 
     @abstractmethod
-    def decide(self, own: Own, seen: list[Ahead]) -> float | None:
+    def decide(self, own: EgoKinematics, seen: list[LeadObject]) -> float | None:
         """The acceleration for this step [m/s²], None where nothing is critical."""
 
     @abstractmethod
-    def following_distance(self, own: Own, lead: Ahead) -> float:
+    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
         """The gap to keep where nothing is critical [m]."""
 
     @property
-    def lead(self) -> Ahead | None:
+    def lead(self) -> LeadObject | None:
         """Who counted in the last decision."""
         return self._lead
 
-    _lead: Ahead | None = None
+    _lead: LeadObject | None = None
 
 
 class MemorylessModel(SafetyModel):
@@ -68,7 +68,7 @@ class MemorylessModel(SafetyModel):
         self._critical = False
         self._left = 0.0
 
-    def decide(self, own: Own, seen: list[Ahead]) -> float | None:
+    def decide(self, own: EgoKinematics, seen: list[LeadObject]) -> float | None:
         """Brake after the reaction time, where it is critical."""
         self._lead = next((one for one in seen if self.matters(own, one)), None)
         held = self._critical and self.full_stop and own.speed > 0.0
@@ -92,14 +92,14 @@ class MemorylessModel(SafetyModel):
         return self.braking(own)
 
     @abstractmethod
-    def matters(self, own: Own, one: Ahead) -> bool:
+    def matters(self, own: EgoKinematics, one: LeadObject) -> bool:
         """True for one in the lane, or on the way into it."""
 
     @abstractmethod
-    def critical(self, own: Own, lead: Ahead) -> bool:
+    def critical(self, own: EgoKinematics, lead: LeadObject) -> bool:
         """True where the car has to brake for one that it closes in on."""
 
-    def braking(self, own: Own) -> float:
+    def braking(self, own: EgoKinematics) -> float:
         """Full deceleration, by its jerk."""
         return max(own.acceleration - FULL / JERK_TIME * own.dt, -FULL)
 
@@ -118,20 +118,20 @@ class Regulation(MemorylessModel):
     SAMPLING = 0.1
     INTRUSION = 0.3
 
-    def matters(self, own: Own, one: Ahead) -> bool:
+    def matters(self, own: EgoKinematics, one: LeadObject) -> bool:
         """In the lane, or 0.3 m inside it."""
         return one.lanes == 0 or one.intrusion > self.INTRUSION
 
-    def critical(self, own: Own, lead: Ahead) -> bool:
+    def critical(self, own: EgoKinematics, lead: LeadObject) -> bool:
         """By the formula of 5.2.5.2."""
         least = lead.closing / (2.0 * self.DECELERATION) + self.DELAY + self.SAMPLING
         return lead.time_to_collision < least
 
-    def braking(self, own: Own) -> float:
+    def braking(self, own: EgoKinematics) -> float:
         """6 m/s² at once."""
         return -self.DECELERATION
 
-    def following_distance(self, own: Own, lead: Ahead) -> float:
+    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
         """The table of 5.2.3.3: 1.0 s at 2 m/s, 1.1 s at 10 km/h, 0.1 s more with each 10 km/h; at least 2 m."""
         kmh = own.speed * 3.6
         gap = 1.0 + kmh / 100.0 if kmh >= 10.0 else 1.0 + 0.1 * max(0.0, own.speed - 2.0) / (10.0 / 3.6 - 2.0)
@@ -146,7 +146,7 @@ class Rss(MemorylessModel):
     SIDEWAYS = 1.0
     MARGIN = 0.3
 
-    def matters(self, own: Own, one: Ahead) -> bool:
+    def matters(self, own: EgoKinematics, one: LeadObject) -> bool:
         """In the lane, or nearer across than the lateral safe distance (lemma 4, for a car that keeps its lane)."""
         if one.lanes == 0 or one.aside <= 0.0:
             return True
@@ -154,11 +154,11 @@ class Rss(MemorylessModel):
         needed = self.MARGIN + 0.5 * (one.sideways + then) * REACTION + then**2 / (2.0 * self.SIDEWAYS)
         return one.aside < needed
 
-    def critical(self, own: Own, lead: Ahead) -> bool:
+    def critical(self, own: EgoKinematics, lead: LeadObject) -> bool:
         """Nearer than the longitudinal safe distance (lemma 2)."""
         return lead.gap < self._safe(own.speed, lead.speed)
 
-    def following_distance(self, own: Own, lead: Ahead) -> float:
+    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
         """The longitudinal safe distance behind one of the own speed."""
         return self._safe(own.speed, own.speed)
 
@@ -176,7 +176,7 @@ class Fsm(MemorylessModel):
     STANDING, MARGIN = 2.0, 2.0
     IN_TIME = 0.1
 
-    def matters(self, own: Own, one: Ahead) -> bool:
+    def matters(self, own: EgoKinematics, one: LeadObject) -> bool:
         """In the lane, or on its way there and not too late to meet the car."""
         if one.lanes == 0 or one.aside <= 0.0:
             return True
@@ -184,13 +184,13 @@ class Fsm(MemorylessModel):
             return False
         return one.aside / one.nearing <= one.time_to_collision + self.IN_TIME
 
-    def critical(self, own: Own, lead: Ahead) -> bool:
+    def critical(self, own: EgoKinematics, lead: LeadObject) -> bool:
         """True where one of the two metrics is above 0."""
         self._urgency = self.critical_safety(own, lead)
         self._caution = self.proactive_safety(own, lead)
         return self._urgency + self._caution > 0.0
 
-    def braking(self, own: Own) -> float:
+    def braking(self, own: EgoKinematics) -> float:
         """By the metrics, no harder than the driver's jerk allows."""
         wanted = (
             self.COMFORTABLE + self._urgency * (self.HARDEST - self.COMFORTABLE)
@@ -199,17 +199,17 @@ class Fsm(MemorylessModel):
         )
         return max(super().braking(own), -wanted)
 
-    def following_distance(self, own: Own, lead: Ahead) -> float:
+    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
         """From where on the proactive metric is 0."""
         return self.STANDING + self.MARGIN + self._stopping(own.speed, lead.speed, self.COMFORTABLE)
 
-    def proactive_safety(self, own: Own, lead: Ahead) -> float:
+    def proactive_safety(self, own: EgoKinematics, lead: LeadObject) -> float:
         """PFS: 0 where the car could stop comfortably behind a lead that brakes hard, 1 where it could not at all."""
         gap = lead.gap - self.STANDING
         safe = self._stopping(own.speed, lead.speed, self.COMFORTABLE) + self.MARGIN
         return _membership(gap, self._stopping(own.speed, lead.speed, self.HARDEST), safe)
 
-    def critical_safety(self, own: Own, lead: Ahead) -> float:
+    def critical_safety(self, own: EgoKinematics, lead: LeadObject) -> float:
         """CFS: 0 where the car could slow down to the lead's speed comfortably after its reaction, else up to 1."""
         if lead.closing <= 0.0:
             return 0.0

@@ -19,8 +19,8 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
-from eidrive_scenario.storyboard.route import route_of
-from eidrive_scenario.storyboard.trajectory import Layout, lay_out
+from eidrive_scenario.storyboard.route import build_route
+from eidrive_scenario.storyboard.trajectory import TrajectoryCurve, sample_trajectory
 
 MARGIN = 2.0
 """How far from the outermost lane a vehicle may be and still count as on the road [m]: a bay, a verge."""
@@ -48,7 +48,7 @@ def trajectories_off_road(context: RoadLintContext) -> Iterator[Diagnostic]:
 
 
 def _leaves(
-    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, layout: Layout
+    context: RoadLintContext, action: FollowTrajectoryAction, trajectory: Trajectory, layout: TrajectoryCurve
 ) -> Iterator[Diagnostic]:
     count = min(max(2, math.ceil(layout.length / SPACING) + 1), MAX_POINTS)
     along = [layout.length * number / (count - 1) for number in range(count)]
@@ -65,7 +65,7 @@ def _leaves(
         )
 
 
-def _layout(context: RoadLintContext, trajectory: Trajectory) -> Layout | None:
+def _layout(context: RoadLintContext, trajectory: Trajectory) -> TrajectoryCurve | None:
     """The trajectory in the world, None where it depends on somebody or a point of it is nowhere."""
 
     def pose(position: Position) -> Pose:
@@ -78,7 +78,7 @@ def _layout(context: RoadLintContext, trajectory: Trajectory) -> Layout | None:
     if spline is not None and spline.clothoid_spline_segment[0].position_start is None:
         return None
     try:
-        return lay_out(trajectory, pose)
+        return sample_trajectory(trajectory, pose)
     except (_Relative, InputError, ValueError, ZeroDivisionError):
         return None
 
@@ -112,7 +112,7 @@ def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
         if any(id(position) in context.unresolved or context.place(position) is None for position in positions):
             continue
         try:
-            route_of(route, context.roads, context.place, again=True)  # type: ignore[arg-type]
+            build_route(route, context.roads, context.place, again=True)  # type: ignore[arg-type]
         except InputError as error:
             for problem in error.diagnostics:
                 yield at(route, problem.message, problem.hint)

@@ -12,9 +12,9 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.lint import LintContext
 from eidrive_scenario.openscenario.model import Position
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.positions import references, resolve
-from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.positions import referenced_entities, resolve_position
+from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
 from eidrive_scenario.world.view import WorldView
 
 
@@ -24,15 +24,15 @@ class RoadLintContext(LintContext):
     def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
         super().__init__(scenario)
         self.roads = roads
-        self.stage = Stage(scenario, roads, dt=0.0, seed=0, nobody=_nobody())
+        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_nobody())
 
-    def place(self, position: Position) -> Place | None:
+    def place(self, position: Position) -> ResolvedPosition | None:
         """Where a position is, None where that depends on where somebody is. Raises InputError if it is nowhere."""
-        if references(position):
+        if referenced_entities(position):
             return None
         try:
-            return resolve(position, self.stage)
-        except (Absent, ValueError):
+            return resolve_position(position, self.context)
+        except (EntityAbsentError, ValueError):
             return None
 
     @cached_property

@@ -41,16 +41,16 @@ class FaultyAction(ActionBehaviour):
             case "none":
                 return None
             case "nan":
-                self.stage.actors[next(iter(self.stage.actors))].motion.speed = math.nan
+                self.context.actors[next(iter(self.context.actors))].motion.speed = math.nan
             case "raises":
                 raise LookupError("no such action")
-            case "fails below 5" if self.stage.actors["Ego"].motion.speed < 4.9:
+            case "fails below 5" if self.context.actors["Ego"].motion.speed < 4.9:
                 raise ValueError("too slow")
         return Status.SUCCESS
 
 
 class FaultyCondition(Condition):
-    def holds(self, stage):
+    def holds(self, context):
         match self.element.value:
             case "none":
                 return None
@@ -60,6 +60,6 @@ class FaultyCondition(Condition):
                 raise ArithmeticError("undefined")
         return False
 
-    def explain(self, stage):
+    def explain(self, context):
         return "faulty"
 """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import Contact, WorldView
@@ -64,7 +64,14 @@ def make_frame() -> Callable[..., Frame]:
         )
         unit = AgentStep(seen, (), seen, None, None, (message,))
         change = StateChange(
-            time, "Stop", "Story/Act/Stop", "event", State.STANDBY, Transition.START, State.RUNNING, "t > 3 s"
+            time,
+            "Stop",
+            "Story/Act/Stop",
+            "event",
+            ElementState.STANDBY,
+            ElementTransition.START,
+            ElementState.RUNNING,
+            "t > 3 s",
         )
         links = (
             LinkEvent("Rsu", "Ego", tick, time, "delivered", time + 0.3, "", 300),

@@ -14,7 +14,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.storyboard.states import State
+from eidrive_scenario.storyboard.states import ElementState
 
 
 def round_trip(kind: Any, value: Any) -> Any:
@@ -50,7 +50,7 @@ def test_integers_stay_integers() -> None:
 
 
 def test_the_other_kinds() -> None:
-    assert round_trip(State, State.RUNNING) is State.RUNNING
+    assert round_trip(ElementState, ElementState.RUNNING) is ElementState.RUNNING
     assert round_trip(float | None, None) is None
     assert round_trip(tuple[str, ...], ("a", "b")) == ("a", "b")
     assert round_trip(tuple[float, int], (1.5, 2)) == (1.5, 2)

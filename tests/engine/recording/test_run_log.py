@@ -9,14 +9,16 @@ import pytest
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog
 from eidrive_scenario.storyboard.elements import EMPTY
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
-START, STOP, SKIP, END = Transition.START, Transition.STOP, Transition.SKIP, Transition.END
-RUNNING, STANDBY, COMPLETE = State.RUNNING, State.STANDBY, State.COMPLETE
+START, STOP, SKIP, END = ElementTransition.START, ElementTransition.STOP, ElementTransition.SKIP, ElementTransition.END
+RUNNING, STANDBY, COMPLETE = ElementState.RUNNING, ElementState.STANDBY, ElementState.COMPLETE
 Lines = Callable[..., list[str]]
 
 
-def change(time: float, kind: str, path: str, what: Transition | None, after: State, why: str = "") -> StateChange:
+def change(
+    time: float, kind: str, path: str, what: ElementTransition | None, after: ElementState, why: str = ""
+) -> StateChange:
     return StateChange(time, path.rpartition("/")[2], path, kind, STANDBY, what, after, why)
 
 

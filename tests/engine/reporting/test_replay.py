@@ -17,7 +17,7 @@ from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay import replay_data, write_replay
 from eidrive_scenario.reporting.settings_text import short_number
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
 Play = Callable[..., list[Frame]]
 
@@ -68,7 +68,9 @@ def test_a_station_that_comes_later_has_no_knowledge_before(street: Play) -> Non
 
 
 def test_changes_of_the_storyboard_are_listed(street: Play) -> None:
-    change = StateChange(0.0, "Go", "S/A/Go", "event", State.STANDBY, Transition.START, State.RUNNING, "time > 0")
+    change = StateChange(
+        0.0, "Go", "S/A/Go", "event", ElementState.STANDBY, ElementTransition.START, ElementState.RUNNING, "time > 0"
+    )
     frame = street(1)[0]
     data = replay_data([Frame(frame.view, frame.steps, (change,))])
     assert data["changes"] == [[0.0, "S/A/Go", "running", "time > 0"]]

@@ -10,8 +10,8 @@ import pytest
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork, by_chance, fastest, fewest_junctions
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.route import route_of
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.route import build_route
 
 Text = Callable[..., str]
 LANE = (
@@ -89,10 +89,10 @@ def test_each_leg_has_a_cost_of_its_own(three_ways: RoadNetwork) -> None:
 
 
 def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwork) -> None:
-    def place(position: model.Position) -> Place:
+    def place(position: model.Position) -> ResolvedPosition:
         assert position.lane_position is not None
         location = three_ways.location(position.lane_position.road_id, -1, position.lane_position.s)
-        return Place(three_ways.pose(location), location)
+        return ResolvedPosition(three_ways.pose(location), location)
 
     def waypoint(road: str, strategy: model.RouteStrategy) -> model.Waypoint:
         there = model.Position(lane_position=model.LanePosition(road_id=road, lane_id="-1", s=50.0))
@@ -103,7 +103,7 @@ def test_the_strategy_of_a_waypoint_chooses_the_way_to_it(three_ways: RoadNetwor
         points = (last, last) if begun else (waypoint("start", model.RouteStrategy.SHORTEST), last)
         route = model.Route(closed=False, name="way", waypoint=points)
         start = three_ways.location("start", -1, 10.0) if begun else None
-        return route_of(route, three_ways, place, start, seed=seed).lanes[1].road[0]
+        return build_route(route, three_ways, place, start, seed=seed).lanes[1].road[0]
 
     strategies = model.RouteStrategy
     for begun in (False, True):

@@ -15,7 +15,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.condition import Condition
 from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.view import WorldView
 
@@ -53,14 +53,14 @@ def empty_view(time: float = 0.0, tick: int = 0) -> WorldView:
 class Clock:
     """Steps a stage through time without a world."""
 
-    def __init__(self, stage: Stage, dt: float) -> None:
-        self.stage, self.dt, self.tick = stage, dt, -1
+    def __init__(self, context: RuntimeContext, dt: float) -> None:
+        self.context, self.dt, self.tick = context, dt, -1
 
-    def step(self) -> Stage:
+    def step(self) -> RuntimeContext:
         """One tick further."""
         self.tick += 1
-        self.stage.begin(replace(self.stage.view, time=self.tick * self.dt, tick=self.tick), self.dt)
-        return self.stage
+        self.context.begin_tick(replace(self.context.view, time=self.tick * self.dt, tick=self.tick), self.dt)
+        return self.context
 
 
 class Script(Condition):
@@ -70,20 +70,22 @@ class Script(Condition):
         super().__init__(model.SimulationTimeCondition(rule=model.Rule.EQUAL_TO, value=0.0))
         self.values, self.asked = list(values), 0
 
-    def holds(self, stage: Stage) -> bool:
+    def holds(self, context: RuntimeContext) -> bool:
         value = self.values[min(self.asked, len(self.values) - 1)]
         self.asked += 1
         return value
 
-    def explain(self, stage: Stage) -> str:
-        return f"value {self.asked} at {stage.time:g} s"
+    def explain(self, context: RuntimeContext) -> str:
+        return f"value {self.asked} at {context.time:g} s"
 
 
 class Task(ActionBehaviour):
     """An action that takes a number of ticks."""
 
-    def __init__(self, stage: Stage, ticks: int, *, actor: str | None = None, domain: Domain = Domain.NONE) -> None:
-        super().__init__(model.VisibilityAction(graphics=True, sensors=True, traffic=True), stage, actor=actor)
+    def __init__(
+        self, context: RuntimeContext, ticks: int, *, actor: str | None = None, domain: Domain = Domain.NONE
+    ) -> None:
+        super().__init__(model.VisibilityAction(graphics=True, sensors=True, traffic=True), context, actor=actor)
         self.ticks, self.starts, self._domain = ticks, 0, domain
 
     @property
@@ -91,7 +93,7 @@ class Task(ActionBehaviour):
         return self._domain
 
     @property
-    def performer_missing(self) -> bool:
+    def is_actor_missing(self) -> bool:
         """Never: nobody is placed where elements are tested alone."""
         return False
 
@@ -111,17 +113,17 @@ class Setting(Task):
 
 
 @pytest.fixture
-def stage() -> Stage:
+def context() -> RuntimeContext:
     """A stage with cars A and B and no roads."""
     cars = "".join(CAR.format(name=name) for name in "AB")
     scenario = load_scenario(SCENARIO.format(cars=cars).encode())
-    return Stage(scenario, None, dt=0.1, seed=0, nobody=empty_view(tick=-1))
+    return RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
 
 
 @pytest.fixture
-def clock(stage: Stage) -> Clock:
+def clock(context: RuntimeContext) -> Clock:
     """Time in steps of 0.1 s."""
-    return Clock(stage, 0.1)
+    return Clock(context, 0.1)
 
 
 @pytest.fixture
@@ -131,25 +133,25 @@ def script() -> Callable[[Sequence[bool]], Script]:
 
 
 @pytest.fixture
-def task(stage: Stage) -> Callable[..., Task]:
+def task(context: RuntimeContext) -> Callable[..., Task]:
     """Makes actions."""
-    return lambda ticks, **more: Task(stage, ticks, **more)
+    return lambda ticks, **more: Task(context, ticks, **more)
 
 
 @pytest.fixture
-def setting(stage: Stage) -> Callable[[], Setting]:
+def setting(context: RuntimeContext) -> Callable[[], Setting]:
     """Makes actions that take no time."""
-    return lambda: Setting(stage, 1)
+    return lambda: Setting(context, 1)
 
 
 @pytest.fixture
-def fresh() -> Callable[[], tuple[Stage, Clock, type[Script], Callable[..., Task]]]:
+def fresh() -> Callable[[], tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]]:
     """Makes a stage, its clock, and makers of conditions and actions on it; anew for each example of a property."""
     scenario = load_scenario(SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB")).encode())
 
-    def made() -> tuple[Stage, Clock, type[Script], Callable[..., Task]]:
-        stage = Stage(scenario, None, dt=0.1, seed=0, nobody=empty_view(tick=-1))
-        return stage, Clock(stage, 0.1), Script, lambda ticks, **more: Task(stage, ticks, **more)
+    def made() -> tuple[RuntimeContext, Clock, type[Script], Callable[..., Task]]:
+        context = RuntimeContext(scenario, None, dt=0.1, seed=0, empty_view=empty_view(tick=-1))
+        return context, Clock(context, 0.1), Script, lambda ticks, **more: Task(context, ticks, **more)
 
     return made
 

@@ -16,7 +16,7 @@ from eidrive_scenario.storyboard.elements import (
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.init_block import InitBlock
-from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 YES, NO = True, False
 
@@ -24,14 +24,14 @@ YES, NO = True, False
 class Builder:
     """Elements of one tree; paths do not matter here."""
 
-    def __init__(self, stage: Any, script: Any) -> None:
-        self.stage, self.script = stage, script
+    def __init__(self, context: Any, script: Any) -> None:
+        self.stage, self.script = context, script
 
     def wait(self, values: Any) -> Any:
         if values is None:
             return None
-        trigger = Trigger([ConditionGroup((ConditionMonitor(self.script(values)),))])
-        return WaitFor("trigger", trigger, self.stage)
+        trigger = Trigger([ConditionGroup((ConditionEvaluator(self.script(values)),))])
+        return WaitForTrigger("trigger", trigger, self.stage)
 
     def action(self, name: Any, *tasks: Any) -> Any:
         by_actor = {task.actor_name: [task] for task in tasks}
@@ -42,7 +42,7 @@ class Builder:
         return EventElement(self.stage, (name,), actions, priority=priority, start=self.wait(start), limit=limit)
 
     def maneuver(self, *events: Any) -> Any:
-        EventElement.compete(events)
+        EventElement.resolve_priorities(events)
         return ManeuverElement(self.stage, ("maneuver",), events)
 
     def group(self, *maneuvers: Any, limit: Any = 1) -> Any:
@@ -57,17 +57,17 @@ class Builder:
 
 
 @pytest.fixture
-def make(stage: Any, script: Any) -> Any:
-    return Builder(stage, script)
+def make(context: Any, script: Any) -> Any:
+    return Builder(context, script)
 
 
 def play(clock: Any, root: Any, ticks: Any) -> Any:
     """One list of `element transition` per tick."""
     seen = []
     for _ in range(ticks):
-        stage = clock.step()
-        root.play()
-        seen.append([f"{c.element} {c.transition.name.lower()}" for c in stage.progress.changes if c.transition])
+        context = clock.step()
+        root.tick_tree()
+        seen.append([f"{c.element} {c.transition.name.lower()}" for c in context.progress.changes if c.transition])
     return seen
 
 
@@ -231,7 +231,7 @@ def test_a_younger_action_ends_an_older_one_on_the_same_domain(clock: Any, make:
 
 
 def test_who_is_displaced_in_the_step_that_would_bring_it_to_its_goal_does_not_end_but_stops(
-    clock: Any, make: Any, task: Any, stage: Any
+    clock: Any, make: Any, task: Any, context: Any
 ) -> None:
     slow = make.event("slow", task(2, actor="A", domain=Domain.LATERAL))
     watching = make.event("watching", task(9, actor="A", domain=Domain.LATERAL), start=[NO, YES])
@@ -242,24 +242,24 @@ def test_who_is_displaced_in_the_step_that_would_bring_it_to_its_goal_does_not_e
 
 def test_an_action_for_two_actors_ends_with_the_later_one(clock: Any, make: Any, task: Any) -> None:
     action = make.action("action", task(1, actor="A"), task(2, actor="B"))
-    event = EventElement(make.stage, ("event",), [action], priority="parallel")
+    event = EventElement(make.context, ("event",), [action], priority="parallel")
     ticks = play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 3)
     assert ticks[1] == []
     assert ticks[2][0] == "action end"
 
 
 @pytest.mark.element("conflicting actions")
-def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, stage: Any) -> None:
-    init = InitBlock(stage, [task(9, actor="A", domain=Domain.LONGITUDINAL)])
+def test_an_init_action_gives_way_too(clock: Any, make: Any, task: Any, context: Any) -> None:
+    init = InitBlock(context, [task(9, actor="A", domain=Domain.LONGITUDINAL)])
     init.start()
     event = make.event("event", task(9, actor="A", domain=Domain.LONGITUDINAL))
     play(clock, make.storyboard(make.act(make.group(make.maneuver(event)))), 1)
     assert init.running == []
 
 
-def test_a_removed_actor_ends_what_it_was_doing(clock: Any, make: Any, task: Any, stage: Any) -> None:
+def test_a_removed_actor_ends_what_it_was_doing(clock: Any, make: Any, task: Any, context: Any) -> None:
     event = make.event("event", task(9, actor="A", domain=Domain.LATERAL))
     root = make.storyboard(make.act(make.group(make.maneuver(event))))
     play(clock, root, 1)
-    stage.leave("A")
+    context.remove_actor("A")
     assert play(clock, root, 1)[0][:2] == ["event end", "maneuver end"]

@@ -10,8 +10,8 @@ import pytest
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.positions import resolve
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.positions import resolve_position
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 LATITUDE, METRES_PER_DEGREE = 48.0, 111_190.32
 """Arc of the WGS 84 meridian per degree around 48°N: a (1 - e²) (1 - e² sin² 48°)^(-3/2) π / 180 [m]."""
@@ -19,7 +19,7 @@ NORTHING = 5_316_300.0
 
 
 @pytest.fixture
-def globe(stage: Stage) -> Stage:
+def globe(context: RuntimeContext) -> RuntimeContext:
     """A street to the north from about (0, 0), z = 10, below another one, z = 17, in shifted coordinates."""
     road = """<road name="" length="400" id="{number}" junction="-1"><link/>
       <planView><geometry s="0" x="0" y="0" hdg="1.5707963267948966" length="400"><line/></geometry></planView>
@@ -30,16 +30,16 @@ def globe(stage: Stage) -> Stage:
       <offset x="499996" y="{NORTHING}" z="100" hdg="0"/></header>
       {road.format(number=1, z=10)}{road.format(number=2, z=17)}</OpenDRIVE>"""
     roads = RoadNetwork.parse(text)
-    return Stage(stage.scenario, roads, dt=0.1, seed=0, nobody=stage.view)
+    return RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
 
 
-def at(stage: Any, **frame: Any) -> tuple[Pose, Any]:
-    place = resolve(model.Position(geo_position=model.GeoPosition(**frame)), stage, "A")
+def at(context: Any, **frame: Any) -> tuple[Pose, Any]:
+    place = resolve_position(model.Position(geo_position=model.GeoPosition(**frame)), context, "A")
     return place.pose, place.location
 
 
 @pytest.mark.element("GeoPosition")
-def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: Stage) -> None:
+def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: RuntimeContext) -> None:
     """On the middle meridian x is the false easting, and the map is smaller than the globe by 0.9996."""
     first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     assert first.x == pytest.approx(4.0, abs=1e-6)
@@ -49,7 +49,7 @@ def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: Stage) -> None:
     assert north.x == pytest.approx(first.x, abs=1e-6)
 
 
-def test_missing_and_relative_angles_refer_to_the_lane(globe: Stage) -> None:
+def test_missing_and_relative_angles_refer_to_the_lane(globe: RuntimeContext) -> None:
     place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
     assert at(globe, **place)[0].h == pytest.approx(math.pi / 2)
     relative = model.Orientation(type=model.ReferenceContext.RELATIVE, h=0.3)
@@ -58,7 +58,7 @@ def test_missing_and_relative_angles_refer_to_the_lane(globe: Stage) -> None:
     assert at(globe, **place, orientation=absolute)[0].h == pytest.approx(0.3)
 
 
-def test_the_ground_the_level_or_the_altitude_say_how_high(globe: Stage) -> None:
+def test_the_ground_the_level_or_the_altitude_say_how_high(globe: RuntimeContext) -> None:
     place = {"latitude_deg": LATITUDE, "longitude_deg": 9.0}
     assert at(globe, **place)[0].z == pytest.approx(10.0)
     pose, location = at(globe, **place, vertical_road_selection=1)
@@ -71,7 +71,7 @@ def test_the_ground_the_level_or_the_altitude_say_how_high(globe: Stage) -> None
 
 
 @pytest.mark.element("GeoPosition")
-def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: Stage) -> None:
+def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: RuntimeContext) -> None:
     expected, _ = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     old, _ = at(globe, latitude=math.radians(LATITUDE), longitude=math.radians(9.0))
     assert old[:3] == pytest.approx(expected[:3], abs=1e-6)
@@ -81,14 +81,14 @@ def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: Stage) 
     assert "taken as degrees" in str(globe.warnings[0])
 
 
-def test_a_latitude_beyond_the_pole(globe: Stage) -> None:
+def test_a_latitude_beyond_the_pole(globe: RuntimeContext) -> None:
     with pytest.raises(ScenarioError, match="latitudes end at"):
         at(globe, latitude_deg=91.0, longitude_deg=9.0)
     with pytest.raises(ScenarioError, match="lacks latitude or longitude"):
         at(globe, latitude_deg=48.0)
 
 
-def test_a_place_far_from_all_roads_is_still_a_place(globe: Stage) -> None:
+def test_a_place_far_from_all_roads_is_still_a_place(globe: RuntimeContext) -> None:
     pose, location = at(globe, latitude_deg=48.1, longitude_deg=9.0)
     assert location is None
     assert (pose.x, pose.z, pose.h) == (pytest.approx(4.0, abs=1e-6), 0.0, 0.0)

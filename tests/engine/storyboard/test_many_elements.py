@@ -69,7 +69,7 @@ def test_an_event_that_overrides_asks_nobody_who_rests(monkeypatch: pytest.Monke
         simulation.tick()
         simulation.tick()
         simulation.tick()
-        assert simulation.storyboard.stage.variables["Count"] == "200"
+        assert simulation.storyboard.context.variables["Count"] == "200"
     assert len(asked) < 50 * 200
 
 
@@ -81,7 +81,7 @@ def test_references_may_leave_levels_out_and_be_written_with_slashes(reference: 
             _, end = simulation.tick()
         assert end == "storyboard complete"
         assert simulation.world.tick < 3
-        assert simulation.storyboard.stage.variables["Count"] == "3"
+        assert simulation.storyboard.context.variables["Count"] == "3"
 
 
 def test_what_a_reference_means_is_found_as_by_trying_all() -> None:

@@ -8,21 +8,21 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.motion import Motion, Place, Steering
+from eidrive_scenario.storyboard.motion import LateralStep, Motion, ResolvedPosition
 
 
 def on_lane(roads: Any, lane: Any, s: Any, *, heading: Any = 0.0, offset: Any = 0.0) -> Any:
     motion = Motion(roads)
     here = roads.location("1", lane, s, offset)
-    motion.put(Place(roads.pose(here).turned(heading), here))
-    motion.settle()
+    motion.teleport(ResolvedPosition(roads.pose(here).turned(heading), here))
+    motion.initialize()
     return motion
 
 
 def test_without_roads_it_goes_straight_on() -> None:
     motion = Motion(None)
-    motion.put(Place(Pose(1.0, 2.0, 0.5, math.pi / 2, 0.0, 0.0)))
-    motion.settle()
+    motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.5, math.pi / 2, 0.0, 0.0)))
+    motion.initialize()
     motion.speed = 10.0
     placement = motion.step(0.1)
     assert (placement.x, placement.y, placement.z) == pytest.approx((1.0, 3.0, 0.5))
@@ -30,7 +30,7 @@ def test_without_roads_it_goes_straight_on() -> None:
 
 def test_the_next_view_shows_a_teleported_actor_where_it_was_put() -> None:
     motion = Motion(None)
-    motion.put(Place(Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
+    motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
     motion.speed = 10.0
     first, second = motion.step(0.1), motion.step(0.1)
     assert (first.x, first.teleport) == (1.0, True)
@@ -116,7 +116,7 @@ def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: 
     """0.6 m to the left and 0.8 m along make the 1 m that the speed covers."""
     motion = on_lane(street, lane, 100.0)
     motion.speed = 10.0
-    motion.steer(Steering(0.6))
+    motion.set_lateral_step(LateralStep(0.6))
     placement = motion.step(0.1)
     sign = -math.copysign(1.0, lane)
     assert (placement.x, placement.y) == pytest.approx((100.0 + sign * 0.8, y))
@@ -126,7 +126,7 @@ def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: 
 
 def test_a_place_may_be_expressed_by_the_oncoming_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
-    assert motion.relate_to_lane(1).offset == pytest.approx(-4.0)
+    assert motion.set_reference_lane(1).offset == pytest.approx(-4.0)
     assert motion.direction == -1
     motion.speed = 10.0
     assert motion.step(0.1).x == pytest.approx(101.0)
@@ -143,7 +143,7 @@ def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
 def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     motion.speed = 10.0
-    motion.go_to(Pose(120.0, -6.5, 0.0, 0.0, 0.0, 0.0), land=True)
+    motion.move_to(Pose(120.0, -6.5, 0.0, 0.0, 0.0, 0.0), land=True)
     assert motion.step(0.1).x == 120.0
     placement = motion.step(0.1)
     assert (placement.x, placement.y) == pytest.approx((121.0, -6.5))
@@ -153,6 +153,6 @@ def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
 def test_who_is_carried_along_moves_by_that_distance_in_one_step(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     motion.speed = 10.0
-    motion.carry(4.0)
+    motion.move_along_lane(4.0)
     assert motion.step(0.1).x == pytest.approx(104.0)
     assert motion.step(0.1).x == pytest.approx(105.0)

@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.openscenario.lint.outline import Outline
 from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
-from eidrive_scenario.storyboard.states import Transition
+from eidrive_scenario.storyboard.states import ElementTransition
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 TICKS = 60
@@ -102,9 +102,9 @@ def starts(storyboard: Storyboard) -> dict[tuple[str, ...], float]:
     storyboard.initial()
     first: dict[tuple[str, ...], float] = {}
     for tick in range(TICKS):
-        storyboard.tick(replace(storyboard.stage.view, time=tick * 0.1, tick=tick))
+        storyboard.tick(replace(storyboard.context.view, time=tick * 0.1, tick=tick))
         for change in storyboard.changes:
-            if change.transition is Transition.START:
+            if change.transition is ElementTransition.START:
                 first.setdefault(tuple(change.path.split("/")), change.time)
     return first
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.states import Transition
-from eidrive_scenario.storyboard.trigger import ConditionMonitor
+from eidrive_scenario.storyboard.states import ElementTransition
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator
 
 PLACE = """<PrivateAction><TeleportAction><Position><WorldPosition x="5" y="0"/></Position></TeleportAction>
   </PrivateAction>"""
@@ -49,8 +49,8 @@ def course(storyboard: Any, ticks: int) -> list[list[str]]:
     storyboard.initial()
     seen = []
     for tick in range(ticks):
-        storyboard.tick(replace(storyboard.stage.view, time=tick * 0.1, tick=tick))
-        words = {Transition.START: "starts", Transition.END: "ends", Transition.STOP: "stops"}
+        storyboard.tick(replace(storyboard.context.view, time=tick * 0.1, tick=tick))
+        words = {ElementTransition.START: "starts", ElementTransition.END: "ends", ElementTransition.STOP: "stops"}
         made = [c for c in storyboard.changes if c.kind in ("event", "storyboard") and c.transition in words]
         seen.append([f"{c.element} {words[c.transition]}" for c in made])
     return seen
@@ -125,14 +125,14 @@ def test_an_event_that_is_executed_again_starts_in_the_next_step(build: Any) -> 
 
 
 def test_conditions_that_look_at_the_view_are_asked_once_however_many_turns_a_step_takes(
-    clock: Any, script: Any, stage: Any
+    clock: Any, script: Any, context: Any
 ) -> None:
     watching, looking = script([False, True, True]), script([False, True, True])
     looking.instant = True
     clock.step()
     for condition in (watching, looking):
-        monitor = ConditionMonitor(condition, edge="rising")
-        assert [monitor.evaluate(stage) for _ in range(3)] == (
+        monitor = ConditionEvaluator(condition, edge="rising")
+        assert [monitor.evaluate(context) for _ in range(3)] == (
             [False] * 3 if condition is watching else [False, True, True]
         )
     assert (watching.asked, looking.asked) == (1, 3)

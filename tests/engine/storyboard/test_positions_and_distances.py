@@ -12,10 +12,10 @@ from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.distances import closing_speed, distance
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.positions import resolve
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.positions import resolve_position
 from eidrive_scenario.storyboard.road_positions import count_lanes
-from eidrive_scenario.storyboard.stage import Absent, Stage
+from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
 from eidrive_scenario.world.view import WorldView
 
 JOINED = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
@@ -40,13 +40,13 @@ def right(*widths: float, link: str = "") -> str:
 
 
 @pytest.fixture
-def on_street(stage: Any, street: Any) -> Any:
+def on_street(context: Any, street: Any) -> Any:
     """A at x = 50 in lane -1, B at x = 80 in lane 1 (coming towards A)."""
-    scenario = stage.scenario
-    made = Stage(scenario, street, dt=0.1, seed=0, nobody=stage.view)
+    scenario = context.scenario
+    made = RuntimeContext(scenario, street, dt=0.1, seed=0, empty_view=context.view)
     for name, lane, s in (("A", -1, 50.0), ("B", 1, 80.0)):
         here = street.location("1", lane, s)
-        made.enter(name, Place(street.pose(here), here))
+        made.add_actor(name, ResolvedPosition(street.pose(here), here))
     return made
 
 
@@ -59,16 +59,18 @@ def on_street(stage: Any, street: Any) -> Any:
         (model.RelativeLanePosition(entity_ref="A", d_lane=0, ds=150), -5.0),
     ],
 )
-def test_relative_position_beyond_a_lane_section_without_the_lane_keeps_its_t(stage: Any, frame: Any, y: float) -> None:
+def test_relative_position_beyond_a_lane_section_without_the_lane_keeps_its_t(
+    context: Any, frame: Any, y: float
+) -> None:
     """Lanes of 4 m become one of 10 m before the road ends: A is in lane -2 at y = -6, the wide one is at -5."""
     first, second = right(4.0, 4.0), right(10.0, link='<successor id="{}"/>')
     text = JOINED.format(first=first, second=second, third=right(10.0, link='<predecessor id="{}"/>'))
     roads = RoadNetwork.parse(text)
-    made = Stage(stage.scenario, roads, dt=0.1, seed=0, nobody=stage.view)
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0, empty_view=context.view)
     here = roads.location("1", -2, 80.0)
-    made.enter("A", Place(roads.pose(here), here))
+    made.add_actor("A", ResolvedPosition(roads.pose(here), here))
     key = {model.RelativeRoadPosition: "relative_road_position", model.RelativeLanePosition: "relative_lane_position"}
-    pose = resolve(model.Position(**{key[type(frame)]: frame}), made).pose
+    pose = resolve_position(model.Position(**{key[type(frame)]: frame}), made).pose
     assert (pose.x, pose.y) == pytest.approx((230.0, y))
 
 
@@ -117,7 +119,7 @@ def test_frames(on_street: Any, frame: Any, x: Any, y: Any, h: Any) -> None:
         model.LanePosition: "lane_position",
         model.RelativeLanePosition: "relative_lane_position",
     }
-    place = resolve(model.Position(**{names[type(frame)]: frame}), on_street)
+    place = resolve_position(model.Position(**{names[type(frame)]: frame}), on_street)
     assert place.pose[:2] == pytest.approx((x, y))
     assert math.cos(place.pose.h - h) == pytest.approx(1.0)
 
@@ -147,7 +149,7 @@ def test_a_route_position_counts_from_the_first_waypoint(on_street: Any, within:
     frame = model.RoutePosition(
         route_ref=model.RouteRef(route=route), in_route_position=model.InRoutePosition(**within)
     )
-    assert resolve(model.Position(route_position=frame), on_street).pose[:2] == pytest.approx((x, y), abs=1e-6)
+    assert resolve_position(model.Position(route_position=frame), on_street).pose[:2] == pytest.approx((x, y), abs=1e-6)
 
 
 @pytest.mark.element("TrajectoryPosition")
@@ -158,7 +160,7 @@ def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: A
     )
     way = model.Trajectory(closed=False, name="way", shape=model.Shape(polyline=model.Polyline(vertex=corners)))
     frame = model.TrajectoryPosition(s=10, t=2, trajectory_ref=model.TrajectoryRef(trajectory=way))
-    pose = resolve(model.Position(trajectory_position=frame), on_street).pose
+    pose = resolve_position(model.Position(trajectory_position=frame), on_street).pose
     assert (pose.x, pose.y, pose.h) == pytest.approx((-2.0, 60.0, math.pi / 2))
 
 
@@ -173,19 +175,19 @@ def test_a_trajectory_position_lies_along_and_beside_the_trajectory(on_street: A
 )
 def test_a_place_that_is_not_there_is_an_error(on_street: Any, frame: Any, text: Any) -> None:
     with pytest.raises(ScenarioError, match=text):
-        resolve(model.Position(**frame), on_street)
+        resolve_position(model.Position(**frame), on_street)
 
 
 def test_beyond_the_end_of_a_road_its_end_is_meant(on_street: Any) -> None:
     frame = model.LanePosition(road_id="1", lane_id="-1", s=300)
-    assert resolve(model.Position(lane_position=frame), on_street).location.s == 200.0
+    assert resolve_position(model.Position(lane_position=frame), on_street).location.s == 200.0
     assert "that road is 200.00 m long" in str(on_street.warnings[-1])
 
 
 def test_nobody_is_placed_beside_who_is_not_there(on_street: Any) -> None:
-    on_street.leave("B")
-    with pytest.raises(Absent):
-        resolve(
+    on_street.remove_actor("B")
+    with pytest.raises(EntityAbsentError):
+        resolve_position(
             model.Position(relative_world_position=model.RelativeWorldPosition(entity_ref="B", dx=0, dy=0)), on_street
         )
 
@@ -222,34 +224,34 @@ def test_distances_from_a_to_b_who_comes_towards(
 
 def test_behind_and_right_are_negative(on_street: Any) -> None:
     here = on_street.roads.location("1", -2, 20.0)
-    on_street.enter("B", Place(on_street.roads.pose(here), here))
+    on_street.add_actor("B", ResolvedPosition(on_street.roads.pose(here), here))
     assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=False) == pytest.approx(-30.0)
     assert distance(on_street, "A", "B", frame="road", kind="lateral", freespace=False) == pytest.approx(-4.0)
     assert distance(on_street, "A", "B", frame="road", kind="longitudinal", freespace=True) == pytest.approx(-25.0)
 
 
 def test_boxes_side_by_side_leave_no_gap_along(on_street: Any) -> None:
-    on_street.enter("B", Place(Pose(52.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
+    on_street.add_actor("B", ResolvedPosition(Pose(52.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
     assert distance(on_street, "A", "B", frame="entity", kind="longitudinal", freespace=True) == 0.0
 
 
 def test_a_straight_distance_is_one_in_space(on_street: Any) -> None:
     """B on a bridge 8 m above the street, 6 m beside A: 10 m; boxes 2 m wide and 1.5 m high leave 4 m and 6.5 m."""
-    on_street.enter("B", Place(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0)))
+    on_street.add_actor("B", ResolvedPosition(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0)))
     straight = {"frame": "entity", "kind": "euclidianDistance"}
     assert distance(on_street, "A", "B", freespace=False, **straight) == pytest.approx(10.0)
     assert distance(on_street, "A", "B", freespace=True, **straight) == pytest.approx(math.hypot(4.0, 6.5))
-    above = Place(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0))
+    above = ResolvedPosition(Pose(50.0, 4.0, 8.0, 0.0, 0.0, 0.0))
     assert distance(on_street, "A", above, freespace=False, **straight) == pytest.approx(10.0)
     assert distance(on_street, "A", above, freespace=True, **straight) == pytest.approx(math.hypot(5.0, 6.5))
 
 
-def test_in_a_bend_the_road_is_longer_than_the_sight(stage: Any, bend: Any) -> None:
+def test_in_a_bend_the_road_is_longer_than_the_sight(context: Any, bend: Any) -> None:
     """A quarter circle of the reference line's 50 m lies between the two; both drive in lane -1, a circle of 52 m."""
-    made = Stage(stage.scenario, bend, dt=0.1, seed=0, nobody=stage.view)
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
     for name, s in (("A", 0.0), ("B", 25 * math.pi)):
         here = bend.location("1", -1, s)
-        made.enter(name, Place(bend.pose(here), here))
+        made.add_actor(name, ResolvedPosition(bend.pose(here), here))
     along = distance(made, "A", "B", frame="road", kind="longitudinal", freespace=False)
     assert along == pytest.approx(25 * math.pi, abs=1e-6)
     sight = distance(made, "A", "B", frame="entity", kind="longitudinal", freespace=False)
@@ -267,13 +269,13 @@ def test_in_a_bend_the_road_is_longer_than_the_sight(stage: Any, bend: Any) -> N
     ],
 )
 def test_in_a_bend_two_come_nearer_as_their_distance_is_measured(
-    stage: Any, bend: Any, frame: str, kind: str, expected: float
+    context: Any, bend: Any, frame: str, kind: str, expected: float
 ) -> None:
     """A drives 20 m/s at the start of the bend, B 8 m/s after 60 m of road (1.2 rad); 52 m of lane are 50 m of road."""
-    made = Stage(stage.scenario, bend, dt=0.1, seed=0, nobody=stage.view)
+    made = RuntimeContext(context.scenario, bend, dt=0.1, seed=0, empty_view=context.view)
     for name, s in (("A", 0.0), ("B", 60.0)):
         here = bend.location("1", -1, s)
-        made.enter(name, Place(bend.pose(here), here))
+        made.add_actor(name, ResolvedPosition(bend.pose(here), here))
     zero, points = np.zeros(2), np.zeros((2, 3))
     made.view = WorldView(
         time=0.0,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.stage import Absent
+from eidrive_scenario.storyboard.motion import ResolvedPosition
+from eidrive_scenario.storyboard.runtime_context import EntityAbsentError
 
 
 def with_car(view: Any, name: str) -> Any:
@@ -21,30 +21,30 @@ def with_car(view: Any, name: str) -> Any:
     return replace(view, names=(name,), categories=("car",), **vectors, **scalars)
 
 
-def test_who_is_deleted_is_there_until_the_end_of_the_step(stage: Any) -> None:
+def test_who_is_deleted_is_there_until_the_end_of_the_step(context: Any) -> None:
     """Conditions judge the view, and that still shows it, whatever was decided in its step."""
-    stage.enter("A", Place(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-    nobody = stage.view
-    stage.begin(replace(with_car(nobody, "A"), tick=0), 0.1)
-    stage.leave("A")
-    assert stage.pose("A").x == 0.0
-    assert stage.location("A") is None
-    stage.begin(replace(nobody, tick=1), 0.1)
-    with pytest.raises(Absent):
-        stage.pose("A")
+    context.add_actor("A", ResolvedPosition(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    nobody = context.view
+    context.begin_tick(replace(with_car(nobody, "A"), tick=0), 0.1)
+    context.remove_actor("A")
+    assert context.pose("A").x == 0.0
+    assert context.location("A") is None
+    context.begin_tick(replace(nobody, tick=1), 0.1)
+    with pytest.raises(EntityAbsentError):
+        context.pose("A")
 
 
-def test_who_is_deleted_and_added_is_both_removed_and_added(stage: Any) -> None:
-    stage.enter("A", Place(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-    stage.begin(replace(with_car(stage.view, "A"), tick=0), 0.1)
-    stage.leave("A")
-    stage.enter("A", Place(Pose(5.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-    assert stage.commands.removals == {"A"}
-    assert stage.commands.additions["A"].x == 5.0
+def test_who_is_deleted_and_added_is_both_removed_and_added(context: Any) -> None:
+    context.add_actor("A", ResolvedPosition(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    context.begin_tick(replace(with_car(context.view, "A"), tick=0), 0.1)
+    context.remove_actor("A")
+    context.add_actor("A", ResolvedPosition(Pose(5.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    assert context.commands.removals == {"A"}
+    assert context.commands.spawns["A"].x == 5.0
 
 
-def test_who_is_added_and_deleted_in_one_step_never_was_there(stage: Any) -> None:
-    stage.begin(replace(stage.view, tick=0), 0.1)
-    stage.enter("A", Place(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
-    stage.leave("A")
-    assert (stage.commands.removals, stage.commands.additions) == (set(), {})
+def test_who_is_added_and_deleted_in_one_step_never_was_there(context: Any) -> None:
+    context.begin_tick(replace(context.view, tick=0), 0.1)
+    context.add_actor("A", ResolvedPosition(Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    context.remove_actor("A")
+    assert (context.commands.removals, context.commands.spawns) == (set(), {})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.motion import Motion, Place, Steering
+from eidrive_scenario.storyboard.motion import LateralStep, Motion, ResolvedPosition
 
 TURN = 20.0 * math.pi
 
@@ -74,8 +74,8 @@ def fork() -> RoadNetwork:
 def on_its_way(fork: RoadNetwork, start: int, s: float, destination: str) -> Motion:
     motion = Motion(fork)
     here = fork.location("a", start, s)
-    motion.put(Place(fork.pose(here), here))
-    motion.settle()
+    motion.teleport(ResolvedPosition(fork.pose(here), here))
+    motion.initialize()
     motion.speed = 20.0
     motion.route = fork.route(here, fork.location(destination, -1, 90.0))
     return motion
@@ -118,7 +118,7 @@ def test_it_keeps_a_lane_that_leads_on(fork: RoadNetwork, start: int, destinatio
 def test_who_is_steered_by_an_action_is_left_alone(fork: RoadNetwork) -> None:
     motion = on_its_way(fork, -1, 20.0, "c")
     for _ in range(230):
-        motion.steer(Steering(0.5))
+        motion.set_lateral_step(LateralStep(0.5))
         motion.step(0.05)
     assert motion.location is not None
     assert (motion.location.road, motion.pose.y) == ("b", pytest.approx(-1.5))
@@ -130,5 +130,5 @@ def test_who_is_put_elsewhere_begins_no_change_there(fork: RoadNetwork) -> None:
     assert driven(motion, 0.5)[-1, 1] < -2.0
     for road_id, s in (("a", 20.0), ("b", 80.0)):
         here = fork.location(road_id, -1, s)
-        motion.put(Place(fork.pose(here), here))
+        motion.teleport(ResolvedPosition(fork.pose(here), here))
         assert driven(motion, 0.5)[:, 1] == pytest.approx(np.full(10, -2.0))

@@ -19,16 +19,25 @@ from eidrive_scenario.storyboard.elements import (
     StoryNode,
 )
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
-from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
-from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 TICKS = 14
 LEGAL = {
-    Transition.START: {(State.STANDBY, State.RUNNING)},
-    Transition.END: {(State.RUNNING, State.COMPLETE), (State.RUNNING, State.STANDBY)},
-    Transition.STOP: {(State.STANDBY, State.COMPLETE), (State.RUNNING, State.COMPLETE)},
-    Transition.SKIP: {(State.STANDBY, State.STANDBY), (State.STANDBY, State.COMPLETE)},
+    ElementTransition.START: {(ElementState.STANDBY, ElementState.RUNNING)},
+    ElementTransition.END: {
+        (ElementState.RUNNING, ElementState.COMPLETE),
+        (ElementState.RUNNING, ElementState.STANDBY),
+    },
+    ElementTransition.STOP: {
+        (ElementState.STANDBY, ElementState.COMPLETE),
+        (ElementState.RUNNING, ElementState.COMPLETE),
+    },
+    ElementTransition.SKIP: {
+        (ElementState.STANDBY, ElementState.STANDBY),
+        (ElementState.STANDBY, ElementState.COMPLETE),
+    },
 }
 
 
@@ -78,19 +87,19 @@ class Tree:
     """A storyboard made from a plan, and its course."""
 
     def __init__(
-        self, plan: list[Act], stop: list[list[Condition]] | None, stage: Stage, script: Any, task: Any
+        self, plan: list[Act], stop: list[list[Condition]] | None, context: RuntimeContext, script: Any, task: Any
     ) -> None:
-        self.stage, self._script, self._task = stage, script, task
+        self.stage, self._script, self._task = context, script, task
         self.scripts: list[Any] = []
         self.rivals: dict[str, list[str]] = {}
         """The other events of its maneuver, by event."""
         acts = [self._act(act, f"act{number}") for number, act in enumerate(plan)]
         self.root = StoryboardElement(
-            stage, ("storyboard",), [StoryNode(stage, ("story",), acts)], stop=self._wait(stop)
+            context, ("storyboard",), [StoryNode(context, ("story",), acts)], stop=self._wait(stop)
         )
         self.elements = {element.name: element for element in below(self.root)}
 
-    def _wait(self, groups: list[list[Condition]] | None) -> WaitFor | None:
+    def _wait(self, groups: list[list[Condition]] | None) -> WaitForTrigger | None:
         if groups is None:
             return None
         made = []
@@ -98,11 +107,11 @@ class Tree:
             scripts = [self._script(one.values) for one in group]
             self.scripts += scripts
             monitors = (
-                ConditionMonitor(script, edge=one.edge, delay=one.delay)
+                ConditionEvaluator(script, edge=one.edge, delay=one.delay)
                 for script, one in zip(scripts, group, strict=True)
             )
             made.append(ConditionGroup(tuple(monitors)))
-        return WaitFor("trigger", Trigger(made), self.stage)
+        return WaitForTrigger("trigger", Trigger(made), self.stage)
 
     def _act(self, act: Act, name: str) -> ActElement:
         groups = []
@@ -114,7 +123,7 @@ class Tree:
 
     def _maneuver(self, plans: list[Event], name: str) -> ManeuverElement:
         events = [self._event(plan, f"{name}.{number}") for number, plan in enumerate(plans)]
-        EventElement.compete(events)
+        EventElement.resolve_priorities(events)
         self.rivals |= {event.name: [other.name for other in events if other is not event] for event in events}
         return ManeuverElement(self.stage, (name,), events)
 
@@ -129,7 +138,7 @@ class Tree:
         )
 
     def tick(self) -> list[StateChange]:
-        self.root.play()
+        self.root.tick_tree()
         return list(self.stage.progress.changes)
 
 
@@ -140,8 +149,8 @@ def below(element: StoryElement) -> Iterator[StoryElement]:
 
 
 def play(plan: list[Act], stop: Any, fresh: Any) -> Iterator[tuple[Tree, list[StateChange]]]:
-    stage, clock, script, task = fresh()
-    tree = Tree(plan, stop, stage, script, task)
+    context, clock, script, task = fresh()
+    tree = Tree(plan, stop, context, script, task)
     for _ in range(TICKS):
         clock.step()
         yield tree, tree.tick()
@@ -167,21 +176,21 @@ def test_every_change_is_a_legal_transition(plan: Any, stop: Any, fresh: Any) ->
 def test_nothing_runs_or_waits_under_what_does_not_run(plan: Any, stop: Any, fresh: Any) -> None:
     for tree, _ in play(plan, stop, fresh):
         for element in tree.elements.values():
-            if element.state is not State.RUNNING:
-                assert all(child.state is not State.RUNNING for child in element.elements)
-            if element.state is State.COMPLETE:
-                assert all(child.state is not State.STANDBY for child in element.elements)
+            if element.state is not ElementState.RUNNING:
+                assert all(child.state is not ElementState.RUNNING for child in element.elements)
+            if element.state is ElementState.COMPLETE:
+                assert all(child.state is not ElementState.STANDBY for child in element.elements)
 
 
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
 def test_an_element_ends_when_all_below_has_come_to_its_end(plan: Any, stop: Any, fresh: Any) -> None:
-    states: dict[str, State] = {}
+    states: dict[str, ElementState] = {}
     for tree, changes in play(plan, stop, fresh):
         for change in changes:
-            if change.transition is Transition.END:
+            if change.transition is ElementTransition.END:
                 children = tree.elements[change.element].elements
-                assert all(states.get(child.name) is State.COMPLETE for child in children)
+                assert all(states.get(child.name) is ElementState.COMPLETE for child in children)
             states[change.element] = change.after
 
 
@@ -195,15 +204,15 @@ def test_nothing_is_executed_more_often_than_it_may(plan: Any, stop: Any, fresh:
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
 def test_priorities_bind_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: Any) -> None:
-    states: dict[str, State] = {}
+    states: dict[str, ElementState] = {}
     for tree, changes in play(plan, stop, fresh):
         for change in changes:
             event = tree.elements[change.element]
             if isinstance(event, EventElement):
-                rivals = [states.get(rival) is State.RUNNING for rival in tree.rivals[event.name]]
-                if change.transition is Transition.START and event.priority != "parallel":
+                rivals = [states.get(rival) is ElementState.RUNNING for rival in tree.rivals[event.name]]
+                if change.transition is ElementTransition.START and event.priority != "parallel":
                     assert not any(rivals)
-                if change.transition is Transition.SKIP:
+                if change.transition is ElementTransition.SKIP:
                     assert event.priority == "skip"
                     assert any(rivals)
             states[change.element] = change.after
@@ -215,7 +224,7 @@ def test_no_two_actions_control_one_domain_of_an_actor(plan: Any, stop: Any, fre
     for tree, _ in play(plan, stop, fresh):
         held: list[tuple[str | None, Domain]] = []
         for element in tree.elements.values():
-            if isinstance(element, ActionElement) and element.state is State.RUNNING:
+            if isinstance(element, ActionElement) and element.state is ElementState.RUNNING:
                 held += [(one.actor_name, domain) for one in element.running for domain in one.controls]
         assert len(held) == len(set(held))
 
@@ -226,7 +235,7 @@ def test_a_running_action_has_something_to_do(plan: Any, stop: Any, fresh: Any) 
     for tree, _ in play(plan, stop, fresh):
         for element in tree.elements.values():
             if isinstance(element, ActionElement):
-                assert (element.state is State.RUNNING) == bool(element.running)
+                assert (element.state is ElementState.RUNNING) == bool(element.running)
 
 
 @RANDOM
@@ -242,7 +251,7 @@ def test_a_stopped_storyboard_stays_as_it_is(plan: Any, stop: Any, fresh: Any) -
     over = False
     for tree, changes in play(plan, stop, fresh):
         assert not (over and changes)
-        over = over or tree.root.state is State.COMPLETE
+        over = over or tree.root.state is ElementState.COMPLETE
 
 
 @RANDOM

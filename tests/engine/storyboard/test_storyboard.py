@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.storyboard.states import Transition
+from eidrive_scenario.storyboard.states import ElementTransition
 
 TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
 AT = '<WorldPosition x="{x}" y="0"/>'
@@ -51,12 +51,12 @@ def view_of(placements: Any, tick: Any, like: Any) -> Any:
 
 def play(storyboard: Any, ticks: Any) -> Any:
     """The commands of each tick, in a world that obeys."""
-    placements = dict(storyboard.initial().additions)
+    placements = dict(storyboard.initial().spawns)
     answers = []
     for tick in range(ticks):
-        commands = storyboard.tick(view_of(placements, tick, storyboard.stage.view))
+        commands = storyboard.tick(view_of(placements, tick, storyboard.context.view))
         answers.append(commands)
-        placements.update(commands.additions)
+        placements.update(commands.spawns)
         placements.update(commands.placements)
         for name in commands.removals:
             placements.pop(name)
@@ -65,15 +65,15 @@ def play(storyboard: Any, ticks: Any) -> Any:
 
 def test_init_holds_before_the_first_view_and_only_who_has_a_place_is_there(build: Any) -> None:
     commands = build(STARTS).initial()
-    assert list(commands.additions) == ["A"]
-    assert (commands.additions["A"].x, commands.additions["A"].speed) == (5.0, 10.0)
+    assert list(commands.spawns) == ["A"]
+    assert (commands.spawns["A"].x, commands.spawns["A"].speed) == (5.0, 10.0)
     assert commands.driven == frozenset()
 
 
 def test_the_order_of_init_does_not_matter_where_one_is_placed_beside_another(build: Any) -> None:
     beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     storyboard = build(beside + '</Private><Private entityRef="B">' + TELEPORT.format(position=AT.format(x=30)))
-    assert storyboard.initial().additions["A"].x == 32.0
+    assert storyboard.initial().spawns["A"].x == 32.0
 
 
 def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
@@ -105,7 +105,7 @@ def test_the_stop_trigger_ends_the_run(build: Any) -> None:
     storyboard = build(STARTS, stop=AFTER.format(kind="Stop", edge="none", value=0.25))
     play(storyboard, 3)
     assert storyboard.ended is None
-    storyboard.tick(replace(storyboard.stage.view, time=0.3, tick=3))
+    storyboard.tick(replace(storyboard.context.view, time=0.3, tick=3))
     assert storyboard.ended == "stop trigger"
     assert storyboard.changes[-1].why == "simulation time 0.30 s > 0.25 s"
 
@@ -131,8 +131,8 @@ def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
     events = EVENT.format(name="come", action=come, trigger=AFTER.format(kind="Start", edge="none", value=0.05))
     events += EVENT.format(name="go", action=go, trigger=AFTER.format(kind="Start", edge="none", value=0.25))
     first, second, third, fourth = play(build(STARTS, events), 4)
-    assert "B" not in first.additions
-    assert second.additions["B"].x == 50.0
+    assert "B" not in first.spawns
+    assert second.spawns["B"].x == 50.0
     assert "B" in third.placements
     assert fourth.removals == {"B"}
     assert "B" not in fourth.placements
@@ -200,9 +200,11 @@ def test_a_transition_is_seen_once(build: Any) -> None:
 
 def starts(storyboard: Any, event: str) -> list[float]:
     """When an event starts within 10 ticks [s]."""
-    placements, moments = dict(storyboard.initial().additions), []
+    placements, moments = dict(storyboard.initial().spawns), []
     for tick in range(10):
-        commands = storyboard.tick(view_of(placements, tick, storyboard.stage.view))
+        commands = storyboard.tick(view_of(placements, tick, storyboard.context.view))
         placements.update(commands.placements)
-        moments += [c.time for c in storyboard.changes if c.element == event and c.transition is Transition.START]
+        moments += [
+            c.time for c in storyboard.changes if c.element == event and c.transition is ElementTransition.START
+        ]
     return moments

@@ -10,7 +10,7 @@ import pytest
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.trajectory import lay_out
+from eidrive_scenario.storyboard.trajectory import sample_trajectory
 
 
 def at(x: Any, y: Any, h: Any = None) -> Any:
@@ -28,7 +28,7 @@ def trajectory(closed: Any = False, **shape: Any) -> Any:
 
 def polyline(*points: Any, closed: Any = False) -> Any:
     vertices = tuple(model.Vertex(time=time, position=at(x, y, h)) for x, y, time, h in points)
-    return lay_out(trajectory(closed, polyline=model.Polyline(vertex=vertices)), resolve)
+    return sample_trajectory(trajectory(closed, polyline=model.Polyline(vertex=vertices)), resolve)
 
 
 @pytest.mark.element("Polyline")
@@ -57,12 +57,12 @@ def test_a_closed_polyline_comes_back_to_its_start() -> None:
 )
 def test_a_point_is_seen_beside_its_nearest_place(point: tuple[float, float], place: tuple[float, float]) -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None))
-    assert way.beside(*point) == pytest.approx(place)
+    assert way.project(*point) == pytest.approx(place)
 
 
 def test_beside_a_closed_polyline_there_is_no_beyond() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
-    assert way.beside(-1, 0)[0] in (0.0, pytest.approx(12.0))
+    assert way.project(-1, 0)[0] in (0.0, pytest.approx(12.0))
 
 
 @pytest.mark.element("Timing")
@@ -84,7 +84,7 @@ def test_times_are_kept_at_the_corners_with_speeds_that_change_linearly() -> Non
 @pytest.mark.element("Clothoid")
 def test_a_clothoid_without_change_of_curvature_is_an_arc() -> None:
     shape = model.Clothoid(curvature=0.1, length=5 * math.pi, curvature_prime=0.0, position=at(0, 0))
-    way = lay_out(trajectory(clothoid=shape), resolve)
+    way = sample_trajectory(trajectory(clothoid=shape), resolve)
     assert way.at(way.length)[:4] == pytest.approx((10.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
 
 
@@ -93,7 +93,7 @@ def test_a_clothoid_turns_by_its_mean_curvature() -> None:
     shape = model.Clothoid(
         curvature=0.0, length=20.0, curvature_prime=0.01, start_time=1.0, stop_time=3.0, position=at(0, 0)
     )
-    way = lay_out(trajectory(clothoid=shape), resolve)
+    way = sample_trajectory(trajectory(clothoid=shape), resolve)
     assert way.at(20.0).h == pytest.approx(0.5 * 0.01 * 400.0)
     assert way.at_time(2.0) == pytest.approx(10.0)
 
@@ -104,7 +104,7 @@ def test_a_clothoid_spline_goes_on_where_the_piece_before_ended() -> None:
         model.ClothoidSplineSegment(curvature_start=0.0, curvature_end=0.0, length=10.0, position_start=at(0, 0)),
         model.ClothoidSplineSegment(curvature_start=0.1, curvature_end=0.1, length=5 * math.pi),
     )
-    way = lay_out(trajectory(clothoid_spline=model.ClothoidSpline(clothoid_spline_segment=pieces)), resolve)
+    way = sample_trajectory(trajectory(clothoid_spline=model.ClothoidSpline(clothoid_spline_segment=pieces)), resolve)
     assert way.length == pytest.approx(10.0 + 5 * math.pi)
     assert way.at(way.length)[:4] == pytest.approx((20.0, 10.0, 0.0, math.pi / 2), abs=1e-3)
 
@@ -118,10 +118,10 @@ def test_a_clothoid_spline_takes_the_times_that_its_pieces_say() -> None:
         for length, time in lengths
     )
     shape = model.ClothoidSpline(clothoid_spline_segment=pieces, time_end=11.0)
-    way = lay_out(trajectory(clothoid_spline=shape), resolve)
+    way = sample_trajectory(trajectory(clothoid_spline=shape), resolve)
     assert (way.start_time, way.end_time) == (0.0, 11.0)
     assert [way.at_time(time) for time in (2.5, 5.0, 7.0, 11.0)] == pytest.approx([5.0, 10.0, 20.0, 40.0])
-    without = lay_out(trajectory(clothoid_spline=replace(shape, time_end=None)), resolve)
+    without = sample_trajectory(trajectory(clothoid_spline=replace(shape, time_end=None)), resolve)
     assert without.times is None
 
 
@@ -134,7 +134,7 @@ def test_a_rational_spline_makes_an_exact_circle() -> None:
         control_point=tuple(model.ControlPoint(weight=w, position=at(x, y)) for x, y, w in points),
         knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
     )
-    way = lay_out(trajectory(nurbs=shape), resolve)
+    way = sample_trajectory(trajectory(nurbs=shape), resolve)
     assert way.length == pytest.approx(5 * math.pi, rel=1e-4)
     for share in (0.1, 0.37, 0.8):
         pose = way.at(share * way.length)
@@ -151,7 +151,7 @@ def test_control_points_with_headings_say_where_a_spline_looks() -> None:
         control_point=tuple(model.ControlPoint(position=at(x, y, h)) for x, y, h in points),
         knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
     )
-    way = lay_out(trajectory(nurbs=shape), resolve)
+    way = sample_trajectory(trajectory(nurbs=shape), resolve)
     assert way.given
     assert way.at(10.0)[:4] == pytest.approx((10.0, 0.0, 0.0, 3.1), abs=1e-6)
     assert way.at(0.0).h == pytest.approx(3.0)
@@ -166,6 +166,6 @@ def test_the_time_of_a_control_point_holds_where_its_basis_function_peaks() -> N
         control_point=tuple(model.ControlPoint(position=at(x, y), time=t) for x, y, t in points),
         knot=tuple(model.Knot(value=value) for value in (0, 0, 0, 1, 1, 1)),
     )
-    way = lay_out(trajectory(nurbs=shape), resolve)
+    way = sample_trajectory(trajectory(nurbs=shape), resolve)
     assert way.at_time(2.0) == pytest.approx(10.0, abs=1.0)
     assert (way.at_time(0.0), way.at_time(6.0)) == pytest.approx((0.0, 20.0))

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger, WaitFor
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 YES, NO = True, False
 
@@ -26,34 +26,34 @@ def answers(clock: Any, monitor: Any, count: Any) -> Any:
     ],
 )
 def test_the_first_evaluation_yields_no_edge(clock: Any, script: Any, edge: Any, expected: Any) -> None:
-    monitor = ConditionMonitor(script([YES, YES, NO, YES, NO]), edge=edge)
+    monitor = ConditionEvaluator(script([YES, YES, NO, YES, NO]), edge=edge)
     assert answers(clock, monitor, 5) == expected
 
 
 @pytest.mark.element("delay")
 def test_a_delay_shows_the_edge_of_that_time_ago(clock: Any, script: Any) -> None:
-    monitor = ConditionMonitor(script([NO, YES, YES, NO, NO, NO, NO]), edge="rising", delay=0.3)
+    monitor = ConditionEvaluator(script([NO, YES, YES, NO, NO, NO, NO]), edge="rising", delay=0.3)
     assert answers(clock, monitor, 7) == [NO, NO, NO, NO, YES, NO, NO]
 
 
 @pytest.mark.element("delay")
 def test_a_delayed_value_without_edge_lasts_as_long_as_it_lasted(clock: Any, script: Any) -> None:
-    monitor = ConditionMonitor(script([NO, YES, YES, NO, NO, NO, NO]), delay=0.3)
+    monitor = ConditionEvaluator(script([NO, YES, YES, NO, NO, NO, NO]), delay=0.3)
     assert answers(clock, monitor, 7) == [NO, NO, NO, NO, YES, YES, NO]
 
 
 def test_before_the_delay_has_passed_nothing_is_true(clock: Any, script: Any) -> None:
-    monitor = ConditionMonitor(script([YES]), delay=0.2)
+    monitor = ConditionEvaluator(script([YES]), delay=0.2)
     assert answers(clock, monitor, 4) == [NO, NO, YES, YES]
 
 
 def test_a_delay_that_is_no_multiple_of_the_step_ends_with_the_next_one(clock: Any, script: Any) -> None:
-    monitor = ConditionMonitor(script([NO, YES, NO]), edge="rising", delay=0.25)
+    monitor = ConditionEvaluator(script([NO, YES, NO]), edge="rising", delay=0.25)
     assert answers(clock, monitor, 6) == [NO, NO, NO, NO, YES, NO]
 
 
 def test_reset_forgets_the_value_before(clock: Any, script: Any) -> None:
-    monitor = ConditionMonitor(script([NO, YES, YES]), edge="rising")
+    monitor = ConditionEvaluator(script([NO, YES, YES]), edge="rising")
     answers(clock, monitor, 1)
     monitor.reset()
     assert answers(clock, monitor, 2) == [NO, NO]
@@ -61,7 +61,7 @@ def test_reset_forgets_the_value_before(clock: Any, script: Any) -> None:
 
 def test_a_group_is_true_where_all_are_and_asks_each_of_them_every_time(clock: Any, script: Any) -> None:
     first, second = script([NO, YES, YES]), script([NO, YES, YES])
-    group = ConditionGroup((ConditionMonitor(first), ConditionMonitor(second, edge="rising")))
+    group = ConditionGroup((ConditionEvaluator(first), ConditionEvaluator(second, edge="rising")))
     assert [group.evaluate(clock.step()) for _ in range(3)] == [NO, YES, NO]
     assert second.asked == 3
 
@@ -69,8 +69,8 @@ def test_a_group_is_true_where_all_are_and_asks_each_of_them_every_time(clock: A
 def test_two_edges_at_different_times_never_meet(clock: Any, script: Any) -> None:
     group = ConditionGroup(
         (
-            ConditionMonitor(script([NO, YES, YES]), edge="rising"),
-            ConditionMonitor(script([NO, NO, YES]), edge="rising"),
+            ConditionEvaluator(script([NO, YES, YES]), edge="rising"),
+            ConditionEvaluator(script([NO, NO, YES]), edge="rising"),
         )
     )
     assert [group.evaluate(clock.step()) for _ in range(3)] == [NO, NO, NO]
@@ -80,8 +80,8 @@ def test_two_edges_at_different_times_never_meet(clock: Any, script: Any) -> Non
 def test_one_true_group_fires_and_says_why(clock: Any, script: Any) -> None:
     trigger = Trigger(
         [
-            ConditionGroup((ConditionMonitor(script([NO])),)),
-            ConditionGroup((ConditionMonitor(script([NO, YES])), ConditionMonitor(script([NO, YES])))),
+            ConditionGroup((ConditionEvaluator(script([NO])),)),
+            ConditionGroup((ConditionEvaluator(script([NO, YES])), ConditionEvaluator(script([NO, YES])))),
         ]
     )
     assert [trigger.evaluate(clock.step()) for _ in range(2)] == [NO, YES]
@@ -89,7 +89,7 @@ def test_one_true_group_fires_and_says_why(clock: Any, script: Any) -> None:
 
 
 def test_why_speaks_of_the_time_before_the_delay(clock: Any, script: Any) -> None:
-    trigger = Trigger([ConditionGroup((ConditionMonitor(script([NO, YES]), edge="rising", delay=0.2),))])
+    trigger = Trigger([ConditionGroup((ConditionEvaluator(script([NO, YES]), edge="rising", delay=0.2),))])
     assert [trigger.evaluate(clock.step()) for _ in range(4)] == [NO, NO, NO, YES]
     assert trigger.why == "value 2 at 0.1 s, 0.2 s ago"
 
@@ -97,14 +97,14 @@ def test_why_speaks_of_the_time_before_the_delay(clock: Any, script: Any) -> Non
 def test_why_of_lasting_condition_has_the_value_of_the_delay_ago(clock: Any, script: Any) -> None:
     """It is true from the start; with another that is true from 0.2 s on, the trigger fires 0.3 s later."""
     lasting, late = script([YES] * 6), script([NO, NO, YES, YES, YES, YES])
-    trigger = Trigger([ConditionGroup((ConditionMonitor(lasting, delay=0.3), ConditionMonitor(late, delay=0.3)))])
+    trigger = Trigger([ConditionGroup((ConditionEvaluator(lasting, delay=0.3), ConditionEvaluator(late, delay=0.3)))])
     assert [trigger.evaluate(clock.step()) for _ in range(6)] == [NO, NO, NO, NO, NO, YES]
     assert trigger.why == "value 3 at 0.2 s, 0.3 s ago and value 3 at 0.2 s, 0.3 s ago"
 
 
 @pytest.mark.parametrize("edge", ["falling", "risingOrFalling"])
 def test_why_of_falling_edge_says_so(clock: Any, script: Any, edge: str) -> None:
-    trigger = Trigger([ConditionGroup((ConditionMonitor(script([YES, NO]), edge=edge),))])
+    trigger = Trigger([ConditionGroup((ConditionEvaluator(script([YES, NO]), edge=edge),))])
     assert [trigger.evaluate(clock.step()) for _ in range(2)] == [NO, YES]
     assert trigger.why == "value 2 at 0.1 s (falling edge)"
 
@@ -114,8 +114,8 @@ def test_a_trigger_without_groups_never_fires(clock: Any) -> None:
     assert not Trigger([]).evaluate(clock.step())
 
 
-def test_the_leaf_runs_until_the_trigger_fires(clock: Any, script: Any, stage: Any) -> None:
-    leaf = WaitFor("start", Trigger([ConditionGroup((ConditionMonitor(script([NO, YES])),))]), stage)
+def test_the_leaf_runs_until_the_trigger_fires(clock: Any, script: Any, context: Any) -> None:
+    leaf = WaitForTrigger("start", Trigger([ConditionGroup((ConditionEvaluator(script([NO, YES])),))]), context)
     clock.step()
     leaf.tick_once()
     assert leaf.status.name == "RUNNING"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.openscenario.model import DynamicsShape
-from eidrive_scenario.storyboard.transition import Transition
+from eidrive_scenario.storyboard.transition_profile import TransitionProfile
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from eidrive_scenario.storyboard.transition import Transition
     ],
 )
 def test_values_along_the_way(shape: Any, quarter: Any, half: Any) -> None:
-    transition = Transition(shape, 10.0, 20.0, 4.0)
+    transition = TransitionProfile(shape, 10.0, 20.0, 4.0)
     assert transition.advance(1.0) == pytest.approx(quarter)
     assert transition.advance(1.0) == pytest.approx(half)
     assert transition.advance(2.0) == 20.0
@@ -33,7 +33,7 @@ def test_values_along_the_way(shape: Any, quarter: Any, half: Any) -> None:
     [(DynamicsShape.LINEAR, 5.0), (DynamicsShape.CUBIC, 7.5), (DynamicsShape.SINUSOIDAL, 2.5 * math.pi)],
 )
 def test_a_rate_is_the_steepest_slope(shape: Any, extent: Any) -> None:
-    transition = Transition.by_rate(shape, 10.0, 20.0, -2.0)
+    transition = TransitionProfile.from_rate(shape, 10.0, 20.0, -2.0)
     assert transition.extent == pytest.approx(extent)
     transition.advance(extent / 2 - 1e-4)
     before = transition.value
@@ -42,14 +42,14 @@ def test_a_rate_is_the_steepest_slope(shape: Any, extent: Any) -> None:
 
 def test_a_bend_is_the_largest_second_derivative() -> None:
     """Cubic: 6 Δ / T² = 0.6 at the ends, so T = 10."""
-    assert Transition.by_bend(DynamicsShape.CUBIC, 0.0, 10.0, 0.6).extent == pytest.approx(10.0)
+    assert TransitionProfile.from_second_derivative(DynamicsShape.CUBIC, 0.0, 10.0, 0.6).extent == pytest.approx(10.0)
 
 
 def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
-    linear = Transition(DynamicsShape.LINEAR, 0.0, 20.0, 1.0)
+    linear = TransitionProfile(DynamicsShape.LINEAR, 0.0, 20.0, 1.0)
     linear.limit_rate(10.0)
     assert linear.extent == pytest.approx(2.0)
-    step = Transition(DynamicsShape.STEP, 0.0, 20.0, 1.0)
+    step = TransitionProfile(DynamicsShape.STEP, 0.0, 20.0, 1.0)
     step.limit_rate(10.0)
     assert step.extent == 0.0
 
@@ -57,7 +57,7 @@ def test_a_limit_stretches_what_is_too_steep_and_leaves_steps_alone() -> None:
 @pytest.mark.parametrize("shape", [DynamicsShape.LINEAR, DynamicsShape.CUBIC, DynamicsShape.SINUSOIDAL])
 def test_the_slope_is_the_derivative_of_the_value(shape: Any) -> None:
     for place in (0.4, 1.0, 2.0, 3.7):
-        before, here, after = (Transition(shape, 10.0, 20.0, 4.0) for _ in range(3))
+        before, here, after = (TransitionProfile(shape, 10.0, 20.0, 4.0) for _ in range(3))
         numeric = (after.advance(place + 1e-5) - before.advance(place - 1e-5)) / 2e-5
         here.advance(place)
         assert here.slope == pytest.approx(numeric, abs=1e-6)

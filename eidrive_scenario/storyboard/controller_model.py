@@ -10,24 +10,24 @@ from typing import ClassVar, SupportsFloat
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry, construct
-from eidrive_scenario.storyboard.actor import Actor, is_ours
-from eidrive_scenario.storyboard.stage import Stage
+from eidrive_scenario.storyboard.actor import Actor, is_agent_controller
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
 
 
-class StandIn(ABC):
+class ControllerModel(ABC):
     """Plays the longitudinal part of a Controller that names no module of ours, where the caller asks for it.
 
     It decides while the controller is active in the longitudinal domain; speed actions of that time set the speed that
     it aims at.
     """
 
-    takes_poses: ClassVar[bool] = False
+    accepts_external_poses: ClassVar[bool] = False
     """True for one that moves the actor to poses from outside (`Simulation.set_pose`)."""
 
-    def __init__(self, controller: model.Controller, stage: Stage, actor: Actor) -> None:
+    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
         properties = controller.properties.property if controller.properties is not None else ()
         self.properties: Mapping[str, str] = {entry.name: entry.value for entry in properties}
-        self.stage = stage
+        self.context = context
         self.actor = actor
         self._active = False
 
@@ -38,39 +38,41 @@ class StandIn(ABC):
             return
         if not self._active:
             self._active = True
-            self.begin()
-        speed = self.speed()
+            self.on_activate()
+        speed = self.compute_speed()
         if not isinstance(speed, SupportsFloat) or not math.isfinite(speed):
             raise InvalidResult(self, "speed", f"returned {speed!r} (expected a finite number)")
         self.actor.motion.speed = speed
 
     @abstractmethod
-    def begin(self) -> None:
+    def on_activate(self) -> None:
         """The controller has just been activated."""
 
     @abstractmethod
-    def speed(self) -> float:
+    def compute_speed(self) -> float:
         """The speed of the step that begins now [m/s]."""
 
 
-def stand_ins(actors: Mapping[str, Actor], stage: Stage, wanted: Mapping[str, str], known: Registry) -> list[StandIn]:
+def build_controller_models(
+    actors: Mapping[str, Actor], context: RuntimeContext, wanted: Mapping[str, str], known: Registry
+) -> list[ControllerModel]:
     """One per actor whose controller's name is `wanted`; the values name stand-ins.
 
     Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
     """
     found = []
-    kinds = {name: known.load(stand_in, StandIn) for name, stand_in in wanted.items()}
+    kinds = {name: known.load(stand_in, ControllerModel) for name, stand_in in wanted.items()}
     for actor in actors.values():
         for controller in actor.controllers:
             if controller.name in kinds:
-                made = construct(kinds[controller.name], controller, stage, actor)
-                if not isinstance(made, StandIn):
+                made = construct(kinds[controller.name], controller, context, actor)
+                if not isinstance(made, ControllerModel):
                     raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
                 found.append(made)
     return found
 
 
-def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Diagnostic]:
+def unassigned_controller_warnings(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[Diagnostic]:
     """Warnings of controllers that name no module of ours and for which nothing stands in."""
     names = {controller.name for actor in actors.values() for controller in actor.controllers}
     astray = sorted(name for name in wanted if name not in names)
@@ -86,9 +88,14 @@ def left_alone(actors: Mapping[str, Actor], wanted: Mapping[str, str]) -> list[D
         )
         for actor in actors.values()
         for controller in actor.controllers
-        if not is_ours(controller) and controller.name not in wanted
+        if not is_agent_controller(controller) and controller.name not in wanted
     ]
-    ours = {controller.name for actor in actors.values() for controller in actor.controllers if is_ours(controller)}
+    ours = {
+        controller.name
+        for actor in actors.values()
+        for controller in actor.controllers
+        if is_agent_controller(controller)
+    }
     odd = [
         Diagnostic(f"nothing stands in for {name!r}, which is a controller of ours") for name in wanted if name in ours
     ]

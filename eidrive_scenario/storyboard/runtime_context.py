@@ -10,11 +10,11 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.actor import Actor
-from eidrive_scenario.storyboard.background import StageTraffic
+from eidrive_scenario.storyboard.background import BackgroundTrafficPort
 from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.motion import Place
-from eidrive_scenario.storyboard.progress import Progress
+from eidrive_scenario.storyboard.element_states import ElementStates
+from eidrive_scenario.storyboard.motion import ResolvedPosition
 from eidrive_scenario.storyboard.signals import Signals
 from eidrive_scenario.traffic.instances import Centre
 from eidrive_scenario.world.appearance import Appearance
@@ -24,35 +24,35 @@ from eidrive_scenario.world.view import WorldView
 E = TypeVar("E", bound=model.Element)
 
 
-class GivenPose(NamedTuple):
+class ExternalPose(NamedTuple):
     """A pose from outside, and the speed along its heading [m/s]."""
 
     pose: Pose
     speed: float
 
 
-class Absent(LookupError):
+class EntityAbsentError(LookupError):
     """An entity is asked for its place, and is not in the world."""
 
 
-class Occupant(Protocol):
+class PreemptableAction(Protocol):
     """Whoever holds a domain of an actor: it can be told that a younger action took it."""
 
-    def bound_to(self, behaviour: Holder) -> Sequence[Holder]:
+    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
         """The behaviours that lose their domains with this one, itself among them."""
 
-    def displace(self, behaviour: Holder, why: str) -> None:
+    def preempt(self, behaviour: DomainHolder, why: str) -> None:
         """Let go of the domain."""
 
 
-class Waiting(Protocol):
+class PendingAction(Protocol):
     """Whoever waits for an entity until all is done at an instant."""
 
-    def give_up(self) -> None:
+    def abort(self) -> None:
         """Nobody came."""
 
 
-class Holder(Protocol):
+class DomainHolder(Protocol):
     """A behaviour that holds domains."""
 
     @property
@@ -64,7 +64,7 @@ class Holder(Protocol):
         """What of a domain it holds; empty for all of it."""
 
 
-class Stage:
+class RuntimeContext:
     """What actions and conditions see of the run at one instant.
 
     view        the truth at this tick; before the first view (Init) it holds nobody
@@ -80,7 +80,7 @@ class Stage:
     """
 
     def __init__(
-        self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int, nobody: WorldView
+        self, scenario: Scenario, roads: RoadNetwork | None, *, dt: float, seed: int, empty_view: WorldView
     ) -> None:
         self.scenario = scenario
         self.roads = roads
@@ -88,8 +88,8 @@ class Stage:
         """The step of the run [s]."""
         self.dt = 0.0
         self.seed = seed
-        self.view = nobody
-        self.progress = Progress()
+        self.view = empty_view
+        self.progress = ElementStates()
         self.parameters: dict[str, str] = dict(scenario.parameters)
         self.variables: dict[str, str] = dict(scenario.variables)
         self.warnings: list[Diagnostic] = []
@@ -105,40 +105,40 @@ class Stage:
         self.environment = Environment()
         self.user_values: Callable[[str], str | None] = lambda _: None
         """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
-        self.given_poses: dict[str, GivenPose] = {}
+        self.external_poses: dict[str, ExternalPose] = {}
         """Where somebody outside puts entities at the end of the step, by name."""
-        self.wanted_values: dict[str, model.Element] = {}
+        self.requested_user_values: dict[str, model.Element] = {}
         """The names of such values, and the first condition that asks for each."""
         self.commands = Commands()
         self.actors: dict[str, Actor] = {
             name: Actor(name, entity, scenario.controllers.get(name, ()), roads)
             for name, entity in scenario.entities.items()
         }
-        self.traffic = StageTraffic(
+        self.traffic = BackgroundTrafficPort(
             roads,
             seed=seed,
             centre=self._centre,
             taken=frozenset(self.actors),
             must_stop=self.signals.must_stop,
         )
-        self.arriving = False
+        self.completes_this_step = False
         """Whether the step that goes on brings an action to its goal."""
-        self.waiting: list[Waiting] = []
+        self.pending_actions: list[PendingAction] = []
         """Whose actions have started at this instant for somebody who is not in the world so far."""
-        self.fixed_places: dict[int, tuple[model.Position, Place]] = {}
+        self.static_positions: dict[int, tuple[model.Position, ResolvedPosition]] = {}
         """What positions mean that do not move, by `id` of the position."""
         self.position_depth = 0
         """Number of positions along curves that are being resolved within each other."""
         self.positions_within = 0
         """Number of those that the outermost of them has led through."""
-        self._holders: list[tuple[str, Domain, Occupant, Holder]] = []
+        self._holders: list[tuple[str, Domain, PreemptableAction, DomainHolder]] = []
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.view.time
 
-    def begin(self, view: WorldView, dt: float) -> None:
+    def begin_tick(self, view: WorldView, dt: float) -> None:
         """A new tick: the view changes, the commands start empty, histories go on."""
         self.view = view
         self.dt = dt
@@ -150,7 +150,7 @@ class Stage:
             if row is not None:
                 actor.observe(view, row)
                 if actor.off_road_wanted:
-                    actor.look_below(self.roads, view)
+                    actor.update_off_road(self.roads, view)
 
     def pose(self, name: str) -> Pose:
         """Where an actor is now. Raises Absent if it is not in the world."""
@@ -165,7 +165,7 @@ class Stage:
         """An actor in the world; whom an action deletes is there until the end of the step."""
         actor = self.actors[name]
         if not actor.present and name not in self.view:
-            raise Absent(name)
+            raise EntityAbsentError(name)
         return actor
 
     def speed(self, name: str) -> float:
@@ -185,25 +185,25 @@ class Stage:
         state = self.view.states[row]
         return Centre(state.x, state.y, state.yaw, state.speed)
 
-    def enter(self, name: str, place: Place) -> None:
+    def add_actor(self, name: str, place: ResolvedPosition) -> None:
         """Put an actor at a place; it enters the world if it was not there."""
         actor = self.actors[name]
-        actor.motion.put(place)
-        actor.forget_location()
+        actor.motion.teleport(place)
+        actor.invalidate_location()
         if not actor.present:
-            actor.appear()
-            self.commands.additions[name] = actor.motion.placement()
+            actor.enter_world()
+            self.commands.spawns[name] = actor.motion.placement()
 
-    def leave(self, name: str) -> None:
+    def remove_actor(self, name: str) -> None:
         """Take an actor out of the world; what it was doing ends."""
         actor = self.actors[name]
         if actor.present:
             actor.present = False
-            if self.commands.additions.pop(name, None) is None:
+            if self.commands.spawns.pop(name, None) is None:
                 self.commands.removals.add(name)
         for held, _, occupant, holder in list(self._holders):
             if held == name:
-                occupant.displace(holder, f"{name} left the world")
+                occupant.preempt(holder, f"{name} left the world")
                 self.release(holder)
 
     def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E], within: model.Element) -> E:
@@ -232,11 +232,13 @@ class Stage:
         """How an actor looks."""
         return self.appearances.get(name) or Appearance()
 
-    def look(self, name: str, appearance: Appearance) -> None:
+    def set_appearance(self, name: str, appearance: Appearance) -> None:
         """Change how an actor looks."""
         self.appearances = {**self.appearances, name: appearance}
 
-    def occupy(self, actor: str | None, domains: Domain, occupant: Occupant, holder: Holder) -> None:
+    def acquire_domain(
+        self, actor: str | None, domains: Domain, occupant: PreemptableAction, holder: DomainHolder
+    ) -> None:
         """A behaviour begins to control domains of an actor; older ones on these domains end.
 
         An older one of a selection of entities ends for all of them (ASAM OpenSCENARIO XML 1.3.1, 7.5.1).
@@ -245,11 +247,11 @@ class Stage:
             return
         for held, other_domains, other, behaviour in list(self._holders):
             if held == actor and other_domains & domains and behaviour.resource == holder.resource:
-                for loser in other.bound_to(behaviour):
+                for loser in other.linked_behaviours(behaviour):
                     self.release(loser)
-                    other.displace(loser, f"{holder.name} took over")
+                    other.preempt(loser, f"{holder.name} took over")
         self._holders.append((actor, domains, occupant, holder))
 
-    def release(self, holder: Holder) -> None:
+    def release(self, holder: DomainHolder) -> None:
         """A behaviour controls nothing any more."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]

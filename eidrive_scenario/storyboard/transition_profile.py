@@ -26,7 +26,7 @@ BEND = {
 """Largest second derivative on the unit square; a straight line has none, so it is given the cubic's."""
 
 
-class Transition:
+class TransitionProfile:
     """A value on its way from `start` to `target` while a parameter (time [s] or distance [m]) runs up to `extent`."""
 
     def __init__(self, shape: DynamicsShape, start: float, target: float, extent: float) -> None:
@@ -37,12 +37,14 @@ class Transition:
         self.progress = 0.0
 
     @classmethod
-    def by_rate(cls, shape: DynamicsShape, start: float, target: float, rate: float) -> Transition:
+    def from_rate(cls, shape: DynamicsShape, start: float, target: float, rate: float) -> TransitionProfile:
         """The transition whose steepest slope is `rate` (its sign does not matter)."""
         return cls(shape, start, target, PEAK[shape] * abs(target - start) / max(abs(rate), TINY))
 
     @classmethod
-    def by_bend(cls, shape: DynamicsShape, start: float, target: float, limit: float) -> Transition:
+    def from_second_derivative(
+        cls, shape: DynamicsShape, start: float, target: float, limit: float
+    ) -> TransitionProfile:
         """The transition whose second derivative stays within `limit`."""
         return cls(shape, start, target, math.sqrt(BEND[shape] * abs(target - start) / max(limit, TINY)))
 

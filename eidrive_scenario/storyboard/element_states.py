@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from eidrive_scenario.openscenario.storyboard_names import Meant
-from eidrive_scenario.storyboard.states import State, StateChange, Transition
+from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
-NOT_BEGUN = State.STANDBY
+NOT_BEGUN = ElementState.STANDBY
 """What an element counts as while those above it do not run."""
 
 
@@ -17,11 +17,11 @@ class ElementRecord:
 
     kind: str
     path: tuple[str, ...]
-    state: State | None = None
-    transitions: list[tuple[int, Transition]] = field(default_factory=list)
+    state: ElementState | None = None
+    transitions: list[tuple[int, ElementTransition]] = field(default_factory=list)
 
 
-class Progress:
+class ElementStates:
     """States of all elements, and the changes of the current tick."""
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Progress:
         self.time = 0.0
         self._meant: Meant[ElementRecord] | None = None
 
-    def enrol(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
+    def register(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
         """Keep track of one more element."""
         record, self._meant = ElementRecord(kind, path), None
         self.records.append(record)
@@ -42,7 +42,9 @@ class Progress:
         self.tick, self.time = tick, time
         self.changes = []
 
-    def change(self, record: ElementRecord, transition: Transition | None, after: State, why: str = "") -> None:
+    def change(
+        self, record: ElementRecord, transition: ElementTransition | None, after: ElementState, why: str = ""
+    ) -> None:
         """An element goes to another state (or, skipped, stays where it is)."""
         before = record.state or NOT_BEGUN
         if transition is None and record.state is after:
@@ -60,20 +62,20 @@ class Progress:
             self._meant = Meant((record.path, record) for record in self.records)
         return [record for record in self._meant.by(reference) if record.kind == kind]
 
-    def watch(self, kind: str, reference: str) -> Watch | None:
+    def observe_element(self, kind: str, reference: str) -> ElementStateObserver | None:
         """A watch on the elements that a reference means, None if there is none."""
         found = self.find(kind, reference)
-        return Watch(self, found) if found else None
+        return ElementStateObserver(self, found) if found else None
 
     def names(self, kind: str) -> list[str]:
         """The names of all elements of one kind."""
         return [record.path[-1] for record in self.records if record.kind == kind]
 
 
-class Watch:
+class ElementStateObserver:
     """One observer's eye on elements: each transition is shown to it in one tick, and not long after it happened."""
 
-    def __init__(self, progress: Progress, records: list[ElementRecord]) -> None:
+    def __init__(self, progress: ElementStates, records: list[ElementRecord]) -> None:
         self._progress = progress
         self._records = records
         self._seen = [0] * len(records)
@@ -81,11 +83,11 @@ class Watch:
         """How many transitions were seen in earlier ticks."""
         self._looked_at = -1
 
-    def in_state(self, state: State) -> bool:
+    def in_state(self, state: ElementState) -> bool:
         """True where one of the elements is in that state."""
         return any(record.state is state for record in self._records)
 
-    def passed(self, transition: Transition) -> bool:
+    def passed(self, transition: ElementTransition) -> bool:
         """True where one of them went through that transition in this tick or, unseen so far, in the one before."""
         found = False
         if self._looked_at != self._progress.tick:

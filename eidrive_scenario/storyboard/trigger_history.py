@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from eidrive_scenario.openscenario.model import Rule
 from eidrive_scenario.storyboard.condition import Measure
-from eidrive_scenario.storyboard.stage import Stage
-from eidrive_scenario.storyboard.trigger import ConditionGroup, ConditionMonitor, Trigger
+from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger
 
 
 @dataclass
-class Times:
+class TrueIntervals:
     """Spans of time in which something went on: how many, and the first and the last of them [s]."""
 
     count: int = 0
@@ -20,7 +20,7 @@ class Times:
     last: tuple[float, float] = (math.nan, math.nan)
     _open: bool = False
 
-    def note(self, going_on: bool, time: float) -> None:
+    def record(self, going_on: bool, time: float) -> None:
         """It goes on at this time, or it does not."""
         if going_on:
             begin = self.last[0] if self._open else time
@@ -33,7 +33,7 @@ class Times:
 
 
 @dataclass
-class Nearest:
+class ClosestMiss:
     """The quantity of one entity when it was nearest to being right, and when that was [s]."""
 
     measure: Measure
@@ -51,14 +51,14 @@ class ConditionHistory:
     nearest  by entity, what it compared when that was nearest to being right
     """
 
-    monitor: ConditionMonitor
+    monitor: ConditionEvaluator
     asked: int = 0
     first_asked: float = math.nan
     last_asked: float = math.nan
-    true: Times = field(default_factory=Times)
-    edges: Times = field(default_factory=Times)
-    counted: Times = field(default_factory=Times)
-    nearest: dict[str, Nearest] = field(default_factory=dict)
+    true: TrueIntervals = field(default_factory=TrueIntervals)
+    edges: TrueIntervals = field(default_factory=TrueIntervals)
+    counted: TrueIntervals = field(default_factory=TrueIntervals)
+    nearest: dict[str, ClosestMiss] = field(default_factory=dict)
     undefined: set[str] = field(default_factory=set)
     """Entities whose quantity was undefined or infinite at some evaluation."""
     words: str = ""
@@ -66,27 +66,27 @@ class ConditionHistory:
     _before: bool | None = None
     _evaluations: int = 0
 
-    def note(self, stage: Stage) -> None:
+    def record(self, context: RuntimeContext) -> None:
         """The condition has just been asked, unless it was not asked anew."""
         if self.monitor.evaluations == self._evaluations:
             return
         self._evaluations = self.monitor.evaluations
-        time, value = stage.time, bool(self.monitor.value)
+        time, value = context.time, bool(self.monitor.value)
         if not self.asked:
             self.first_asked = time
         self.asked += 1
         self.last_asked = time
-        self.true.note(value, time)
+        self.true.record(value, time)
         changed = self._before is not None and self._before != value
         wanted = self.monitor.edge == "risingOrFalling" or (self.monitor.edge == "rising") == value
-        self.edges.note(changed and wanted, time)
-        self.counted.note(self.monitor.result, time)
+        self.edges.record(changed and wanted, time)
+        self.counted.record(self.monitor.result, time)
         self._before = value
-        measures = self.monitor.condition.measures(stage)
+        measures = self.monitor.condition.measures(context)
         for measure in measures:
             self._compare(measure, time)
         if not measures:
-            self.words = self.monitor.condition.explain(stage)
+            self.words = self.monitor.condition.explain(context)
 
     def _compare(self, measure: Measure, time: float) -> None:
         gap = gap_of(measure)
@@ -95,7 +95,7 @@ class ConditionHistory:
             return
         known = self.nearest.get(measure.of)
         if known is None or gap < known.gap:
-            self.nearest[measure.of] = Nearest(measure, time, gap)
+            self.nearest[measure.of] = ClosestMiss(measure, time, gap)
 
 
 def gap_of(measure: Measure) -> float:
@@ -119,20 +119,20 @@ class GroupHistory:
     """
 
     conditions: tuple[ConditionHistory, ...]
-    held: Times = field(default_factory=Times)
+    held: TrueIntervals = field(default_factory=TrueIntervals)
     most: int = -1
     most_at: float = math.nan
     missing: tuple[ConditionHistory, ...] = ()
 
-    def note(self, stage: Stage) -> None:
+    def record(self, context: RuntimeContext) -> None:
         """The group has just been asked."""
         for condition in self.conditions:
-            condition.note(stage)
+            condition.record(context)
         missing = tuple(condition for condition in self.conditions if not condition.monitor.result)
         count = len(self.conditions) - len(missing)
-        self.held.note(not missing, stage.time)
+        self.held.record(not missing, context.time)
         if count > self.most:
-            self.most, self.most_at, self.missing = count, stage.time, missing
+            self.most, self.most_at, self.missing = count, context.time, missing
 
 
 class TriggerHistory:
@@ -143,10 +143,10 @@ class TriggerHistory:
         self.groups = tuple(_history(group) for group in trigger.groups)
         trigger.witness = self
 
-    def saw(self, stage: Stage) -> None:
+    def on_evaluated(self, context: RuntimeContext) -> None:
         """Note what each condition was."""
         for group in self.groups:
-            group.note(stage)
+            group.record(context)
 
     @property
     def asked(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from eidrive_scenario.roads import Branch, Choose, LaneKey, LaneLocation, RoadNetwork, Route
 
 
-def any_branch(generator: np.random.Generator) -> Choose:
+def uniform_branch_selector(generator: np.random.Generator) -> Choose:
     """Chooses anew at each fork."""
 
     def choose(branches: Sequence[Branch]) -> Branch:
