@@ -53,7 +53,7 @@ def measured(build: Callable[[], FusionMethod], ticks: list[list[Report]], objec
     for number, reports in enumerate(ticks):
         begin = time.thread_time()
         for report in reports:
-            fusion.hear(report)
+            fusion.add_report(report)
         fused = fusion.fuse(reports, DT * number)
         times.append(time.thread_time() - begin)
         right += len(fused) == objects

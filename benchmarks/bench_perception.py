@@ -23,7 +23,7 @@ from random_scenes import random_scenes
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.lidar_detector import LidarDetector
 from eidrive_scenario.perception.tracker_settings import TrackerSettings
 from eidrive_scenario.perception.tracking import Tracker
@@ -62,7 +62,7 @@ def look(name: str, stations: tuple[str, ...], every: int, seed: int, found: Fin
                 if station not in eyes:
                     spec, sensors = world.spec(station), {"lidar": LidarSettings()}
                     detector = LidarDetector()
-                    detector.install(Installation(spec, sensors, simulation.roads, seed))
+                    detector.setup(DetectorContext(spec, sensors, simulation.roads, seed))
                     eyes[station] = Rig(spec, sensors, seed=seed), detector
                 rig, detector = eyes[station]
                 began = time.perf_counter()

@@ -18,7 +18,7 @@ from eidrive_scenario.library import names
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.reporting.street_view import look_at
 from eidrive_scenario.reporting.weather_sheet import street
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
 from eidrive_scenario.world.render.renderer import Renderer
@@ -62,10 +62,10 @@ def main() -> None:
             world.set_weather(load_weather(weather))
             row = []
             for width, height in SIZES:
-                camera = Photographer(CameraSettings(width=width, height=height, fov=80.0))
+                camera = ImageSensor(CameraSettings(width=width, height=height, fov=80.0))
 
-                def take(camera: Photographer = camera) -> object:
-                    return camera.take(world, pose, generator(1, "bench"), ignore=("Ego",))
+                def take(camera: ImageSensor = camera) -> object:
+                    return camera.capture(world, pose, generator(1, "bench"), ignore=("Ego",))
 
                 standing = best(take)
                 with _nothing_kept():

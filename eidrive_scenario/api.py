@@ -22,9 +22,9 @@ from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.trajectory_times import has_times
-from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
 from eidrive_scenario.recording.frame import Frame
@@ -98,6 +98,7 @@ __all__ = [
     "CustomCommand",
     "Detections",
     "Detector",
+    "DetectorContext",
     "Diagnostic",
     "Domain",
     "EgoState",
@@ -114,7 +115,6 @@ __all__ = [
     "FusionMethod",
     "Goal",
     "InputError",
-    "Installation",
     "LaneLocation",
     "LateralStep",
     "LidarReading",
@@ -122,6 +122,7 @@ __all__ = [
     "LinkChannel",
     "LinkEvent",
     "LinkEvents",
+    "MapContext",
     "Measure",
     "Message",
     "Motion",
@@ -149,7 +150,6 @@ __all__ = [
     "SignalReading",
     "SimulationError",
     "StateChange",
-    "Surroundings",
     "TrajectoryCurve",
     "TrajectoryProgress",
     "TransitionProfile",

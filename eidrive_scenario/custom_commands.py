@@ -49,7 +49,7 @@ class CustomCommands:
             )
 
     def _select_channel(self, command: CustomCommand) -> None:
-        self._stations.use_channel(command.content, source=command.source, line=command.line, scope=command.scope)
+        self._stations.request_channel(command.content, source=command.source, line=command.line, scope=command.scope)
         if self._settings.channel is None:
             profile, dt = self._stations.channel_profile, self._settings.dt
             self._warnings += map(str, short_channel_delay(profile, dt, command.source, command.line))

@@ -10,8 +10,8 @@ from typing import Self
 
 from eidrive_scenario.attribution import attributed, report_extension, wall_limit_error
 from eidrive_scenario.custom_commands import CustomCommands
-from eidrive_scenario.driving.declared import possible_drivers
 from eidrive_scenario.driving.motionless import MotionlessStations
+from eidrive_scenario.driving.station_declarations import possible_drivers
 from eidrive_scenario.errors import SimulationError, WallLimitError
 from eidrive_scenario.library import name_of
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
@@ -41,8 +41,8 @@ from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
-from eidrive_scenario.world.weather_of import weather_of
 
 __all__ = [
     "BROKEN",
@@ -198,7 +198,7 @@ class Simulation:
 
     def _tick(self) -> tuple[Frame, str | None]:
         view = self.world.view()
-        steps = self.stations.act(self.world, view)
+        steps = self.stations.step(self.world, view)
         commands = self.storyboard.tick(view)
         self._environment = commands.environment or self._environment
         frame = Frame(
@@ -244,20 +244,20 @@ class Simulation:
         """Carry out what the storyboard decided, except the placements, which are the world's step."""
         for name in sorted(commands.removals):
             self.world.remove(name)
-            self.stations.leave(name)
+            self.stations.remove(name)
         for name, placement in commands.spawns.items():
             spec = commands.actor_specs.get(name) or actor_spec(name, self.scenario.entities[name])
             self.world.add(spec, placement)
-            self.stations.join(spec)
+            self.stations.add(spec)
         for name in sorted(self.stations.drivers):
             self.world.set_driven(name, name in commands.driven)
         self.stations.goals = commands.goals
-        self.world.show(commands.signals, commands.appearances)
+        self.world.set_display_state(commands.signals, commands.appearances)
         self.stations.signals = commands.signals
         if commands.environment is not None:
             self._environment = commands.environment
             if self._weather is None:
-                self.world.set_weather(weather_of(commands.environment, self.world.time))
+                self.world.set_weather(weather_from_environment(commands.environment, self.world.time))
         for command in commands.custom:
             self._commands.execute(command, self.world.time)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, object_category
 from eidrive_scenario.perception.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings
 from eidrive_scenario.world.weather import Weather
@@ -56,7 +56,7 @@ def errors(scenes: Iterable[Seen]) -> dict[tuple[str, str], Array]:
                 sweep,
                 time=0.0,
                 ground=float(seen.readings.ego.position[2]),
-                surroundings=Surroundings(seen.installation.roads),
+                surroundings=MapContext(seen.installation.roads),
                 pattern=pattern_from_settings(SENSORS["lidar"]),  # type: ignore[arg-type]
             )
             for row, label in enumerate(labels):

@@ -84,7 +84,7 @@ def centre_errors(kind: type[LearnedDetector], scenes: Iterable[Seen], use_lidar
         readings = seen.readings
         if not use_lidar:
             readings = type(readings)(readings.time, readings.ego, cameras=readings.cameras)
-        detector.install(seen.installation)
+        detector.setup(seen.installation)
         detections = detector.detect(readings)
         objects = objects_of(seen.labels)
         vehicles = [

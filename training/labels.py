@@ -15,8 +15,8 @@ from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, ST
 from eidrive_scenario.roads.signal_states import lamp_colours, lamps, lit
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.furniture import SignalHead
 from eidrive_scenario.world.meshes import actor_mesh
+from eidrive_scenario.world.road_objects import SignalHead
 from eidrive_scenario.world.roadside import FIRST_LABEL
 from eidrive_scenario.world.signs import sign_face
 from eidrive_scenario.world.view import WorldView

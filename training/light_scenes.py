@@ -17,13 +17,13 @@ from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
-from eidrive_scenario.world.furniture import SignalHead, signal_heads
+from eidrive_scenario.world.road_objects import SignalHead, signal_heads
 from training.dataset import shows_enough
 from training.labels import Label, head_box, legible, signal_labels
 from training.random_roads import Place, random_place
@@ -130,8 +130,8 @@ def _scene(
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)
-    world.show(states, random_looks(rng, [carrier, *cast], weather))
-    reading = Photographer(camera).take(world, pose, rng, ignore=(spec.name,))
+    world.set_display_state(states, random_looks(rng, [carrier, *cast], weather))
+    reading = ImageSensor(camera).capture(world, pose, rng, ignore=(spec.name,))
     labels = legible(signal_labels(reading, heads, states), reading, weather)
     return LightScene(reading, place.roads, tuple(_lights(reading, heads, labels, states)), weather.name)
 

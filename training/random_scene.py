@@ -14,7 +14,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState
-from eidrive_scenario.world.furniture import SignalHead
+from eidrive_scenario.world.road_objects import SignalHead
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]

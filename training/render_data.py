@@ -21,9 +21,9 @@ from rich.progress import Progress
 
 from eidrive_scenario.perception.learned.image_network import resized
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World
-from eidrive_scenario.world.furniture import signal_heads
+from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.weather import Weather
 from training.dataset import encode, write
 from training.labels import Label, actor_labels, legible, signal_labels
@@ -73,8 +73,8 @@ def shot(world: World, place: Place, spots: Spots, rng: np.random.Generator) -> 
     weather = random_weather(rng)
     world.set_weather(weather)
     states = random_signals(rng, place.roads)
-    world.show(states, random_looks(rng, cast, weather))
-    reading = Photographer(view.settings).take(world, view.pose, rng)
+    world.set_display_state(states, random_looks(rng, cast, weather))
+    reading = ImageSensor(view.settings).capture(world, view.pose, rng)
     carrier = (view.carrier[0].name,) if view.carrier is not None else ()
     labels = actor_labels(reading, world.view(), {spec.name: spec for spec, _ in cast}, carrier)
     labels += signal_labels(reading, heads, states)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from eidrive_scenario.driving.settings import is_agent
+from eidrive_scenario.driving.settings import is_agent_controller
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.mounting import mounting
@@ -38,7 +38,7 @@ class Seen:
     readings: Readings
     labels: list[Label]
     weather: str
-    installation: Installation
+    installation: DetectorContext
 
 
 def usual_sensors() -> dict[str, AnySensorSettings]:
@@ -53,7 +53,7 @@ def library_scenes(weathers: Sequence[Weather], scenarios: Sequence[str] = LIBRA
             scenario = load_for_seed(resolve_scenario(name), 1, {})
             with Simulation(scenario, seed=1, settings=RunSettings(channel="ideal")) as simulation:
                 world = simulation.world
-                stations = [name for name, own in scenario.controllers.items() if any(map(is_agent, own))]
+                stations = [name for name, own in scenario.controllers.items() if any(map(is_agent_controller, own))]
                 end, tick = None, 0
                 rigs: dict[str, Rig] = {}
                 while end is None:
@@ -116,5 +116,5 @@ def _read(
     view = world.view()
     for name, readings in read_all(list(rigs.values()), world, view).items():
         labels = actor_labels(readings.cameras["camera"], view, specs, (name,))
-        installation = Installation(specs[name], dict(sensors or usual_sensors()), roads, 1)
+        installation = DetectorContext(specs[name], dict(sensors or usual_sensors()), roads, 1)
         yield Seen(readings, labels, weather, installation)

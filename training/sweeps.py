@@ -14,7 +14,7 @@ from eidrive_scenario.perception.learned.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.weather import Weather
@@ -49,7 +49,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
             place = random_place(rng, Path(folder))
         spots = Spots.of(place.roads)
         view = random_view(rng, spots)
-        camera = Photographer(CameraSettings())
+        camera = ImageSensor(CameraSettings())
         with World(place.roads) as world:
             place.build_houses(world)
             cast = random_traffic(rng, spots, view)
@@ -59,7 +59,7 @@ def sweeps(networks: Mapping[str, ImageNetwork], seed: int, worlds: int) -> dict
             boxes = None
             for key, weather in weathers.items():
                 world.set_weather(weather)
-                reading = camera.take(world, view.pose, generator(seed, "sweeps", number))
+                reading = camera.capture(world, view.pose, generator(seed, "sweeps", number))
                 if boxes is None:
                     boxes = _vehicles(actor_labels(reading, world.view(), specs))
                     asked += len(boxes)

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.control import VehicleController
+from eidrive_scenario.driving.message_generator import MessageGenerator
+from eidrive_scenario.driving.partial_reports import PartialReportAssembler
 from eidrive_scenario.driving.planner import Planner
-from eidrive_scenario.driving.received_objects import ReceivedObjects
 from eidrive_scenario.driving.result_checks import check_followed, check_plan
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.shared_points import SharedPoints
-from eidrive_scenario.driving.speaker import Speaker
+from eidrive_scenario.driving.shared_points import PointCloudSharing
 from eidrive_scenario.driving.step import AgentStep, Goal, Plan
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -30,12 +30,12 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 
 Array = NDArray[np.float64]
 
-OWN_MARGIN = 0.9
+EGO_BODY_MARGIN = 0.9
 """A reported box whose centre lies this near to the own outline is the own body: half the width of a car, so that the
 centre of another car can come as near only after a collision [m]."""
 TIME_TOLERANCE = 1e-9
 
-ITSELF = " itself"
+SENDER_REPORT_SUFFIX = " itself"
 """What a station says of itself counts as the report of one more station: it is not among the objects that it sees."""
 
 
@@ -55,12 +55,12 @@ class Agent:
         perception: Perception,
         fusion: FusionMethod,
         planner: Planner | None,
-        controller: Controller | None,
-        speaker: Speaker,
+        controller: VehicleController | None,
+        speaker: MessageGenerator,
         dt: float,
-        listens: bool = True,
+        receives_messages: bool = True,
         own_perception: bool = False,
-        points: SharedPoints | None = None,
+        points: PointCloudSharing | None = None,
     ) -> None:
         self.name = spec.name
         self.spec = spec
@@ -71,7 +71,7 @@ class Agent:
         self.planner = planner
         self._planner_checked = planner is not None and not is_built_in(type(planner))
         self.controller = controller
-        self.listens = listens
+        self.receives_messages = receives_messages
         """Whether the messages of others are for this station; one that does not drive may only speak."""
         self.own_perception = own_perception
         self.points = points
@@ -79,7 +79,7 @@ class Agent:
         """Least time between two messages that congestion control leaves this station [s]."""
         self._speaker = speaker
         self._clock = settings.clock
-        self._partial: dict[str, ReceivedObjects] = {}
+        self._partial: dict[str, PartialReportAssembler] = {}
         self._detections = Detections(0.0)
         self._reports: dict[str, Report] = {}
         self._usual_lifetime = settings.lifetime(complete=True)
@@ -94,23 +94,23 @@ class Agent:
         """One tick at `now` [s]."""
         readings = self.perception.locate(readings)
         ego = readings.ego
-        self._remember_place(ego)
+        self._record_ego_pose(ego)
         fresh = self.perception.perceive(readings)
         if fresh is not None:
             self._detections = fresh
         detections = self._detections
-        self._listen(inbox, now)
+        self._process_inbox(inbox, now)
         state = self._state(ego)
         found = fresh if self.points is None else self.points.perceive(readings, fresh)
         if found is not None and not self.own_perception:
-            self._take(Report(self.name, found, now, state))
+            self._accept_report(Report(self.name, found, now, state))
         fused = self.fusion.fuse(list(self._reports.values()), now)
         if self._fusion_checked:
             check_detections(self.fusion, "fuse", fused)
         plan = None
         if self.planner is not None:
             if self.settings.obey_signals:
-                self.planner.heed(self.perception.signals(readings))
+                self.planner.observe_signals(self.perception.signals(readings))
             plan = self.planner.plan(ego, fused, goal, now)
             if self._planner_checked:
                 check_plan(self.planner, plan)
@@ -120,7 +120,7 @@ class Agent:
             fused=fused,
             plan=plan,
             control=self._control(ego, plan),
-            outbox=self._speaker.speak(
+            outbox=self._speaker.generate(
                 state,
                 detections,
                 now,
@@ -130,13 +130,13 @@ class Agent:
             estimate=ego if self.settings.localization != "oracle" else None,
         )
 
-    def _remember_place(self, ego: EgoState) -> None:
+    def _record_ego_pose(self, ego: EgoState) -> None:
         x, y, z = ego.position.tolist()
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, _ = self.spec.offset
         self._own_places.append((ego.time, x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z, ego.yaw))
 
-    def _listen(self, inbox: Sequence[ReceivedMessage], now: float) -> None:
+    def _process_inbox(self, inbox: Sequence[ReceivedMessage], now: float) -> None:
         """Keep the newest report of each sender that counts, and forget the old ones."""
         for received in inbox:
             message = self._clock.with_local_timestamps(received.message, now)
@@ -147,32 +147,32 @@ class Agent:
             elif self.settings.cooperates_with is not None and sender not in self.settings.cooperates_with:
                 continue
             if self.points is not None and message.points is not None and sender != self.name:
-                self.points.hear(sender, message.points, self._own_body(message.points.time))
+                self.points.add_points(sender, message.points, self._own_body(message.points.time))
                 continue
             detections = _numbered(message)
             if sender != self.name:
                 detections = self._without_own_body(detections)
-            station = sender if message.kind == "cpm" else sender + ITSELF
+            station = sender if message.kind == "cpm" else sender + SENDER_REPORT_SUFFIX
             report = Report(station, detections, received.arrived, message.state, complete=message.objects is None)
             self._lifetimes[station] = self.settings.lifetime(complete=report.complete and message.kind == "cpm")
-            self._take(report, None if report.complete else self._all_said(message))
+            self._accept_report(report, None if report.complete else self._assembled_detections(message))
         for station, held in list(self._reports.items()):
             if held.detections.time < now - self._lifetimes.get(station, self._usual_lifetime) - TIME_TOLERANCE:
                 del self._reports[station]
 
-    def _all_said(self, message: Message) -> Detections:
+    def _assembled_detections(self, message: Message) -> Detections:
         """What the sender of a message that does not list all its objects has said of them by now."""
         memory = self._partial.get(message.sender)
         if memory is None:
-            memory = self._partial[message.sender] = ReceivedObjects(self.settings.lifetime(complete=False))
-        return self._without_own_body(memory.take(message))
+            memory = self._partial[message.sender] = PartialReportAssembler(self.settings.lifetime(complete=False))
+        return self._without_own_body(memory.update(message))
 
-    def _take(self, report: Report, completed: Detections | None = None) -> None:
+    def _accept_report(self, report: Report, completed: Detections | None = None) -> None:
         """Fusion hears every report; a late one does not replace a newer one.
 
         A report that does not say all is kept together with what its station said before, `completed`.
         """
-        self.fusion.hear(report)
+        self.fusion.add_report(report)
         if completed is not None:
             report = replace(report, detections=completed, complete=True)
         held = self._reports.get(report.station)
@@ -188,7 +188,7 @@ class Agent:
             return detections
         x, y, _, yaw = self._own_place(detections.time)
         cos, sin = math.cos(yaw), math.sin(yaw)
-        half_length, half_width = self.spec.size[0] / 2.0 + OWN_MARGIN, self.spec.size[1] / 2.0 + OWN_MARGIN
+        half_length, half_width = self.spec.size[0] / 2.0 + EGO_BODY_MARGIN, self.spec.size[1] / 2.0 + EGO_BODY_MARGIN
         others = [
             row
             for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist())
@@ -207,13 +207,13 @@ class Agent:
         """(7,) box of the own outline with a margin, as high as anything on it, at that time."""
         x, y, z, yaw = self._own_place(time)
         length, width, height = self.spec.size
-        return np.array([x, y, z, length + OWN_MARGIN, width + OWN_MARGIN, 4.0 * height, yaw])
+        return np.array([x, y, z, length + EGO_BODY_MARGIN, width + EGO_BODY_MARGIN, 4.0 * height, yaw])
 
     def _control(self, ego: EgoState, plan: Plan | None) -> Control | None:
         if self.controller is None:
             return None
         if plan is None or self.planner is None:
-            return self.controller.parked()
+            return self.controller.hold_standstill()
         try:
             control = self.controller.control(ego, plan)
         except (ArithmeticError, ValueError, LookupError):

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from eidrive_scenario.driving.conflict_area import inside
-from eidrive_scenario.driving.settings import AgentSettings, Polygon, is_agent
+from eidrive_scenario.driving.settings import AgentSettings, Polygon, is_agent_controller
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
@@ -55,7 +55,7 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
 
 def _place(scenario: Scenario, name: str) -> tuple[str, int]:
     """File and line of the property that states the areas of a station."""
-    for controller in filter(is_agent, scenario.controllers.get(name, ())):
+    for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
         for entry in controller.properties.property if controller.properties is not None else ():
             if entry.name == "conflict_area":
                 return controller.source, entry.line

@@ -35,7 +35,7 @@ HOLDING = 3.0
 """Deceleration that the held brake would give: enough for a slope of 30 % [m/s²]."""
 
 
-class Controller:
+class VehicleController:
     """Follows the plans of one vehicle.
 
     Across the path, the law of Stanley (Hoffmann, Tomlin, Montemerlo, Thrun: Autonomous automobile trajectory tracking
@@ -57,7 +57,7 @@ class Controller:
             return Control(0.0, _pedal(plan.braking, self.spec.max_deceleration), steering)
         return self._pedals(self._accelerate(ego, plan), steering)
 
-    def parked(self) -> Control:
+    def hold_standstill(self) -> Control:
         """The brake held, the wheels as they are."""
         return Control(0.0, 1.0, self._steering)
 

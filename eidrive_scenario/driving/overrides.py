@@ -34,7 +34,7 @@ Overrides: TypeAlias = Mapping[str, Override]
 """What is held of one vehicle, by control."""
 
 
-class HeldControls:
+class ControlOverrides:
     """The controls of one vehicle, some of which may be held. It knows where they were, as rates are limited."""
 
     def __init__(self, spec: ActorSpec, dt: float) -> None:

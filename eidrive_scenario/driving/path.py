@@ -23,7 +23,7 @@ LEADS_AWAY = 5.0
 later is another bend, or another lap [m]."""
 
 
-class Path:
+class PlannedPath:
     """points (M, 2) [m], at least two; limits (M,) [m/s] that keep lateral and approach accelerations."""
 
     def __init__(self, line: Array, *, ends: bool) -> None:

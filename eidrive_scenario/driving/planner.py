@@ -25,7 +25,7 @@ class Planner(ABC):
         self.dt = dt
         self.seed = seed
 
-    def heed(self, signals: Sequence[SignalReading]) -> None:  # noqa: B027 - for planners that know signals
+    def observe_signals(self, signals: Sequence[SignalReading]) -> None:  # noqa: B027 - for planners that know signals
         """The traffic lights and stop signs in sight now; called before `plan` where the station obeys them."""
 
     @abstractmethod

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.path import SPACING, Path
+from eidrive_scenario.driving.path import SPACING, PlannedPath
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.signal_stops import SignalStops, Stop
+from eidrive_scenario.driving.signal_stops import SignalStops, StopPoint
 from eidrive_scenario.driving.step import Goal, Plan
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
@@ -48,16 +48,16 @@ class RoutePlanner(Planner):
         self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
-        self._path: Path | None = None
+        self._path: PlannedPath | None = None
         self._goal: Goal | None = None
         self._way: tuple[Array | None, Array | None, Array | None] = (None, None, None)
         self._progress = 0
         self._lane: list[LaneLocation] = []
         self._first_speed: float | None = None
         self._stops = SignalStops(roads, spec) if settings.obey_signals else None
-        self._laid: Path | None = None
+        self._laid: PlannedPath | None = None
 
-    def heed(self, signals: Sequence[SignalReading]) -> None:
+    def observe_signals(self, signals: Sequence[SignalReading]) -> None:
         if self._stops is not None:
             self._stops.signals.see(signals)
 
@@ -87,7 +87,7 @@ class RoutePlanner(Planner):
         acceleration = goal.acceleration if goal is not None and free else 0.0
         return Plan(path.points[part], speeds, reason, acceleration)
 
-    def _stop(self, path: Path, ego: EgoState, x: float, y: float, now: float) -> Stop | None:
+    def _stop(self, path: PlannedPath, ego: EgoState, x: float, y: float, now: float) -> StopPoint | None:
         """The traffic light or stop sign for which to stop next."""
         if self._stops is None:
             return None
@@ -105,7 +105,7 @@ class RoutePlanner(Planner):
             self._first_speed = max(ego.speed, 0.0)
         return self._first_speed
 
-    def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> Path:
+    def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
         if self._path is not None and goal is self._goal:
             return self._path
         self._goal = goal
@@ -117,7 +117,7 @@ class RoutePlanner(Planner):
 
     def _laid_out(
         self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
-    ) -> Path:
+    ) -> PlannedPath:
         line: Array | None = None
         if path is not None and len(path) > 1:
             if lap is not None:
@@ -129,9 +129,9 @@ class RoutePlanner(Planner):
         if line is None:
             return self._lane_ahead(x, y, yaw)
         try:
-            return Path(line, ends=True)
+            return PlannedPath(line, ends=True)
         except ValueError:  # the destination is here
-            return Path(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
+            return PlannedPath(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
 
     def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
         """The route through all waypoints, None if one of them or the vehicle itself is on no road."""
@@ -144,7 +144,7 @@ class RoutePlanner(Planner):
         line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
         return np.asarray(line)[:, :2]
 
-    def _lane_ahead(self, x: float, y: float, yaw: float) -> Path:
+    def _lane_ahead(self, x: float, y: float, yaw: float) -> PlannedPath:
         """Along the lane and those that follow it, from where the last call left off; straight on where no lane is."""
         if self.roads is not None:
             self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
@@ -154,9 +154,9 @@ class RoutePlanner(Planner):
                 self._lane += more
                 onward = bool(more)
             if len(self._lane) > 1:
-                return Path(self.roads.centres(self._lane), ends=not onward)
+                return PlannedPath(self.roads.centres(self._lane), ends=not onward)
         reach = np.array([[0.0], [float(LOOK_AHEAD)]])
-        return Path(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
+        return PlannedPath(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
     def _lane_here(self, x: float, y: float, yaw: float) -> list[LaneLocation]:
         """The lane under the vehicle, if it leads where the vehicle looks."""
@@ -184,11 +184,11 @@ def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
     return places[1:]
 
 
-def _with_laps(line: Array, lap: Array) -> Path:
+def _with_laps(line: Array, lap: Array) -> PlannedPath:
     """The line and as many laps after it as are looked at ahead."""
     length = float(np.hypot(*np.diff(lap[:, :2], axis=0).T).sum())
     laps = [lap[1:, :2]] * math.ceil(LOOK_AHEAD * SPACING / length)
-    return Path(np.concatenate([line[:, :2], *laps]), ends=False)
+    return PlannedPath(np.concatenate([line[:, :2], *laps]), ends=False)
 
 
 def _same(first: Array | None, second: Array | None) -> bool:

@@ -33,7 +33,7 @@ NO_PLANNER = "none"
 _TEXTS = frozenset({"module", "detector", "fusion", "planner"})
 """Properties whose values are names, not YAML."""
 
-USUAL: Mapping[str, Any] = {
+DEFAULT_SENSORS: Mapping[str, Any] = {
     model.model_fields["kind"].default: model for model in get_args(get_args(AnySensorSettings)[0])
 }
 """The settings of each kind of sensor; as they are, where nothing else is said."""
@@ -206,7 +206,7 @@ class AgentSettings(Settings):
         return self
 
     @property
-    def names_senders(self) -> bool:
+    def restricts_senders(self) -> bool:
         """Whether it was said whom to hear, be it all; a station that drives hears all without a word."""
         return "cooperates_with" in self.model_fields_set and self.cooperates_with != ()
 
@@ -229,7 +229,7 @@ class AgentSettings(Settings):
 
         Raises SettingError if the settings leave one out that the detector needs.
         """
-        sensors: dict[str, Any] = dict(usual) or {kind: USUAL[kind]() for kind in sorted(needs)}
+        sensors: dict[str, Any] = dict(usual) or {kind: DEFAULT_SENSORS[kind]() for kind in sorted(needs)}
         if self.sensors is not None:
             sensors = dict(self.sensors)
         present = {sensor.kind for sensor in sensors.values()}
@@ -237,7 +237,9 @@ class AgentSettings(Settings):
         if missing:
             message = f"detector {self.detector!r} needs a sensor of kind {', '.join(sorted(missing))}"
             raise SettingError(Diagnostic(message, "add it to the property 'sensors'"))
-        sensors |= {kind: USUAL[kind]() for kind in LOCALIZING if self.localization == "ekf" and kind not in present}
+        sensors |= {
+            kind: DEFAULT_SENSORS[kind]() for kind in LOCALIZING if self.localization == "ekf" and kind not in present
+        }
         for name, sensor in sensors.items():
             if isinstance(sensor, TruthSettings):
                 own = {key: getattr(self, key) for key in _OF_THE_TRUTH_SENSOR if key not in sensor.model_fields_set}
@@ -245,7 +247,7 @@ class AgentSettings(Settings):
         return sensors
 
 
-def is_agent(controller: Controller) -> bool:
+def is_agent_controller(controller: Controller) -> bool:
     """Whether this controller is one of ours."""
     found = controller.properties.property if controller.properties is not None else ()
     return any(entry.name == "module" and entry.value == MODULE for entry in found)

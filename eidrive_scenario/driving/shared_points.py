@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 TIME_TOLERANCE = 1e-9
 
 
-class SharedPoints:
+class PointCloudSharing:
     """The clouds that others sent, and the search for objects in them and the own points together.
 
     perception   for that search; one of its own, as detectors and trackers remember what they saw. None for a station
@@ -31,7 +31,7 @@ class SharedPoints:
         self._perception = perception
         self._heard: dict[str, tuple[float, Array]] = {}
 
-    def hear(self, sender: str, cloud: PointCloud, body: Array) -> None:
+    def add_points(self, sender: str, cloud: PointCloud, body: Array) -> None:
         """A cloud has come in; points on the own body (7,), where that was when they were measured, are left out.
 
         A late cloud does not replace a newer one.
@@ -43,11 +43,11 @@ class SharedPoints:
 
     def perceive(self, readings: Readings, alone: Detections | None) -> Detections | None:
         """The objects that become known now, `alone` being those in the own points; None if there is nothing new."""
-        self.own = self._fusion.cloud(readings) or self.own
+        self.own = self._fusion.shared_cloud(readings) or self.own
         if self._perception is None:
             return alone
         oldest = readings.time - self._fusion.early.max_lateness - TIME_TOLERANCE
         self._heard = {sender: held for sender, held in self._heard.items() if held[0] >= oldest}
         return self._perception.perceive(
-            self._fusion.joined(readings, [points for _, (_, points) in sorted(self._heard.items())])
+            self._fusion.merge_readings(readings, [points for _, (_, points) in sorted(self._heard.items())])
         )

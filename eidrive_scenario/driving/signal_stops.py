@@ -29,7 +29,7 @@ WAIT = 3.0
 """How long a vehicle stands at a stop sign: EI-Drive's 60 ticks of 0.05 s [s]."""
 
 
-class Stop(NamedTuple):
+class StopPoint(NamedTuple):
     """Where to stand, as a distance along the path [m], and why."""
 
     place: float
@@ -55,9 +55,9 @@ class SignalStops:
         self.signals.follow(path)
         self._along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
 
-    def next(self, along: float, speed: float, now: float) -> Stop | None:
+    def next(self, along: float, speed: float, now: float) -> StopPoint | None:
         """The stop ahead of a vehicle whose reference point is `along` the path, None where nothing stops it."""
-        found: Stop | None = None
+        found: StopPoint | None = None
         ahead: dict[str, SignalAhead] = {}
         for signal in self.signals.ahead(along):
             ahead.setdefault(signal.signal, signal)
@@ -70,7 +70,7 @@ class SignalStops:
             holds = self._light_holds if signal.kind == "light" else self._sign_holds
             if holds(signal, left, speed, now) and found is None:
                 what = "traffic light" if signal.kind == "light" else "stop sign"
-                found = Stop(along + max(left, 0.0), f"stop at {what} {signal.signal}")
+                found = StopPoint(along + max(left, 0.0), f"stop at {what} {signal.signal}")
         return found
 
     def _forget(self, name: str) -> None:
@@ -80,7 +80,7 @@ class SignalStops:
         self._served.discard(name)
         self._standing_since.pop(name, None)
 
-    def limits(self, stop: Stop, part: slice) -> Array:
+    def limits(self, stop: StopPoint, part: slice) -> Array:
         """The speeds at points of the path with which the vehicle comes to a stand there [m/s]."""
         return np.sqrt(2.0 * APPROACH_DECELERATION * np.maximum(stop.place - self._along[part], 0.0))
 

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.building import build_agent, build_detector, build_rig
-from eidrive_scenario.driving.declared import declared_detectors, declared_encoders, declared_settings
-from eidrive_scenario.driving.overrides import HeldControls, Overrides
-from eidrive_scenario.driving.radio_sight import antenna_place, sight_lines
+from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
+from eidrive_scenario.driving.overrides import ControlOverrides, Overrides
+from eidrive_scenario.driving.radio_line_of_sight import antenna_position, line_of_sight_states
 from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.station_declarations import declared_detectors, declared_encoders, declared_settings
 from eidrive_scenario.driving.step import AgentStep, Goal
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
@@ -22,7 +22,7 @@ from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
-from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
+from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.channel_checks import check_delivered, check_interval, check_statistics, check_told
 from eidrive_scenario.v2x.link_events import LinkEvents
@@ -68,7 +68,7 @@ class Stations:
         self._channel: Channel | None = None
         self._checked_channel: Channel | None = None
         """The channel, if its results are checked: that of a third party."""
-        self._silenced: Channel | None = None
+        self._retired_channel: Channel | None = None
         """The channel before, where there is none any more: its books still count."""
         self._books: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
         """When the books of the channel were last read, and what they said: those of many links take a while."""
@@ -84,8 +84,8 @@ class Stations:
         """Of the stations with a planner, the probability of existence from which on it reacts to objects."""
         self._agents: dict[str, Agent] = {}
         self._rigs: dict[str, Rig] = {}
-        self._lookouts: dict[str, SignalLookout] = {}
-        self._held: dict[str, HeldControls] = {}
+        self._lookouts: dict[str, SignalSensor] = {}
+        self._held: dict[str, ControlOverrides] = {}
         self._settings = declared_settings(scenario, detector, cooperate)
         self.channel_profile: ChannelProfile | None = None
         """The profile of the channel; None where there is none."""
@@ -113,7 +113,7 @@ class Stations:
         """Of a station. Raises KeyError if it is not in the world."""
         return self._agents[name].perception.detector
 
-    def join(self, spec: ActorSpec) -> None:
+    def add(self, spec: ActorSpec) -> None:
         """An actor has entered the world; it becomes a station if it has a controller of ours."""
         settings = self._settings.get(spec.name)
         if settings is None:
@@ -134,13 +134,13 @@ class Stations:
         )
         if self._agents[spec.name].planner is not None:
             self.min_existence[spec.name] = settings.min_existence
-        unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.sees_signals
+        unseen = SIGNAL_KINDS - self._agents[spec.name].perception.detector.detectable_signals
         if settings.obey_signals and unseen:
-            self._lookouts[spec.name] = SignalLookout(spec, self._roads, unseen)
+            self._lookouts[spec.name] = SignalSensor(spec, self._roads, unseen)
         if self._agents[spec.name].controller is not None:
-            self._held[spec.name] = HeldControls(spec, self._dt)
+            self._held[spec.name] = ControlOverrides(spec, self._dt)
 
-    def leave(self, name: str) -> None:
+    def remove(self, name: str) -> None:
         """An actor has left the world."""
         self._agents.pop(name, None)
         self.min_existence.pop(name, None)
@@ -148,12 +148,12 @@ class Stations:
         self._lookouts.pop(name, None)
         self._held.pop(name, None)
 
-    def use_channel(self, profile: str, *, source: str, line: int, scope: Scope | None = None) -> None:
+    def request_channel(self, profile: str, *, source: str, line: int, scope: Scope | None = None) -> None:
         """The file asks for a channel, at the start or on a trigger; an option given by the caller wins."""
         if not self._fixed_channel:
             self._set_channel(profile, origin=source, line=line, scope=scope)
 
-    def act(self, world: World, view: WorldView) -> dict[str, AgentStep]:
+    def step(self, world: World, view: WorldView) -> dict[str, AgentStep]:
         """Sensors read, messages that have arrived are heard, every agent acts."""
         self.readings = {}
         if not self._agents:
@@ -200,7 +200,7 @@ class Stations:
             return
         outbox = []
         for sender, step in steps.items():
-            receivers = self._listeners(sender)
+            receivers = self._receivers(sender)
             outbox += [(message, receivers) for message in step.outbox]
         told = self._channel.transmit(outbox, now)
         if self._checked_channel is not None:
@@ -210,7 +210,7 @@ class Stations:
 
     def metrics(self, now: float) -> dict[str, float]:
         """Counts of messages over all links."""
-        if self._channel is None and self._silenced is None:
+        if self._channel is None and self._retired_channel is None:
             return {}
         books = self.link_statistics(now).values()
         return {
@@ -222,7 +222,7 @@ class Stations:
 
     def link_statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
         """The books of every link, by (sender, receiver); empty where there never was a channel."""
-        channel = self._channel or self._silenced
+        channel = self._channel or self._retired_channel
         if channel is None:
             return {}
         if self._books is None or self._books[0] != now:
@@ -233,9 +233,10 @@ class Stations:
 
     def _surroundings(self, world: World, view: WorldView) -> RadioEnvironment:
         places = {
-            name: antenna_place(view, agent.spec, agent.settings.antenna_height) for name, agent in self._agents.items()
+            name: antenna_position(view, agent.spec, agent.settings.antenna_height)
+            for name, agent in self._agents.items()
         }
-        return RadioEnvironment(places, partial(sight_lines, world, places))
+        return RadioEnvironment(places, partial(line_of_sight_states, world, places))
 
     def _deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
         if self._channel is None:
@@ -245,11 +246,11 @@ class Stations:
             check_delivered(self._checked_channel, delivered, now)
         return delivered
 
-    def _listeners(self, sender: str) -> list[str]:
+    def _receivers(self, sender: str) -> list[str]:
         """Who hears `sender`: listening stations that count it; itself too where the channel carries own perception."""
         found = []
         for name, agent in self._agents.items():
-            if not agent.listens:
+            if not agent.receives_messages:
                 continue
             heard = agent.settings.cooperates_with
             if self._own_perception if name == sender else heard is None or sender in heard:
@@ -262,13 +263,13 @@ class Stations:
 
     def _set_channel(self, source: str | Path, *, origin: str, line: int | None, scope: Scope | None) -> None:
         profile = load_profile(source, [library_path() / "channels"], origin=origin, line=line, scope=scope)
-        before = self._channel or self._silenced
+        before = self._channel or self._retired_channel
         self._channel = build_channel(profile, self._seed, previous=before)
         third_party = self._channel is not None and not is_built_in(type(self._channel))
         self._checked_channel = self._channel if third_party else None
-        self._silenced = before if self._channel is None else None
+        self._retired_channel = before if self._channel is None else None
         self._books = None
         self.channel_profile = profile
         self.channel_name = profile.name if profile is not None else NO_COOPERATION
         for agent in self._agents.values():
-            agent.own_perception = self._own_perception and agent.listens
+            agent.own_perception = self._own_perception and agent.receives_messages

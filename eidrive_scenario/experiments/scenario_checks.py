@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from eidrive_scenario.driving.declared import torchscript_warnings
+from eidrive_scenario.driving.station_declarations import torchscript_warnings
 from eidrive_scenario.errors import Diagnostic, InputError, capped
 from eidrive_scenario.experiments.rules import check_rule_names, run_rules
 from eidrive_scenario.openscenario import Source, load_scenario

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.radio_sight import sight_lines
+from eidrive_scenario.driving.radio_line_of_sight import line_of_sight_states
 from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
@@ -91,7 +91,7 @@ def precision_by_delay(
             known = Detections(now)
             for received in channel.deliver("Ego", now):
                 report = Report("RSU", received.message.detections, received.arrived)
-                fusion.hear(report)
+                fusion.add_report(report)
                 known = fusion.fuse([report], now) if tick == ticks else known
             said = seen(now)
             state = StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -136,7 +136,7 @@ def _seen_in_the_world(places: dict[str, tuple[float, float, float]], truck: boo
         if truck:
             spec = ActorSpec("Firetruck", "firetruck", "truck", TRUCK, (0.0, 0.0, TRUCK[2] / 2.0))
             world.add(spec, Placement(places["RSU"][0] / 2.0, 0.0, yaw=math.pi / 2.0))
-        return sight_lines(world, places, [("Ego", "RSU")])
+        return line_of_sight_states(world, places, [("Ego", "RSU")])
 
 
 def _expected_reception(distance: Array, profile: RadioProfile, truck: bool) -> Array:

@@ -45,10 +45,10 @@ def associate_few(
         for column, other in enumerate(second)
         if (distance := math.dist(one, other)) < gate
     ]
-    return matched(*zip(*near, strict=True)) if near else []
+    return assign(*zip(*near, strict=True)) if near else []
 
 
-def matched(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
+def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
     """Of the possible pairs (row, column) those chosen: as many as possible, then the least sum of costs.
 
     Each row and column is used at most once. Where two choices are equally good, the order of the numbers decides.

@@ -48,7 +48,7 @@ class AverageFusion(FusionMethod):
                 return only
             return replaced(only, time=now)
         labels = self._labels(present)
-        fused = joined_few(present, labels, now) if len(labels) <= FEW else joined(present, labels, now)
+        fused = fuse_average_small(present, labels, now) if len(labels) <= FEW else fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
         return replaced(fused, existence=joint_existence(present, labels))
@@ -99,7 +99,7 @@ class _Object:
         self.z += (z - self.z) / self.count
 
 
-def joined(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:
+def fuse_average(reports: Sequence[Detections], numbers: Sequence[int], now: float) -> Detections:
     """Means over the boxes of each object, by the object's number; a box that is alone stays as it is, to the bit."""
     labels = np.array(numbers, dtype=np.intp)
     boxes = np.concatenate([report.boxes for report in reports])
@@ -123,7 +123,7 @@ def joined(reports: Sequence[Detections], numbers: Sequence[int], now: float) ->
     )
 
 
-def joined_few(reports: Sequence[Detections], labels: Sequence[int], now: float) -> Detections:
+def fuse_average_small(reports: Sequence[Detections], labels: Sequence[int], now: float) -> Detections:
     """The same as `joined` in plain numbers."""
     members: list[list[int]] = [[] for _ in range(max(labels) + 1)]
     for row, label in enumerate(labels):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from eidrive_scenario.detections import CLASSES, Detections
-from eidrive_scenario.fusion.grouping import grouped
+from eidrive_scenario.fusion.covariance import covariances, estimates, intersect_batch, means
+from eidrive_scenario.fusion.grouping import group_tracks
 from eidrive_scenario.fusion.headings import joined_heading
-from eidrive_scenario.fusion.intersection import covariances, estimates, intersected, means
 from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.fusion.pairs import Gate
-from eidrive_scenario.fusion.report_memory import ReportMemory
-from eidrive_scenario.fusion.tracks import Table, move_on
+from eidrive_scenario.fusion.pairs import AssociationGate
+from eidrive_scenario.fusion.report_history import ReportHistory
+from eidrive_scenario.fusion.tracks import Table, predict_tracks
 from eidrive_scenario.settings import Settings
 
 Array = NDArray[np.float64]
@@ -56,14 +56,14 @@ class CovarianceIntersectionFusion(FusionMethod):
 
     def __init__(self, settings: CovarianceIntersectionSettings | None = None) -> None:
         self.settings = settings or CovarianceIntersectionSettings()
-        self._gate = Gate.of(self.settings.gate, self.settings.gate_distance)
-        self._memory = ReportMemory(self.settings.max_age, self._gate)
+        self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
+        self._memory = ReportHistory(self.settings.max_age, self._gate)
 
-    def hear(self, report: Report) -> None:
-        self._memory.hear(report)
+    def add_report(self, report: Report) -> None:
+        self._memory.add_report(report)
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        self._memory.forget(now)
+        self._memory.evict_stale(now)
         tracks = self._memory.tracks()
         names = self._memory.stations
         rank: dict[str | None, int] = {
@@ -75,9 +75,9 @@ class CovarianceIntersectionFusion(FusionMethod):
             return Detections(now)
         rows = rows[np.argsort(station[rows], kind="stable")]
         present = tracks[rows]
-        move_on(present, np.full(len(rows), now))
+        predict_tracks(present, np.full(len(rows), now))
         present["station"] = station[rows]
-        objects = grouped(present, self._gate)
+        objects = group_tracks(present, self._gate)
         return _joined(present, objects, now, self.settings.existence)
 
 
@@ -124,7 +124,7 @@ def _intersected(tracks: Table, objects: list[list[int]]) -> tuple[Array, Array]
     groups, count = objects, len(tracks)
     while pairs := [pair for members in groups for pair in zip(members[::2], members[1::2], strict=False)]:
         first, second = zip(*pairs, strict=True)
-        fresh, _ = intersected(known.take(first, axis=1), known.take(second, axis=1))
+        fresh, _ = intersect_batch(known.take(first, axis=1), known.take(second, axis=1))
         known = np.concatenate([known, fresh], axis=1)
         places = iter(range(count, count + len(pairs)))
         groups = [[*islice(places, len(members) // 2), *members[len(members) // 2 * 2 :]] for members in groups]

@@ -46,14 +46,14 @@ class EarlyFusion(CovarianceIntersectionFusion):
         self.early = settings or EarlyFusionSettings()
         super().__init__(self.early)
 
-    def cloud(self, readings: Readings) -> PointCloud | None:
+    def shared_cloud(self, readings: Readings) -> PointCloud | None:
         """The points of all LiDARs of a station as it sends them; None where none was read."""
         if not readings.lidars:
             return None
         points = np.concatenate([_to_world(reading) for reading in readings.lidars.values()])
         return compressed(points, readings.time, self.early.cell)
 
-    def joined(self, readings: Readings, heard: Sequence[Array]) -> Readings:
+    def merge_readings(self, readings: Readings, heard: Sequence[Array]) -> Readings:
         """The readings with points (N, 3) of others among those of the first LiDAR, as if it had measured them."""
         if not readings.lidars or not heard:
             return readings

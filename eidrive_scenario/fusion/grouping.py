@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from eidrive_scenario.fusion.pairs import Gate, Pairs, likely_pairs, matched_pairs
+from eidrive_scenario.fusion.pairs import AssociationGate, Pairs, assigned_pairs, gated_pairs
 from eidrive_scenario.fusion.tracks import Table
 
 
-def grouped(tracks: Table, gate: Gate) -> list[list[int]]:
+def group_tracks(tracks: Table, gate: AssociationGate) -> list[list[int]]:
     """The rows of each object, of tracks at one instant that are sorted by station.
 
     Station by station, tracks are given to the objects known so far, as many as possible and at the least cost; one to
@@ -19,7 +19,7 @@ def grouped(tracks: Table, gate: Gate) -> list[list[int]]:
     stations = tracks["station"].tolist()
     if stations[0] == stations[-1]:
         return [[row] for row in range(len(tracks))]
-    pairs = likely_pairs(tracks, tracks, gate, same_station=False)
+    pairs = gated_pairs(tracks, tracks, gate, same_station=False)
     return _cliques(stations, pairs) or _in_turn(stations, pairs)
 
 
@@ -74,4 +74,4 @@ def _assigned(
         [cost for _, cost in best.values()],
         [not outside for outside, _ in best.values()],
     )
-    return {row: found for found, row in matched_pairs(pairs)}
+    return {row: found for found, row in assigned_pairs(pairs)}

@@ -39,7 +39,7 @@ class FusionMethod(ABC):
     settings_type: ClassVar[type[Settings] | None] = None
     """What the property `fusion_settings` may say; nothing where None."""
 
-    def hear(self, report: Report) -> None:  # noqa: B027 - a hook for methods with a memory
+    def add_report(self, report: Report) -> None:  # noqa: B027 - a hook for methods with a memory
         """A report has come in: each one, in the order of arrival, before the next `fuse`. Also those that are older
         than another of their station, and those that do not say all that their station knows."""
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.fusion.association import matched
+from eidrive_scenario.fusion.association import assign
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -21,7 +21,7 @@ CERTAIN = -1e3
 """Cost of a pair whose station says that both are the same object: less than any other."""
 
 
-class Gate(NamedTuple):
+class AssociationGate(NamedTuple):
     """When two positions may be of one object.
 
     chi_square  squared Mahalanobis distance at most
@@ -32,7 +32,7 @@ class Gate(NamedTuple):
     distance: float
 
     @classmethod
-    def of(cls, probability: float, distance: float) -> Gate:
+    def of(cls, probability: float, distance: float) -> AssociationGate:
         """The gate that holds an estimate of the same object with this probability; in the plane, chi-square of 2."""
         return cls(-2.0 * math.log1p(-probability), distance)
 
@@ -47,7 +47,7 @@ class Pairs(NamedTuple):
     inside: list[bool]
 
 
-def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool) -> Pairs:
+def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_station: bool) -> Pairs:
     """Pairs of tracks that may be one object: of the same station, or the second of a later one than the first.
 
     They may by the gate, by the station's own number, or because the centre of one lies within half a width of the
@@ -89,12 +89,12 @@ def likely_pairs(first: Table, second: Table, gate: Gate, *, same_station: bool)
     return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
 
 
-def matched_pairs(pairs: Pairs) -> list[tuple[int, int]]:
+def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     """Those chosen: first within the gate, then among the rows that are left over."""
     if all(pairs.inside):
-        return matched(pairs.first, pairs.second, pairs.cost)
+        return assign(pairs.first, pairs.second, pairs.cost)
     chosen = (
-        matched(*zip(*(pair[:3] for pair in zip(*pairs, strict=True) if pair[3]), strict=True))
+        assign(*zip(*(pair[:3] for pair in zip(*pairs, strict=True) if pair[3]), strict=True))
         if any(pairs.inside)
         else []
     )
@@ -104,7 +104,7 @@ def matched_pairs(pairs: Pairs) -> list[tuple[int, int]]:
         for row, column, cost in zip(pairs.first, pairs.second, pairs.cost, strict=True)
         if row not in rows and column not in columns
     ]
-    return chosen + matched(*zip(*rest, strict=True)) if rest else chosen
+    return chosen + assign(*zip(*rest, strict=True)) if rest else chosen
 
 
 class _Side(NamedTuple):
@@ -123,7 +123,7 @@ class _Side(NamedTuple):
     reach: Array
 
     @classmethod
-    def of(cls, tracks: Table, gate: Gate) -> _Side:
+    def of(cls, tracks: Table, gate: AssociationGate) -> _Side:
         mean, covariance, pose, vague = (tracks[name] for name in ("mean", "covariance", "pose", "vague"))
         xx, yy = covariance[:, 0, 0] + pose[:, 0, 0], covariance[:, 1, 1] + pose[:, 1, 1]
         width = tracks["body"][:, 2]

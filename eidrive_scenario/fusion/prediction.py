@@ -14,7 +14,7 @@ _SPEED = np.diag([0.0, 0.0, 1.0, 1.0])
 _BOTH = np.eye(4, k=2) + np.eye(4, k=-2)
 
 
-def predicted(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
+def predict(mean: Array, covariance: Array, step: Array, turn: Array) -> tuple[Array, Array]:
     """States (N, 4) x y vx vy and covariances (N, 4, 4), each `step` (N,) [s] later, turning by `turn` (N,) [rad/s].
 
     White noise acceleration, and the coordinated turn of a known rate (Bar-Shalom, Li and Kirubarajan, Estimation with

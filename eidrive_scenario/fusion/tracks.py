@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import first_heading, known_turn, predicted_heading, updated_heading
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import Gate, likely_pairs, matched_pairs
-from eidrive_scenario.fusion.prediction import predicted
+from eidrive_scenario.fusion.pairs import AssociationGate, assigned_pairs, gated_pairs
+from eidrive_scenario.fusion.prediction import predict
 from eidrive_scenario.perception.existence import LIFETIME, detected, likelihood_ratio
 from eidrive_scenario.perception.existence import missed as after_miss
 from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
@@ -53,7 +53,7 @@ _ROW_OF_CLASS = {name: row for row, name in enumerate(CLASSES)}
 _MISC = _ROW_OF_CLASS["misc"]
 
 
-def first_seen(stations: Sequence[int], reports: Sequence[Report]) -> Table:
+def initiate_tracks(stations: Sequence[int], reports: Sequence[Report]) -> Table:
     """The objects of reports, a row each in their order, as if nothing had been known of them before.
 
     A box that is not finite, or has no size, is left out.
@@ -109,7 +109,7 @@ def pose_part(points: Array, x: float, y: float, covariance: Array) -> Array:
     return np.asarray(jacobian @ covariance @ np.swapaxes(jacobian, 1, 2))
 
 
-def move_on(tracks: Table, time: Array) -> None:
+def predict_tracks(tracks: Table, time: Array) -> None:
     """Predict these tracks to other times (N,) [s]."""
     step = time - tracks["time"]
     if not step.any():
@@ -117,28 +117,30 @@ def move_on(tracks: Table, time: Array) -> None:
     mean, covariance, heading, of_heading = (
         tracks[name] for name in ("mean", "covariance", "heading", "heading_covariance")
     )
-    mean[:], covariance[:] = predicted(mean, covariance, step, known_turn(heading, of_heading))
+    mean[:], covariance[:] = predict(mean, covariance, step, known_turn(heading, of_heading))
     heading[:], of_heading[:] = predicted_heading(heading, of_heading, step)
     tracks["existence"] *= np.exp(np.abs(step) / -LIFETIME)
     tracks["time"] = time
 
 
-def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: Gate, max_age: float) -> Table:
+def update_tracks(
+    tracks: Table, stations: Sequence[int], reports: Sequence[Report], gate: AssociationGate, max_age: float
+) -> Table:
     """The tracks after one report of each of these stations, none of which is older than what is known of it.
 
     What a station has not seen for `max_age` seconds it does not know any more. Tracks of other stations stay as they
     are. A report with velocities replaces what was known: its sender has seen the object over time, and to filter it
     again would count its past twice. Positions alone go through a Kalman filter.
     """
-    born = first_seen(stations, reports)
+    born = initiate_tracks(stations, reports)
     time_of = np.full(max(stations, default=0) + 1 + int(tracks["station"].max(initial=0)), np.nan)
     time_of[stations] = [report.detections.time for report in reports]
     times = time_of[tracks["station"]]
     concerned = np.isfinite(times)
     recent = times - tracks["seen"] <= max_age
     old = tracks[recent]
-    move_on(old, times[recent])
-    pairs = matched_pairs(likely_pairs(old, born, gate, same_station=True))
+    predict_tracks(old, times[recent])
+    pairs = assigned_pairs(gated_pairs(old, born, gate, same_station=True))
     rows = np.array([row for row, _ in pairs], dtype=np.intp)
     columns = np.array([column for _, column in pairs], dtype=np.intp)
     if len(rows) == len(old):
@@ -150,7 +152,7 @@ def advanced(tracks: Table, stations: Sequence[int], reports: Sequence[Report], 
         missed[rows] = False
         tracked = {station for station, report in zip(stations, reports, strict=True) if report.detections.tracks}
         silent = {station for station, report in zip(stations, reports, strict=True) if not report.complete}
-        _miss(old, missed, tracked, silent)
+        _coast(old, missed, tracked, silent)
         old = old[old["existence"] >= LEAST_EXISTENCE]
     parts = [old]
     if not concerned.all():
@@ -206,7 +208,7 @@ def _filtered(old: Table, new: Table) -> tuple[Array, Array]:
     return old["mean"] + (gain @ innovation[:, :, None])[:, :, 0], after
 
 
-def _miss(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: set[int]) -> None:
+def _coast(tracks: Table, missed: NDArray[np.bool_], tracked: set[int], silent: set[int]) -> None:
     """Objects that a report does not show: they may be gone. A station that tracks has judged that itself."""
     for row in np.flatnonzero(missed).tolist():
         station = int(tracks["station"][row])

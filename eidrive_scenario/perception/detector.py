@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Installation:
+class DetectorContext:
     """Where a detector works: the body that carries it, its sensors by name, the map, and the run's seed."""
 
     spec: ActorSpec
@@ -38,22 +38,22 @@ class Detector(ABC):
     A class is registered in the entry points `eidrive_scenario.detectors`. It is built as `cls()`, or as
     `cls(settings)` where it has a `settings_type`: an instance of that, read from the controller's property
     `detector_settings`. It may raise SettingError while it is built. Then `load_weights` is called before a run, but
-    not by `eidrive check`; then `install` is called once, and `detect` in each tick in which all kinds of sensors in
+    not by `eidrive check`; then `setup` is called once, and `detect` in each tick in which all kinds of sensors in
     `needs` were read.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset()
     """The kinds of sensors it reads: truth, camera, lidar."""
-    usual_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
+    default_sensors: ClassVar[Mapping[str, SensorSettings]] = {}
     """What a station gets, by name, that says nothing of its sensors; where empty, one of each kind in `needs`."""
-    gives_velocity: ClassVar[bool] = False
+    provides_velocity: ClassVar[bool] = False
     """Whether its boxes have velocities; those of others get them from a tracker, unless the station says otherwise."""
-    sees_signals: frozenset[str] = frozenset()
+    detectable_signals: frozenset[str] = frozenset()
     """The kinds of signals that it reads, out of `light` and `stop sign`; the others a station knows by the map and the
     line of sight."""
     settings_type: ClassVar[type[Settings] | None] = None
     """What the property `detector_settings` may say; nothing where None."""
-    pictures: Mapping[str, ImageDetections] = MappingProxyType({})
+    image_detections: Mapping[str, ImageDetections] = MappingProxyType({})
     """What it found in the last picture of each camera, if it looks at pictures: they are kept with the boxes."""
 
     def load_weights(self, *, allow_torchscript: bool = False) -> None:  # noqa: B027 - a hook that most do not need
@@ -62,7 +62,7 @@ class Detector(ABC):
         `allow_torchscript`: whether the user lets files of weights execute code.
         """
 
-    def install(self, installation: Installation) -> None:  # noqa: B027 - a hook that most do not need
+    def setup(self, installation: DetectorContext) -> None:  # noqa: B027 - a hook that most do not need
         """Learn where it works, before the first reading."""
 
     @abstractmethod
@@ -77,5 +77,5 @@ class Detector(ABC):
         return np.ones(len(boxes))
 
     def signals(self) -> Sequence[SignalReading]:
-        """The signals of the map that it found in the last readings, of the kinds that it `sees_signals` of."""
+        """Return the signals of the map found in the last readings, of the kinds in `detectable_signals`."""
         return ()

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.size_priors import prior_of
-from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import CameraReading
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class ByGround(NamedTuple):
 
 
 def lift_by_ground(
-    boxes: Array, classes: Sequence[str], camera: CameraReading, *, ground: float, surroundings: Surroundings
+    boxes: Array, classes: Sequence[str], camera: CameraReading, *, ground: float, surroundings: MapContext
 ) -> ByGround:
     """The boxes in the world that fill boxes (N, 4) of a picture [px].
 
@@ -147,7 +147,7 @@ class _View:
         self._known &= ~_behind_others(boxes)
         self._lowest = np.where(self._cut, CUT_DEVIATION, 0.0)
 
-    def place(self, ground: Array, surroundings: Surroundings) -> ByGround:
+    def place(self, ground: Array, surroundings: MapContext) -> ByGround:
         """What the boxes are, for heights (N,) of the ground."""
         count = len(self._sizes)
         start = self._first_guess(ground)

@@ -13,16 +13,16 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.lidar_geometry import (
     LevelFrame,
     Pattern,
     pattern_from_points,
     pattern_from_settings,
 )
-from eidrive_scenario.perception.lidar_objects import UNLIKELY, Found, objects
+from eidrive_scenario.perception.lidar_objects import UNLIKELY, FittedObject, objects
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.scan import Scan
-from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.perception.visibility import in_lidar
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
@@ -61,15 +61,15 @@ class LidarDetector(Detector):
 
     def __init__(self, settings: LidarDetectorSettings | None = None) -> None:
         self.settings = settings or LidarDetectorSettings()
-        self._surroundings = Surroundings(None)
+        self._surroundings = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._turns: dict[str, _Turn] = {}
         self._reach: dict[str, tuple[float, float]] = {}
         """Half the field of view [rad] and the range [m] of each sensor."""
 
-    def install(self, installation: Installation) -> None:
+    def setup(self, installation: DetectorContext) -> None:
         """Learn the map and the patterns of the sensors."""
-        self._surroundings = Surroundings(installation.roads, margin=self.settings.off_road or 0.0)
+        self._surroundings = MapContext(installation.roads, margin=self.settings.off_road or 0.0)
         for name, sensor in installation.sensors.items():
             if isinstance(sensor, LidarSettings):
                 self._patterns[name] = pattern_from_settings(sensor)
@@ -80,7 +80,7 @@ class LidarDetector(Detector):
         """The road users in the sweeps of all LiDARs of the station."""
         foot = float(readings.ego.position[2])
         restricted = self.settings.off_road is not None and self._surroundings.has_map
-        found: list[tuple[Found, LevelFrame]] = []
+        found: list[tuple[FittedObject, LevelFrame]] = []
         for name, reading in readings.lidars.items():
             pattern = self._patterns.get(name) or pattern_from_points(reading.points)
             turn = self._turns[name].add(readings.time, reading) if name in self._turns else reading
@@ -132,7 +132,7 @@ class _Turn:
         return LidarReading(np.concatenate([*points, reading.points]), np.concatenate(intensities), reading.pose)
 
 
-def _score(found: Found) -> float:
+def _score(found: FittedObject) -> float:
     """Half for five points that fit a class well; less where the size is unusual."""
     return len(found.rows) / (len(found.rows) + HALF_SURE) * math.exp(-found.fit.deviation / UNLIKELY)
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.box_fit import Fit
 from eidrive_scenario.perception.clustering import clusters
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.scan import Scan
 from eidrive_scenario.perception.size_priors import PRIORS
-from eidrive_scenario.perception.surroundings import Surroundings
 
 Integers = NDArray[np.int64]
 
@@ -32,14 +32,14 @@ TOUCHING = 0.2
 """Boxes this near to each other are taken to touch [m]."""
 
 
-class Found(NamedTuple):
+class FittedObject(NamedTuple):
     """The points of one object, as rows of the scan, and the box around it."""
 
     rows: Integers
     fit: Fit
 
 
-def objects(scan: Scan, surroundings: Surroundings, least_points: int) -> list[Found]:
+def objects(scan: Scan, surroundings: MapContext, least_points: int) -> list[FittedObject]:
     """The objects of a scan that have at least so many points.
 
     A cluster that fits no class is taken apart where its points lie apart; clusters whose boxes overlap are put
@@ -59,7 +59,7 @@ def objects(scan: Scan, surroundings: Surroundings, least_points: int) -> list[F
     return [one for one in _joined(scan, whole) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
 
 
-def _fitted(scan: Scan, surroundings: Surroundings, groups: list[Integers], least_points: int) -> list[Found]:
+def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], least_points: int) -> list[FittedObject]:
     groups = [rows for rows in groups if len(rows) >= least_points]
     headings = np.full(len(groups), np.nan)
     few = [number for number, rows in enumerate(groups) if len(rows) < FEW]
@@ -70,20 +70,20 @@ def _fitted(scan: Scan, surroundings: Surroundings, groups: list[Integers], leas
     for rows, heading in zip(groups, headings.tolist(), strict=True):
         fit = scan.fit(rows, tuple(PRIORS), heading if math.isfinite(heading) else None)
         if fit is not None:
-            found.append(Found(rows, fit))
+            found.append(FittedObject(rows, fit))
         elif len(rows) > least_points:
             found += _taken_apart(scan, rows, least_points)
     return found
 
 
-def _taken_apart(scan: Scan, rows: Integers, least_points: int) -> list[Found]:
+def _taken_apart(scan: Scan, rows: Integers, least_points: int) -> list[FittedObject]:
     """The pieces of what is larger than any road user."""
     parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
     fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= least_points]
-    return [Found(part, fit) for part, fit in fits if fit is not None]
+    return [FittedObject(part, fit) for part, fit in fits if fit is not None]
 
 
-def _joined(scan: Scan, found: list[Found]) -> list[Found]:
+def _joined(scan: Scan, found: list[FittedObject]) -> list[FittedObject]:
     """The same objects, two boxes of which overlap put together where one box fits the points of both.
 
     Two bodies cannot be in one place, and hardly ever touch: such boxes are pieces of one that something nearer cuts in
@@ -99,7 +99,7 @@ def _joined(scan: Scan, found: list[Found]) -> list[Found]:
                 fit = scan.fit(rows, tuple(PRIORS))
                 if fit is not None and fit.deviation <= DOUBTFUL:
                     whole = [thing for thing in whole if thing is not one and thing is not other]
-                    whole.append(Found(rows, fit))
+                    whole.append(FittedObject(rows, fit))
                     again = True
                     break
     return whole

@@ -16,10 +16,10 @@ from eidrive_scenario.perception.box_fit import Fit
 from eidrive_scenario.perception.clustering import clusters
 from eidrive_scenario.perception.ground_lifting import AT_BORDER, ByGround, lift_by_ground
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_points
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.perception.scan import Scan
 from eidrive_scenario.perception.size_priors import prior_of
-from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def lift(
     *,
     time: float,
     ground: float = 0.0,
-    surroundings: Surroundings | None = None,
+    surroundings: MapContext | None = None,
     pattern: Pattern | None = None,
 ) -> Detections:
     """The objects in the world that a detector of pictures saw, one for each box, in the order given.
@@ -82,7 +82,7 @@ def lift(
     `lift_by_ground` puts it. Velocities are unknown.
     """
     boxes = np.asarray(boxes, dtype=float).reshape(-1, 4)
-    surroundings = surroundings or Surroundings(None)
+    surroundings = surroundings or MapContext(None)
     by_ground = lift_by_ground(boxes, classes, camera, ground=ground, surroundings=surroundings)
     lifted, covariance = by_ground.boxes, by_ground.covariance
     if lidar is not None and len(boxes):

@@ -148,7 +148,7 @@ class Localizer:
             raise ValueError("there is no estimate before the first reading")
         return self._filter.estimate
 
-    def located(self, readings: Readings) -> Readings:
+    def with_estimated_pose(self, readings: Readings) -> Readings:
         """The readings with the estimated motion, and the poses of the sensors that follow from it."""
         truth = readings.ego
         if self._filter is None:

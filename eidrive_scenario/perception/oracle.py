@@ -19,7 +19,7 @@ class OracleDetector(Detector):
     """Exact boxes, classes and velocities of the objects that the truth sensor has in its line of sight, score 1."""
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
-    gives_velocity: ClassVar[bool] = True
+    provides_velocity: ClassVar[bool] = True
 
     def detect(self, readings: Readings) -> Detections:
         truth = readings.truth

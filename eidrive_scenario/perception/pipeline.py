@@ -55,7 +55,7 @@ class Perception:
 
     def locate(self, readings: Readings) -> Readings:
         """The readings as the station can know them, if it has to find out by itself where it is."""
-        return readings if self._localizer is None else self._localizer.located(readings)
+        return readings if self._localizer is None else self._localizer.with_estimated_pose(readings)
 
     def signals(self, readings: Readings) -> Sequence[SignalReading]:
         """The traffic lights and stop signs in sight: those that the detector reads, and the lookout's."""

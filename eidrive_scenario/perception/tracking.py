@@ -83,8 +83,8 @@ class Tracker:
         for row, column in zip(rows, columns, strict=True):
             self._life[row].see(detections, column)
         taken = set(columns)
-        self._begin(detections, [column for column in range(len(detections)) if column not in taken], noise)
-        self._bury(detections.time)
+        self._initiate(detections, [column for column in range(len(detections)) if column not in taken], noise)
+        self._delete(detections.time)
         return self._reported(detections.time)
 
     def _judge(
@@ -142,7 +142,7 @@ class Tracker:
         turned = np.where(np.cos(turned - course) < math.cos(math.pi / 4), held, turned)
         return np.asarray(held + share * ((turned - held + math.pi) % (2.0 * math.pi) - math.pi))
 
-    def _begin(self, detections: Detections, columns: list[int], noise: Array) -> None:
+    def _initiate(self, detections: Detections, columns: list[int], noise: Array) -> None:
         if not columns:
             return
         boxes = detections.boxes[columns]
@@ -158,7 +158,7 @@ class Tracker:
             life.see(detections, column)
             self._life.append(life)
 
-    def _bury(self, now: float) -> None:
+    def _delete(self, now: float) -> None:
         """Delete tracks that cannot be confirmed any more, hardly exist, or have coasted for too long."""
         existence = self._existence.tolist()
         kept = [

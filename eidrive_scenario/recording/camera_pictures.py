@@ -57,7 +57,7 @@ class CameraPictures:
         if self._stations is None:
             return
         for station, readings in self._stations.readings.items():
-            found = self._stations.detector(station).pictures
+            found = self._stations.detector(station).image_detections
             for camera, reading in readings.cameras.items():
                 if camera in found:
                     picture = drawn(reading.rgb, found[camera])

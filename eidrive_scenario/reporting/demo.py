@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.text import Text
 
-from eidrive_scenario.driving.settings import agent_settings, is_agent
+from eidrive_scenario.driving.settings import agent_settings, is_agent_controller
 from eidrive_scenario.errors import EidriveError, InputError
 from eidrive_scenario.experiments.paper import (
     EGO,
@@ -65,7 +65,7 @@ def conflict_areas(scenario: Scenario) -> tuple[Array, ...]:
     return tuple(
         np.array(polygon)
         for controller in scenario.controllers.get(EGO, ())
-        if is_agent(controller)
+        if is_agent_controller(controller)
         for polygon in agent_settings(controller).conflict_area or ()
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.received_objects import ReceivedObjects
+from eidrive_scenario.driving.partial_reports import PartialReportAssembler
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
@@ -47,7 +47,7 @@ class Knowledge:
     def __init__(self, station: str) -> None:
         self.station = station
         self._heard: dict[tuple[str, str], ReceivedMessage] = {}
-        self._partial: dict[str, ReceivedObjects] = {}
+        self._partial: dict[str, PartialReportAssembler] = {}
         self._links: dict[str, LinkEvent] = {}
         self._own_travels = False
 
@@ -81,7 +81,7 @@ class Knowledge:
         message = received.message
         if message.objects is not None:
             usual = USUAL.lifetime(complete=False)
-            said = self._partial.setdefault(message.sender, ReceivedObjects(usual)).take(message)
+            said = self._partial.setdefault(message.sender, PartialReportAssembler(usual)).update(message)
             received = replace(received, message=replace(message, detections=said))
         key = message.sender, message.kind
         held = self._heard.get(key)

@@ -20,7 +20,7 @@ from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.output import create
 from eidrive_scenario.reporting.street_view import look_at
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -78,14 +78,14 @@ def street() -> World:
 
 def contact_sheet(weathers: list[Weather], camera: CameraSettings = CAMERA) -> NDArray[np.uint8]:
     """A picture (H, W, 3): a row for each weather, a column for each view, captions above."""
-    photographer = Photographer(camera)
+    photographer = ImageSensor(camera)
     rows = []
     with street() as world:
         for weather in weathers:
             world.set_weather(weather)
             row: list[NDArray[np.uint8]] = []
             for number, (view, pose, own) in enumerate(_VIEWS):
-                reading = photographer.take(
+                reading = photographer.capture(
                     world,
                     pose,
                     generator(1, "weather sheet", number),

@@ -13,18 +13,18 @@ from eidrive_scenario.roads.model import (
     SignalController,
     SignalPlace,
 )
-from eidrive_scenario.roads.movement import Branch, Choose
+from eidrive_scenario.roads.movement import Branch, BranchSelector
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
-from eidrive_scenario.roads.preferences import Cost, by_chance, fastest, fewest_junctions
 from eidrive_scenario.roads.route import Route
+from eidrive_scenario.roads.route_costs import Cost, fastest, fewest_junctions, random_costs
 from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
 
 __all__ = [
     "KINDS",
     "Branch",
+    "BranchSelector",
     "Chain",
-    "Choose",
     "Cost",
     "Junction",
     "Lane",
@@ -45,10 +45,10 @@ __all__ = [
     "SignalController",
     "SignalPlace",
     "SurfaceMesh",
-    "by_chance",
     "fastest",
     "fewest_junctions",
     "outlines",
     "placed_objects",
+    "random_costs",
     "surface_meshes",
 ]

@@ -21,7 +21,7 @@ from eidrive_scenario.roads.model import (
 from eidrive_scenario.roads.movement import driving_direction
 
 
-class Roads:
+class RoadAttributes:
     """The roads, junctions, signals and objects of a map, and what holds where on them."""
 
     def __init__(self, road_map: RoadMap) -> None:

@@ -10,7 +10,7 @@ from eidrive_scenario.roads.links import LaneLinks
 from eidrive_scenario.roads.location import LaneLocation
 from eidrive_scenario.roads.model import Road
 from eidrive_scenario.roads.movement import driving_direction
-from eidrive_scenario.roads.preferences import JUNCTION_COST
+from eidrive_scenario.roads.route_costs import JUNCTION_COST
 
 Chain = Literal["shortest", "fastest", "leastIntersections"]
 """Which chain of roads a distance is measured along."""

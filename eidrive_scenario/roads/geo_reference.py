@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.roads.geodesy import (
     CARLA_RADIUS,
-    Frame,
     GeoReference,
     LambertConformalConic,
     Mercator,
     Projection,
+    TangentFrame,
     TransverseMercator,
 )
 from eidrive_scenario.roads.geodetic_datum import DATUMS, ELLIPSOIDS, Ellipsoid, Shift
@@ -35,7 +35,9 @@ def parse_geo_reference(text: str) -> GeoReference:
             raise ValueError(f"the map's geoReference is {text.strip()[:60]!r}, which is no PROJ text")
         sphere = Ellipsoid(CARLA_RADIUS, 0.0)
         latitude = _angle(said, "lat_0")
-        return GeoReference(Mercator(sphere, Frame(latitude, _angle(said, "lon_0"), scale=math.cos(latitude))), sphere)
+        return GeoReference(
+            Mercator(sphere, TangentFrame(latitude, _angle(said, "lon_0"), scale=math.cos(latitude))), sphere
+        )
     kind = said["proj"]
     if kind not in PROJECTIONS:
         raise ValueError(f"the map's projection is {kind!r}; {suggestion(kind, PROJECTIONS)}")
@@ -57,17 +59,17 @@ def _projection(kind: str, said: Mapping[str, str], ellipsoid: Ellipsoid) -> Pro
             raise ValueError(f"the map's UTM zone is {said.get('zone', 'missing')!r}, and 1 to 60 are expected")
         middle = math.radians(6.0 * int(zone) - 183.0)
         north = UTM_SOUTHERN_NORTHING if "south" in said else 0.0
-        return TransverseMercator(ellipsoid, Frame(0.0, middle, UTM_EASTING, north, UTM_SCALE))
+        return TransverseMercator(ellipsoid, TangentFrame(0.0, middle, UTM_EASTING, north, UTM_SCALE))
     if kind in ("tmerc", "etmerc"):
-        return TransverseMercator(ellipsoid, Frame(latitude, longitude, x, y, scale))
+        return TransverseMercator(ellipsoid, TangentFrame(latitude, longitude, x, y, scale))
     if kind == "lcc":
         first = _angle(said, "lat_1" if "lat_1" in said else "lat_0")
         second = _angle(said, "lat_2") if "lat_2" in said else first
-        return LambertConformalConic(ellipsoid, Frame(latitude, longitude, x, y, scale), first, second)
+        return LambertConformalConic(ellipsoid, TangentFrame(latitude, longitude, x, y, scale), first, second)
     if "lat_ts" in said:
         true = _angle(said, "lat_ts")
         scale = math.cos(true) / math.sqrt(1.0 - (ellipsoid.eccentricity * math.sin(true)) ** 2)
-    return Mercator(ellipsoid, Frame(0.0, longitude, x, y, scale))
+    return Mercator(ellipsoid, TangentFrame(0.0, longitude, x, y, scale))
 
 
 def _datum(said: Mapping[str, str]) -> tuple[Ellipsoid, Shift | None]:

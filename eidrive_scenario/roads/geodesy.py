@@ -16,7 +16,7 @@ CARLA_RADIUS = 6_378_137.0
 
 
 @dataclass(frozen=True)
-class Frame:
+class TangentFrame:
     """Where a projection has its origin: latitude and longitude [rad], false easting and northing [m], scale."""
 
     latitude: float = 0.0
@@ -29,7 +29,7 @@ class Frame:
 class TransverseMercator:
     """Also UTM and Gauss-Krüger."""
 
-    def __init__(self, ellipsoid: Ellipsoid, frame: Frame) -> None:
+    def __init__(self, ellipsoid: Ellipsoid, frame: TangentFrame) -> None:
         n = ellipsoid.flattening / (2.0 - ellipsoid.flattening)
         self._eccentricity = ellipsoid.eccentricity
         self._frame = frame
@@ -63,7 +63,7 @@ class TransverseMercator:
 class Mercator:
     """Upright Mercator; on a sphere also the one of web maps and of CARLA."""
 
-    def __init__(self, ellipsoid: Ellipsoid, frame: Frame) -> None:
+    def __init__(self, ellipsoid: Ellipsoid, frame: TangentFrame) -> None:
         self._eccentricity, self._radius, self._frame = ellipsoid.eccentricity, ellipsoid.axis, frame
 
     def __call__(self, latitude: float, longitude: float) -> tuple[float, float]:
@@ -76,7 +76,7 @@ class Mercator:
 class LambertConformalConic:
     """On one or two standard parallels [rad]."""
 
-    def __init__(self, ellipsoid: Ellipsoid, frame: Frame, first: float, second: float) -> None:
+    def __init__(self, ellipsoid: Ellipsoid, frame: TangentFrame, first: float, second: float) -> None:
         self._eccentricity, self._frame = ellipsoid.eccentricity, frame
         width, steepness = self._width(first), math.sin(first)
         if abs(first - second) > 1e-10:

@@ -16,7 +16,7 @@ from eidrive_scenario.roads.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model import Lane, LaneSection, Road
 from eidrive_scenario.roads.movement import driving_direction
 from eidrive_scenario.roads.poses import lane_at
-from eidrive_scenario.roads.preferences import Cost
+from eidrive_scenario.roads.route_costs import Cost
 from eidrive_scenario.roads.tables import RoadTables
 
 if TYPE_CHECKING:

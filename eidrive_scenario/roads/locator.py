@@ -87,7 +87,7 @@ class Locator:
             outside=outside,
         )
 
-    def touched(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
+    def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
         """Every lane beneath points (N,): its row, s on its road, and the point's number."""
         found = self.locate(x, y, z)
         on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))

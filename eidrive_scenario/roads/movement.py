@@ -33,7 +33,7 @@ class Branch(NamedTuple):
     turn: float
 
 
-Choose = Callable[[Sequence[Branch]], Branch]
+BranchSelector = Callable[[Sequence[Branch]], Branch]
 
 
 def driving_direction(road: Road, lane_id: int) -> int:
@@ -56,7 +56,7 @@ class Movement:
         location: LaneLocation,
         distance: float,
         route: Route | None = None,
-        choose: Choose | None = None,
+        choose: BranchSelector | None = None,
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
@@ -110,7 +110,7 @@ class Movement:
         with_traffic: bool,
         offset: float,
         route: Route | None,
-        choose: Choose | None,
+        choose: BranchSelector | None,
         visit: int,
     ) -> tuple[LaneKey, int, float] | None:
         key = LaneKey(road.id, section.index, lane.id)

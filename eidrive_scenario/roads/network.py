@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads import poses
-from eidrive_scenario.roads.attributes import Roads
+from eidrive_scenario.roads.attributes import RoadAttributes
 from eidrive_scenario.roads.distance import Chain, RoadDistances
 from eidrive_scenario.roads.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.geodesy import GeoReference
@@ -24,18 +24,18 @@ from eidrive_scenario.roads.locator import REACH, Locator
 from eidrive_scenario.roads.map_checks import check_road_map
 from eidrive_scenario.roads.map_warnings import group_map_warnings
 from eidrive_scenario.roads.model import RoadMap
-from eidrive_scenario.roads.movement import Choose, Movement, driving_direction
+from eidrive_scenario.roads.movement import BranchSelector, Movement, driving_direction
 from eidrive_scenario.roads.nearby import locate_near
-from eidrive_scenario.roads.preferences import Cost, speed_on
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
-from eidrive_scenario.roads.route import Route, joined
+from eidrive_scenario.roads.route import Route, concatenate_routes
+from eidrive_scenario.roads.route_costs import Cost, speed_on
 from eidrive_scenario.roads.tables import RoadTables
 
 KEPT = 2
 """So many networks of files are kept for the next run."""
 
 
-class RoadNetwork(Roads):
+class RoadNetwork(RoadAttributes):
     """Roads, lanes, junctions, signals and objects of one OpenDRIVE file, with their geometry.
 
     Coordinates as in the standard: s along a road's reference line, t to its left, lane ids positive to the left.
@@ -161,7 +161,7 @@ class RoadNetwork(Roads):
 
         Outside junctions that is one lane at most; in a junction, one for each connecting road beneath the point.
         """
-        return self._locator.touched(x, y, z)
+        return self._locator.overlapped_lanes(x, y, z)
 
     def locate_at(
         self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH
@@ -200,7 +200,7 @@ class RoadNetwork(Roads):
         distance: float,
         *,
         route: Route | None = None,
-        choose: Choose | None = None,
+        choose: BranchSelector | None = None,
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
@@ -230,7 +230,7 @@ class RoadNetwork(Roads):
             Route(self.tables, find_lanes(self.graph, self.roads, a, b, cost), a, b)
             for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
         ]
-        return parts[0] if len(parts) == 1 else joined(parts)
+        return parts[0] if len(parts) == 1 else concatenate_routes(parts)
 
     def distance(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None

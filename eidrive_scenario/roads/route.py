@@ -245,7 +245,7 @@ class Route:
             return t
         span = min(abs(leg.s_end - leg.s), LANE_CHANGE_LENGTH)
         part = min(abs(s - leg.s) / span, 1.0) if span > 0.0 else 1.0
-        return t + eased(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
+        return t + smoothstep(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
 
     @cached_property
     def _course(self) -> tuple[Array, Array, Array, Array]:
@@ -269,7 +269,7 @@ class Route:
             begin = np.array([leg.s for leg in legs])[leg_of]
             part = np.divide(np.abs(s[changes] - begin), span, out=np.ones_like(span), where=span > 0.0)
             t_end = tables.lane_t(row_end[leg_of], s[changes])[0]
-            t[changes] += eased(np.minimum(part, 1.0)) * (t_end - t[changes])
+            t[changes] += smoothstep(np.minimum(part, 1.0)) * (t_end - t[changes])
         road = tables.section_road[tables.lane_section[row]]
         points = np.column_stack(tables.road_poses(road[owner], s, t)[:3])
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
@@ -279,12 +279,12 @@ class Route:
 Share = TypeVar("Share", float, Array)
 
 
-def eased(part: Share) -> Share:
+def smoothstep(part: Share) -> Share:
     """How much of a lane change is done at a share of its length: no jump of curvature at either end."""
     return part**3 * (10.0 + part * (6.0 * part - 15.0))
 
 
-def joined(routes: Sequence[Route]) -> Route:
+def concatenate_routes(routes: Sequence[Route]) -> Route:
     """Several routes, each beginning where the one before ends, as one."""
     lanes = list(routes[0].lanes)
     for route in routes[1:]:

@@ -35,14 +35,14 @@ class Camera:
         self.settings = settings
         self.name = name
         self.mounting = mounting(settings, spec, "front")
-        self._photographer = Photographer(settings)
+        self._photographer = ImageSensor(settings)
         self._unseen = (spec.name,) if spec.wheelbase <= 0.0 else ()
         self._key = (seed, "camera", spec.name, name)
 
     def read(self, scene: Scene, view: WorldView, row: int) -> CameraReading:
         """A picture from the actor in this row."""
         seed, *key = self._key
-        return self._photographer.take(
+        return self._photographer.capture(
             scene,
             self.mounting.camera_pose(view, row),
             generator(seed, *key, view.tick),
@@ -52,7 +52,7 @@ class Camera:
         )
 
 
-class Photographer:
+class ImageSensor:
     """Takes pictures with a camera of these settings, from anywhere."""
 
     def __init__(self, settings: CameraSettings) -> None:
@@ -61,7 +61,7 @@ class Photographer:
         self.intrinsics = self._lens.intrinsics
         self._optics = Optics(settings)
 
-    def take(
+    def capture(
         self,
         scene: Scene,
         pose: Array,

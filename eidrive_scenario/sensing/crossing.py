@@ -40,7 +40,7 @@ def crossing(origins: Array, targets: Array, boxes: Array) -> tuple[Array, Array
     return enter, leave
 
 
-def past_box(origins: Array, targets: Array, boxes: Array) -> Array:
+def is_occluded_by(origins: Array, targets: Array, boxes: Array) -> Array:
     """(P, K, 3) starts of the rays: behind the box where a ray crosses it on its way, else where it was."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
@@ -48,8 +48,8 @@ def past_box(origins: Array, targets: Array, boxes: Array) -> Array:
     return np.asarray(origins + share[..., None] * (targets - origins))
 
 
-def few_past_box(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
-    """The same as `past_box` in plain numbers, for a few rays from one origin.
+def is_occluded_by_small(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
+    """The same as `is_occluded_by` in plain numbers, for a few rays from one origin.
 
     Targets that lie above each other are quicker where they come one after the other.
     """

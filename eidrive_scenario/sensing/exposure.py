@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
-from eidrive_scenario.world.render.tones import toned, white_level
+from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 
 Floats = NDArray[np.float32]
 
@@ -64,7 +64,7 @@ def develop(
         signal = light[part] * np.float32(1.0 / exposure.saturation)
         if noise is not None:
             signal += noise_of(signal, exposure, noise, draws)
-        shown[part] = toned(signal)
+        shown[part] = tone_map(signal)
     return picture
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.crossing import crossing, past_box
+from eidrive_scenario.sensing.crossing import crossing, is_occluded_by
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import LidarReading
@@ -56,12 +56,12 @@ class Lidar:
         targets = origin + settings.range * ways
         own = view.boxes[row][None]
         if self._on_mast:
-            starts, clear = past_box(origin[None], targets[None], own)[0], np.arange(len(origin))
+            starts, clear = is_occluded_by(origin[None], targets[None], own)[0], np.arange(len(origin))
         else:
             enter, leave = crossing(origin[None], targets[None], own)
             starts, clear = origin, np.flatnonzero(~((enter < leave) & (leave > 0.0))[0])
         named = {"sensor": self.name} if view.unseen_by else {}
-        hits = scene.cast(np.ascontiguousarray(starts[clear]), targets[clear], **named)
+        hits = scene.raycast(np.ascontiguousarray(starts[clear]), targets[clear], **named)
         rows = np.asarray(hits.rows)
         met = rows != NOTHING
         begin = np.linalg.norm(starts[clear] - pose[:3, 3], axis=1) if self._on_mast else 0.0

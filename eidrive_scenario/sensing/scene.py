@@ -18,7 +18,7 @@ NOTHING = -2
 """In RayHits.rows: the ray met nothing. -1 is the ground, the road or a building."""
 
 
-class RayHits(Protocol):
+class RayHitsView(Protocol):
     """Where each of M rays ended first."""
 
     @property
@@ -41,11 +41,11 @@ class Scene(Protocol):
     def weather(self) -> Weather:
         """The weather at present."""
 
-    def cast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHits:
+    def raycast(self, origins: Array, targets: Array, *, sensor: str = "") -> RayHitsView:
         """Rays from (M, 3) to (M, 3) [m], of the sensor of this name, which may not see some actors."""
 
-    def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
-        """The same rows as of `cast`, for a few rays in plain numbers."""
+    def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> Sequence[int]:
+        """The same rows as of `raycast`, for a few rays in plain numbers."""
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """The light that a camera receives; pose (4, 4) camera to world, x right, y down, z forward."""

@@ -14,7 +14,7 @@ from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.scene import NOTHING, Scene
 from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.furniture import signal_heads
+from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.view import WorldView
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ BEFORE = 0.4
 """Rays end this much before the face, as it has a housing [m]."""
 
 
-class SignalLookout:
+class SignalSensor:
     """Reads signals of some kinds, out of SIGNAL_KINDS, that face the station, within range and in the line of sight.
 
     It looks ahead and aside from the roof, so that a vehicle at its stop line still sees a light beside it. A stop sign
@@ -60,7 +60,7 @@ class SignalLookout:
         near = np.flatnonzero((distance <= RANGE) & before & ahead)
         if not near.size:
             return ()
-        hits = scene.cast(np.broadcast_to(eye, (near.size, 3)).copy(), self._faces[near])
+        hits = scene.raycast(np.broadcast_to(eye, (near.size, 3)).copy(), self._faces[near])
         seen = near[np.asarray(hits.rows) == NOTHING]
         return tuple(SignalReading(self._ids[index], states.get(self._ids[index], "")) for index in seen.tolist())
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.sensing.crossing import few_past_box, past_box
+from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_small
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
@@ -152,9 +152,9 @@ def visibilities(
     mounts = np.array([sensor.mounting.position(view, row) for sensor, row in zip(sensors, own, strict=True)])
     points = _points(boxes[target_of])
     origins = np.repeat(mounts[sensor_of][:, None], len(SAMPLES), axis=1)
-    starts = past_box(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
+    starts = is_occluded_by(origins, points, boxes[np.asarray(own, dtype=np.intp)[sensor_of]])
     begin, end = starts.reshape(-1, 3), points.reshape(-1, 3)
-    hits = scene.cast(begin, end, sensor=name) if name else scene.cast(begin, end)
+    hits = scene.raycast(begin, end, sensor=name) if name else scene.raycast(begin, end)
     met = np.asarray(hits.rows).reshape(len(target_of), len(SAMPLES))
     in_sight = (met == target_of[:, None]) | (met == NOTHING)
     shares: list[float] = in_sight.mean(axis=1).tolist()
@@ -173,9 +173,13 @@ def few_visibilities(
             origin, body = sensor.mounting.position(view, station), boxes[station]
             for row in rows:
                 aims = _few_points(boxes[row])
-                starts += [origin] * len(aims) if _above(origin, body, boxes[row]) else few_past_box(origin, aims, body)
+                starts += (
+                    [origin] * len(aims)
+                    if _above(origin, body, boxes[row])
+                    else is_occluded_by_small(origin, aims, body)
+                )
                 points += aims
-    met = scene.first_met(starts, points)
+    met = scene.first_hit(starts, points)
     shares, number = [], len(SAMPLES)
     for index, row in enumerate([row for rows in targets for row in rows]):
         part = met[index * number : (index + 1) * number]

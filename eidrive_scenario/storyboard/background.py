@@ -9,7 +9,7 @@ from functools import cached_property
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.commands import Commands
 from eidrive_scenario.traffic.background import BackgroundTraffic
-from eidrive_scenario.traffic.instances import Centre, Instance
+from eidrive_scenario.traffic.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.world.view import WorldView
 
 
@@ -26,7 +26,7 @@ class BackgroundTrafficPort:
         roads: RoadNetwork | None,
         *,
         seed: int,
-        centre: Callable[[str], Centre | None],
+        centre: Callable[[str], CentralObject | None],
         taken: frozenset[str],
         must_stop: Callable[[str], bool],
     ) -> None:
@@ -51,7 +51,7 @@ class BackgroundTrafficPort:
         """All cars that are there."""
         return self.traffic.names if self._started else ()
 
-    def start(self, instance: Instance) -> None:
+    def start(self, instance: TrafficGenerator) -> None:
         """An instance begins: its first cars enter in this tick, or in the first one where it begins in Init."""
         self.traffic.start(instance)
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads import Choose, LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.route_lanes import RouteLanes
 from eidrive_scenario.world.actor import Placement
 
@@ -65,7 +65,7 @@ class Motion:
         self._route: Route | None = None
         self._visit = 0
         self._route_lanes = RouteLanes(roads) if roads is not None else None
-        self.branch_selector: Choose | None = None
+        self.branch_selector: BranchSelector | None = None
         """Picks a branch at forks that the route leaves open; None takes the straightest."""
         self.end_of_road = False
         self._steering: LateralStep | None = None

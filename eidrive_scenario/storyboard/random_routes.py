@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.roads import Branch, Choose, LaneKey, LaneLocation, RoadNetwork, Route
+from eidrive_scenario.roads import Branch, BranchSelector, LaneKey, LaneLocation, RoadNetwork, Route
 
 
-def uniform_branch_selector(generator: np.random.Generator) -> Choose:
+def uniform_branch_selector(generator: np.random.Generator) -> BranchSelector:
     """Chooses anew at each fork."""
 
     def choose(branches: Sequence[Branch]) -> Branch:
@@ -18,7 +18,7 @@ def uniform_branch_selector(generator: np.random.Generator) -> Choose:
     return choose
 
 
-def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose: Choose) -> Route:
+def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose: BranchSelector) -> Route:
     """A way from a place on, at least `length` metres long unless the road ends before."""
     road = roads.road(start.road)
     direction = roads.driving_direction(start.road, start.lane)

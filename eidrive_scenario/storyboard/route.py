@@ -14,9 +14,9 @@ from eidrive_scenario.roads import (
     RoadNetwork,
     Route,
     RouteError,
-    by_chance,
     fastest,
     fewest_junctions,
+    random_costs,
 )
 from eidrive_scenario.storyboard.motion import ResolvedPosition
 
@@ -84,5 +84,5 @@ def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cos
     if strategy is model.RouteStrategy.LEAST_INTERSECTIONS:
         return fewest_junctions(roads)
     if strategy is model.RouteStrategy.RANDOM:
-        return by_chance(roads, generator(seed, "route", route.name, number))
+        return random_costs(roads, generator(seed, "route", route.name, number))
     return None

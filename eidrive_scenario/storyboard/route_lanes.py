@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, Route
 from eidrive_scenario.roads.poses import lane_t
-from eidrive_scenario.roads.route import LANE_CHANGE_LENGTH, eased
+from eidrive_scenario.roads.route import LANE_CHANGE_LENGTH, smoothstep
 
 SHORTEST = 1.0
 """On less than this nobody changes lanes [m]."""
@@ -57,7 +57,7 @@ class RouteLanes:
         done = part >= 1.0
         if done:
             self._change = None
-        aside = change.offset + eased(part) * (after - before)
+        aside = change.offset + smoothstep(part) * (after - before)
         return (change.after, aside + before - after, done) if part > 0.5 else (change.before, aside, done)
 
     def _needed(self, here: LaneLocation, section: int, way: int, route: Route, visit: int) -> LaneChange | None:

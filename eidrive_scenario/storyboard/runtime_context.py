@@ -16,7 +16,7 @@ from eidrive_scenario.storyboard.domains import Domain
 from eidrive_scenario.storyboard.element_states import ElementStates
 from eidrive_scenario.storyboard.motion import ResolvedPosition
 from eidrive_scenario.storyboard.signals import Signals
-from eidrive_scenario.traffic.instances import Centre
+from eidrive_scenario.traffic.generators import CentralObject
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
@@ -173,7 +173,7 @@ class RuntimeContext:
         row = self.view.rows.get(name)
         return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
 
-    def _centre(self, name: str) -> Centre | None:
+    def _centre(self, name: str) -> CentralObject | None:
         """Where an entity is and moves, for the traffic around it; None while it is not in the world."""
         actor = self.actors.get(name)
         if actor is None or not actor.present:
@@ -181,9 +181,9 @@ class RuntimeContext:
         row = self.view.rows.get(name)
         if row is None:
             pose = actor.motion.pose
-            return Centre(pose.x, pose.y, pose.h, actor.motion.speed)
+            return CentralObject(pose.x, pose.y, pose.h, actor.motion.speed)
         state = self.view.states[row]
-        return Centre(state.x, state.y, state.yaw, state.speed)
+        return CentralObject(state.x, state.y, state.yaw, state.speed)
 
     def add_actor(self, name: str, place: ResolvedPosition) -> None:
         """Put an actor at a place; it enters the world if it was not there."""

@@ -2,12 +2,12 @@
 
 from eidrive_scenario.traffic.areas import Cursor, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.background import BackgroundTraffic, Changes
-from eidrive_scenario.traffic.bodies import Mixture, Participant
+from eidrive_scenario.traffic.bodies import Participant, TrafficMix
 from eidrive_scenario.traffic.fleet import Fleet
+from eidrive_scenario.traffic.generators import Area, Sink, Source, Swarm, TrafficGenerator
 from eidrive_scenario.traffic.idm import IntelligentDriver
-from eidrive_scenario.traffic.instances import Area, Instance, Sink, Source, Swarm
 from eidrive_scenario.traffic.mobil import LaneChanger
-from eidrive_scenario.traffic.sites import Sites, around
+from eidrive_scenario.traffic.sites import SpawnSites, sites_within_radius
 
 __all__ = [
     "Area",
@@ -15,18 +15,18 @@ __all__ = [
     "Changes",
     "Cursor",
     "Fleet",
-    "Instance",
     "IntelligentDriver",
     "LaneChanger",
-    "Mixture",
     "Participant",
     "Sink",
-    "Sites",
     "Source",
+    "SpawnSites",
     "Stretch",
     "Swarm",
-    "around",
+    "TrafficGenerator",
+    "TrafficMix",
     "polygon",
     "road_range",
+    "sites_within_radius",
     "stretches_cover",
 ]

@@ -15,12 +15,12 @@ from eidrive_scenario.geometry import points_in_polygon
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.location import PositionError
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.sites import Covers, Flags, Sites
+from eidrive_scenario.traffic.sites import Covers, Flags, SpawnSites
 
 START, END = "start", "end"
 
 
-class RoadEnd(NamedTuple):
+class RoadTerminal(NamedTuple):
     """One end of a road."""
 
     road: str
@@ -55,7 +55,7 @@ def polygon(corners: Sequence[tuple[float, float]]) -> Covers:
 def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers:
     """Which places lie on one of several stretches of road."""
 
-    def covers(sites: Sites) -> Flags:
+    def covers(sites: SpawnSites) -> Flags:
         found = np.zeros(len(sites), dtype=bool)
         s, road, number = lanes.s(sites.row, sites.progress), lanes.road[sites.row], lanes.tables.lane_id[sites.row]
         for stretch in stretches:
@@ -108,30 +108,30 @@ def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[St
     return found
 
 
-def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
+def _links(roads: RoadNetwork) -> Mapping[RoadTerminal, list[RoadTerminal]]:
     """Which ends of roads meet, as the lanes are linked."""
-    found: dict[RoadEnd, list[RoadEnd]] = {}
+    found: dict[RoadTerminal, list[RoadTerminal]] = {}
     for one, two, edge in roads.graph.edges(data=True):
         if edge["kind"] == "successor" and one.road != two.road:
-            leaving = RoadEnd(one.road, END if roads.driving_direction(one.road, one.lane) > 0 else START)
-            entering = RoadEnd(two.road, START if roads.driving_direction(two.road, two.lane) > 0 else END)
+            leaving = RoadTerminal(one.road, END if roads.driving_direction(one.road, one.lane) > 0 else START)
+            entering = RoadTerminal(two.road, START if roads.driving_direction(two.road, two.lane) > 0 else END)
             for a, b in ((leaving, entering), (entering, leaving)):
                 if b not in found.setdefault(a, []):
                     found[a].append(b)
     return found
 
 
-def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:
+def _chain(ends: Mapping[RoadTerminal, list[RoadTerminal]], start: str, goal: str) -> list[RoadTerminal]:
     """Ends of roads from where `start` is left to where `goal` is entered; roads between come in pairs of ends."""
-    queue = deque([[RoadEnd(start, END)], [RoadEnd(start, START)]])
-    seen = {RoadEnd(start, END), RoadEnd(start, START)}
+    queue = deque([[RoadTerminal(start, END)], [RoadTerminal(start, START)]])
+    seen = {RoadTerminal(start, END), RoadTerminal(start, START)}
     while queue:
         chain = queue.popleft()
         for entry in ends.get(chain[-1], ()):
             if entry.road == goal:
                 return [*chain, entry]
             if entry not in seen:
-                other = RoadEnd(entry.road, START if entry.end == END else END)
+                other = RoadTerminal(entry.road, START if entry.end == END else END)
                 seen |= {entry, other}
                 queue.append([*chain, entry, other])
     raise PositionError(Diagnostic(f"no roads lead from road {start!r} to road {goal!r}", "correct the road cursors"))

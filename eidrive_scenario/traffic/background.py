@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic.bodies import WALKING, Participant
 from eidrive_scenario.traffic.fleet import Fleet
-from eidrive_scenario.traffic.instances import Centre, Instance
+from eidrive_scenario.traffic.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.traffic.lanes import FREE
-from eidrive_scenario.traffic.sites import Ground, Sites, free
+from eidrive_scenario.traffic.sites import SpawnAreas, SpawnSites, is_unoccupied
 from eidrive_scenario.traffic.stop_lines import MustStop
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
@@ -54,17 +54,17 @@ class BackgroundTraffic:
         roads: RoadNetwork,
         *,
         seed: int,
-        centre: Callable[[str], Centre | None],
+        centre: Callable[[str], CentralObject | None],
         taken: frozenset[str] = frozenset(),
         must_stop: MustStop | None = None,
     ) -> None:
         self.seed = seed
         self.fleet = Fleet(roads, seed=seed, must_stop=must_stop)
-        self.ground = Ground(self.fleet.lanes)
+        self.ground = SpawnAreas(self.fleet.lanes)
         self.centre = centre
         self.time = 0.0
         self.dt = 0.0
-        self.instances: list[Instance] = []
+        self.instances: list[TrafficGenerator] = []
         self._taken = taken
         self._counts: dict[str, int] = {}
         self._started: dict[str, int] = {}
@@ -86,7 +86,7 @@ class BackgroundTraffic:
         self._started[name] = self._started.get(name, 0) + 1
         return self._started[name]
 
-    def start(self, instance: Instance) -> None:
+    def start(self, instance: TrafficGenerator) -> None:
         """An instance begins; it works from the next step on."""
         self.instances.append(instance)
         self._begun = True
@@ -112,7 +112,7 @@ class BackgroundTraffic:
     def _work(self, view: WorldView) -> None:
         """Look where the others are; let the instances bring in and take out cars."""
         self._begun = False
-        growing = any(instance.wants(self) for instance in self.instances)
+        growing = any(instance.is_due(self) for instance in self.instances)
         self.fleet.observe(view, everywhere=growing)
         if growing:
             rows = [row for row, name in enumerate(view.names) if name not in self.fleet]
@@ -125,11 +125,11 @@ class BackgroundTraffic:
         """x and y of cars [m]."""
         return self.fleet.positions(names)
 
-    def sites(self, names: list[str]) -> Sites:
+    def sites(self, names: list[str]) -> SpawnSites:
         """The places on lanes where cars are."""
-        return Sites.at(self.fleet.lanes, *self.fleet.places(names))
+        return SpawnSites.at(self.fleet.lanes, *self.fleet.places(names))
 
-    def starting_speed(self, sites: Sites, participant: Participant) -> Array:
+    def starting_speed(self, sites: SpawnSites, participant: Participant) -> Array:
         """(K,) the speeds at which traffic usually passes places [m/s]."""
         if participant.walks:
             return np.full(len(sites), WALKING)
@@ -139,11 +139,11 @@ class BackgroundTraffic:
         bend = np.sqrt(participant.driver.lateral_acceleration / np.maximum(lanes.tightest(sites.row), 1e-6))
         return np.asarray(np.minimum(np.minimum(limit, bend), participant.spec.max_speed))
 
-    def bring_in(
+    def spawn(
         self,
-        instance: Instance,
+        instance: TrafficGenerator,
         participant: Participant,
-        sites: Sites,
+        sites: SpawnSites,
         speed: Array,
         rng: np.random.Generator,
         given_speed: float | None,
@@ -153,8 +153,8 @@ class BackgroundTraffic:
         speed  (K,) with which it would start at each;  given_speed  the one that the scenario states, if any
         """
         order = rng.permutation(len(sites))[:TRIES]
-        some, speed = sites.some(order), np.minimum(speed[order], participant.spec.max_speed)
-        at = np.flatnonzero(free(self.fleet, some, participant, speed, self._foreign))
+        some, speed = sites.subset(order), np.minimum(speed[order], participant.spec.max_speed)
+        at = np.flatnonzero(is_unoccupied(self.fleet, some, participant, speed, self._foreign))
         if not at.size:
             return False
         n = int(at[0])
@@ -175,7 +175,7 @@ class BackgroundTraffic:
         self._changes.additions[name] = (spec, placement)
         return True
 
-    def take_out(self, name: str) -> None:
+    def despawn(self, name: str) -> None:
         """A car disappears."""
         self.fleet.remove(name)
         self._forget(name)

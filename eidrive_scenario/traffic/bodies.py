@@ -24,7 +24,7 @@ T = TypeVar("T")
 MODULE = "eidrive.traffic"
 """A controller with this `module` states the parameters of the drivers of background traffic."""
 
-STAND_INS = {
+CATEGORY_FALLBACKS = {
     VehicleCategory.SEMITRAILER: VehicleCategory.TRUCK,
     VehicleCategory.TRAILER: VehicleCategory.TRUCK,
     VehicleCategory.TRAIN: VehicleCategory.BUS,
@@ -72,7 +72,7 @@ class Participant:
 
 
 @dataclass(frozen=True)
-class Weighted(Generic[T]):
+class WeightedChoice(Generic[T]):
     """Things with shares."""
 
     things: Sequence[T]
@@ -84,7 +84,7 @@ class Weighted(Generic[T]):
         return self.things[int(np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))]
 
 
-class Mixture:
+class TrafficMix:
     """What a TrafficDefinition or a TrafficDistribution describes; without either, the library's cars.
 
     Raises ScenarioError for shares that are negative or all 0, and for entities that neither drive nor walk.
@@ -97,10 +97,10 @@ class Mixture:
         distribution: model.TrafficDistribution | None,
     ) -> None:
         self._scenario = scenario
-        self._groups: Weighted[Weighted[Participant]] | None = None
-        self._categories: Weighted[VehicleCategory] = Weighted([VehicleCategory.CAR], [1.0])
-        self._roles: Weighted[Role] = Weighted([Role.NONE], [1.0])
-        self._drivers: Weighted[DriverSettings] = Weighted([DriverSettings()], [1.0])
+        self._groups: WeightedChoice[WeightedChoice[Participant]] | None = None
+        self._categories: WeightedChoice[VehicleCategory] = WeightedChoice([VehicleCategory.CAR], [1.0])
+        self._roles: WeightedChoice[Role] = WeightedChoice([Role.NONE], [1.0])
+        self._drivers: WeightedChoice[DriverSettings] = WeightedChoice([DriverSettings()], [1.0])
         if distribution is not None:
             entries = distribution.traffic_distribution_entry
             self._groups = self._weighted([self._group(entry) for entry in entries], entries)
@@ -118,7 +118,7 @@ class Mixture:
         if self._groups is not None:
             return self._groups.draw(rng).draw(rng)
         category, role, settings = self._categories.draw(rng), self._roles.draw(rng), self._drivers.draw(rng)
-        bodies = library_bodies(STAND_INS.get(category, category))
+        bodies = library_bodies(CATEGORY_FALLBACKS.get(category, category))
         fitting = [body for body, its_role in bodies if its_role is role] or [
             body for body, its_role in bodies if its_role is Role.NONE
         ]
@@ -130,11 +130,11 @@ class Mixture:
         """The categories of all bodies that it can draw."""
         if self._groups is None:
             pairs = zip(self._categories.things, self._categories.weights, strict=True)
-            wanted = [STAND_INS.get(category, category) for category, weight in pairs if weight > 0.0]
+            wanted = [CATEGORY_FALLBACKS.get(category, category) for category, weight in pairs if weight > 0.0]
             return frozenset(body.category for category in wanted for body, _ in library_bodies(category))
         return frozenset(member.spec.category for group in self._groups.things for member in group.things)
 
-    def _group(self, entry: model.TrafficDistributionEntry) -> Weighted[Participant]:
+    def _group(self, entry: model.TrafficDistributionEntry) -> WeightedChoice[Participant]:
         members = entry.entity_distribution.entity_distribution_entry
         return self._weighted([self._member(member.scenario_object_template) for member in members], members)
 
@@ -161,13 +161,13 @@ class Mixture:
         lines = {entry.name: entry.line for entry in controller.properties.property}
         return parse_settings(DriverSettings, properties, source=controller.source, line=controller.line, lines=lines)
 
-    def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> Weighted[T]:
+    def _weighted(self, things: Sequence[T], entries: Sequence[model.Element]) -> WeightedChoice[T]:
         weights = [float(getattr(entry, "weight")) for entry in entries]  # noqa: B009
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             where = entries[0]
             what = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are no shares"
             raise ScenarioError(Diagnostic(what, "give weights of at least 0, not all 0", where.source, where.line))
-        return Weighted(things, weights)
+        return WeightedChoice(things, weights)
 
 
 def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:

@@ -18,10 +18,10 @@ from eidrive_scenario.traffic.leaders import (
     FIXED,
     Leaders,
     Occupants,
+    concatenate_occupants,
     find_leaders,
-    nobody,
+    no_occupants,
     obstacles,
-    together,
 )
 from eidrive_scenario.traffic.mobil import LaneChanger
 from eidrive_scenario.traffic.plans import Plans
@@ -68,7 +68,7 @@ class Fleet:
         self._ticks = self._decisions = 0
         self._until = 0.0
         self._poses: Array | None = None
-        self._foreign, self._moving = nobody(), set[int]()
+        self._foreign, self._moving = no_occupants(), set[int]()
         self._ends = self._ends_of_lanes()
 
     @property
@@ -254,7 +254,9 @@ class Fleet:
         occupants = self.occupants()
         leaders = self._leaders(occupants)
         lights = Leaders.none(len(cars)) if self._lines is None else self._lines.ahead(cars)
-        self._right_of_way.hand_out(cars, leaders.or_nearer(lights), lights, begins, self._moving, self._ticks * dt)
+        self._right_of_way.grant_right_of_way(
+            cars, leaders.or_nearer(lights), lights, begins, self._moving, self._ticks * dt
+        )
         desired = self._plans.desired_speeds(cars, begins)
         halted = leaders.or_nearer(lights).or_nearer(self._right_of_way.waits(cars, begins))
         cars.acceleration = cars.drivers.response(cars.speed, desired, halted.gap, cars.speed - halted.speed)
@@ -268,7 +270,7 @@ class Fleet:
         who, row = np.concatenate([own, still]), np.concatenate([cars.row, lane])
         key = cars.progress[who]
         mine = Occupants(row, key, key + cars.rear[who], key + cars.front[who], cars.speed[who], who)
-        return together(mine, self._foreign, self._ends)
+        return concatenate_occupants(mine, self._foreign, self._ends)
 
     def _ends_of_lanes(self) -> Occupants:
         row = np.flatnonzero(np.isfinite(self.lanes.ends_at))

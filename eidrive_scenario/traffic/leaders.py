@@ -162,7 +162,7 @@ def find_followers(
     return Followers(gap, number)
 
 
-def nobody() -> Occupants:
+def no_occupants() -> Occupants:
     """No occupants."""
     none = np.empty(0)
     return Occupants(np.empty(0, dtype=np.int64), none, none, none, none, np.empty(0, dtype=np.int64))
@@ -182,7 +182,7 @@ def obstacles(
         square = np.sum((view.position[rows, None, :2] - near[None]) ** 2, axis=2)
         rows = rows[np.any(square < reach[:, None] ** 2, axis=1)] if len(near) else rows[:0]
     if not rows.size:
-        return nobody(), set()
+        return no_occupants(), set()
     boxes = view.boxes[rows]
     corners = OUTLINE[None] * boxes[:, None, 3:5]
     cos, sin = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
@@ -200,7 +200,7 @@ def obstacles(
     return found, set(row[moving].tolist())
 
 
-def together(*parts: Occupants) -> Occupants:
+def concatenate_occupants(*parts: Occupants) -> Occupants:
     """All of them, as one."""
     names = ("row", "key", "rear", "front", "speed", "owner")
     return Occupants(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

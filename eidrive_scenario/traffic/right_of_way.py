@@ -38,7 +38,7 @@ class RightOfWay:
         wait = self._distances(cars, begins) - cars.front - STOP_LINE
         return Leaders(np.maximum(wait, 1e-3), np.zeros(len(cars)))
 
-    def hand_out(
+    def grant_right_of_way(
         self, cars: Cars, leaders: Leaders, lights: Leaders, begins: Array, moving: set[int], time: float
     ) -> None:
         """Hand passages through junctions to the cars that come near and may have them.

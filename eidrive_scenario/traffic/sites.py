@@ -33,7 +33,7 @@ AIR = 0.5
 
 
 @dataclass(frozen=True)
-class Sites:
+class SpawnSites:
     """Places (K,) along lanes: row and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
 
     row: Integers
@@ -44,7 +44,7 @@ class Sites:
     width: Array
 
     @classmethod
-    def along(cls, lanes: TrafficLanes, rows: Integers) -> Sites:
+    def along(cls, lanes: TrafficLanes, rows: Integers) -> SpawnSites:
         """Places at an even distance along lanes."""
         counts = np.maximum(np.floor(lanes.length[rows] / SPACING).astype(np.int64), 1)
         row = np.repeat(rows, counts)
@@ -52,7 +52,7 @@ class Sites:
         return cls.at(lanes, row, (number + 0.5) * lanes.length[row] / np.repeat(counts, counts))
 
     @classmethod
-    def at(cls, lanes: TrafficLanes, row: Integers, progress: Array) -> Sites:
+    def at(cls, lanes: TrafficLanes, row: Integers, progress: Array) -> SpawnSites:
         """Given places (K,)."""
         poses = lanes.tables.lane_poses(row, lanes.s(row, progress), np.zeros(len(row)))
         heading = poses.h + np.where(lanes.direction[row] > 0, 0.0, np.pi)
@@ -61,9 +61,9 @@ class Sites:
     def __len__(self) -> int:
         return len(self.row)
 
-    def some(self, which: Integers | Flags) -> Sites:
+    def subset(self, which: Integers | Flags) -> SpawnSites:
         """A part of them."""
-        return Sites(
+        return SpawnSites(
             self.row[which],
             self.progress[which],
             self.x[which],
@@ -72,9 +72,9 @@ class Sites:
             self.width[which],
         )
 
-    def joined(self, other: Sites) -> Sites:
+    def concatenate(self, other: SpawnSites) -> SpawnSites:
         """These and others."""
-        return Sites(
+        return SpawnSites(
             np.concatenate([self.row, other.row]),
             np.concatenate([self.progress, other.progress]),
             np.concatenate([self.x, other.x]),
@@ -84,53 +84,53 @@ class Sites:
         )
 
 
-Covers = Callable[[Sites], Flags]
+Covers = Callable[[SpawnSites], Flags]
 """Which of some places belong to an area."""
 
 
-class Ground:
+class SpawnAreas:
     """The places of one road network, for those who drive and those who walk."""
 
     def __init__(self, lanes: TrafficLanes) -> None:
         self._lanes = lanes
 
     @cached_property
-    def driving(self) -> Sites:
+    def driving(self) -> SpawnSites:
         """For vehicles; none on lanes that end."""
         lanes = self._lanes
         fit = lanes.tables.lane_drivable & ~lanes.in_junction & np.isinf(lanes.ends_at)
-        return Sites.along(lanes, np.flatnonzero(fit))
+        return SpawnSites.along(lanes, np.flatnonzero(fit))
 
     @cached_property
-    def walking(self) -> Sites:
+    def walking(self) -> SpawnSites:
         """For pedestrians."""
-        return Sites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
+        return SpawnSites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
 
-    def for_body(self, participant: Participant) -> Sites:
+    def for_body(self, participant: Participant) -> SpawnSites:
         """The places where this one fits."""
         return self.walking if participant.walks else self.driving
 
 
-def around(
-    lanes: TrafficLanes, sites: Sites, x: float, y: float, radius: float, location: LaneLocation | None
-) -> Sites:
+def sites_within_radius(
+    lanes: TrafficLanes, sites: SpawnSites, x: float, y: float, radius: float, location: LaneLocation | None
+) -> SpawnSites:
     """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
 
     Where that is none at all, the nearest place that is no further away than a point may lie from its road.
     """
     distance = np.hypot(sites.x - x, sites.y - y)
-    found = sites.some(distance <= radius)
+    found = sites.subset(distance <= radius)
     if location is not None:
         row, progress = lanes.of(location)
         if np.any(sites.row == row):
-            here = Sites.at(lanes, np.array([row]), np.array([progress]))
-            return found.joined(here)
+            here = SpawnSites.at(lanes, np.array([row]), np.array([progress]))
+            return found.concatenate(here)
     if not len(found) and len(sites) and distance.min() <= REACH:
-        return sites.some(np.array([int(np.argmin(distance))]))
+        return sites.subset(np.array([int(np.argmin(distance))]))
     return found
 
 
-def free(fleet: Fleet, sites: Sites, participant: Participant, speed: Array, foreign: Array) -> Flags:
+def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Flags:
     """(K,) where a participant can appear with a speed (K,) [m/s].
 
     It touches nobody, has a gap ahead in which it need not brake harder than is comfortable, and leaves its follower as
@@ -161,7 +161,7 @@ def free(fleet: Fleet, sites: Sites, participant: Participant, speed: Array, for
     return np.asarray(fit)
 
 
-def _touches(sites: Sites, n: int, participant: Participant, boxes: Array) -> bool:
+def _touches(sites: SpawnSites, n: int, participant: Participant, boxes: Array) -> bool:
     spec = participant.spec
     yaw = float(sites.heading[n])
     cos, sin = np.cos(yaw), np.sin(yaw)

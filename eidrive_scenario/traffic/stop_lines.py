@@ -10,7 +10,7 @@ from eidrive_scenario.roads.location import LaneKey
 from eidrive_scenario.roads.model import SignalPlace
 from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import FIXED, Leaders, Occupants, find_leaders, nobody
+from eidrive_scenario.traffic.leaders import FIXED, Leaders, Occupants, find_leaders, no_occupants
 
 STOP_LINE = 1.0
 """Cars wait this far before a line [m]."""
@@ -41,7 +41,7 @@ class StopLines:
         self._progress = np.array([progress for _, progress, _ in found])
         self._signal = np.array([signal for _, _, signal in found], dtype=np.int64)
         self._shown: tuple[bool, ...] = ()
-        self._closed = nobody()
+        self._closed = no_occupants()
 
     def _on_lanes(self, place: SignalPlace) -> list[tuple[int, float]]:
         lanes = self._lanes

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Picture(NamedTuple):
+class CameraImage(NamedTuple):
     """rgb (H, W, 3), depth (H, W) along the optical axis [m], inf where nothing is; segmentation (H, W): row or -1.
 
     Heads of traffic signals are less than -1: `World.signal_labels` says which.

@@ -42,7 +42,7 @@ class DrivenBody(Body):
             DRIVEN,
             SCRIPTED | DRIVEN | STATIC,
         )
-        self.jump(placement)
+        self.teleport(placement)
 
     @property
     def travel(self) -> float:
@@ -50,7 +50,7 @@ class DrivenBody(Body):
         vx, vy, rate = self._motion
         return (math.hypot(vx, vy) + abs(rate) * 2.0 * self.radius) * self._dt
 
-    def jump(self, placement: Placement) -> None:
+    def teleport(self, placement: Placement) -> None:
         """Stand there now, rolling straight ahead with the given speed; the ground gives height, pitch and roll."""
         z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
         self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
@@ -90,7 +90,7 @@ class DrivenBody(Body):
         self._arrive(x, y, yaw, (vx, vy, rate))
         self.stale = bool(self.pitch or self.roll or lifted or qx or qy)
 
-    def roll_on(self, demand: Demand, steps: int) -> None:
+    def coast(self, demand: Demand, steps: int) -> None:
         """Move by physics steps in which nothing can hit it.
 
         As pybullet integrates: the velocity at the end of a step covers the step's distance.

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.furniture import Fixture
-from eidrive_scenario.world.nearby import SQUARE, Nearby
+from eidrive_scenario.world.road_objects import RoadObjectBody
+from eidrive_scenario.world.spatial_grid import SQUARE, SpatialGrid
 from eidrive_scenario.world.triangle_shape import create_triangle_shape
 
 Array = NDArray[np.float64]
@@ -37,12 +37,12 @@ _FACES = np.array(
 class Obstacles:
     """Everything that stands at the roads and has a body."""
 
-    def __init__(self, furniture: Sequence[Fixture]) -> None:
+    def __init__(self, furniture: Sequence[RoadObjectBody]) -> None:
         solid = [piece for piece in furniture if piece.solid]
         self._solid = _merged_rails(solid)
         self._soft = [piece for piece in furniture if piece.kind in ("tree", "vegetation")]
         self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
-        self._nearby: Nearby[Fixture] = Nearby()
+        self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
         for piece in self._solid:
             self._nearby.add(piece, _cells(piece))
 
@@ -54,7 +54,7 @@ class Obstacles:
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """How far from a point nothing solid stands, at most `most` [m]."""
-        return min([_gap(piece, x, y) for piece in self._nearby.around(x, y, most)], default=most)
+        return min([_gap(piece, x, y) for piece in self._nearby.query(x, y, most)], default=most)
 
     def name_at(self, x: float, y: float) -> str:
         """What stands at a point at which something was touched."""
@@ -65,9 +65,9 @@ class Obstacles:
         return self._solid[min(gaps)[1]].name if gaps else "obstacle"
 
 
-def _merged_rails(solid: Sequence[Fixture]) -> list[Fixture]:
+def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
     """Parts of a rail or barrier that continue each other in a straight line as one piece."""
-    whole: list[Fixture] = []
+    whole: list[RoadObjectBody] = []
     for piece in solid:
         before = whole[-1] if whole else None
         if (
@@ -87,7 +87,7 @@ def _merged_rails(solid: Sequence[Fixture]) -> list[Fixture]:
     return whole
 
 
-def _follows(before: Fixture, piece: Fixture) -> bool:
+def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
     """Whether a piece begins where the one before ends."""
     step = (before.length + piece.length) / 2
     cos, sin = math.cos(before.pose.h), math.sin(before.pose.h)
@@ -99,7 +99,7 @@ Box = tuple[float, float, float, float, float, float, float]
 """Middle of the bottom x, y, z, length, width, height [m], heading [rad]."""
 
 
-def _solid_boxes(piece: Fixture) -> Iterator[Box]:
+def _solid_boxes(piece: RoadObjectBody) -> Iterator[Box]:
     x, y, z, h = piece.pose[:4]
     if piece.kind == "gantry":
         cos, sin = math.cos(h), math.sin(h)
@@ -114,7 +114,7 @@ def _solid_boxes(piece: Fixture) -> Iterator[Box]:
         yield x, y, z, piece.length, piece.width, piece.height, h
 
 
-def _foliage(piece: Fixture) -> Box:
+def _foliage(piece: RoadObjectBody) -> Box:
     x, y, z, h = piece.pose[:4]
     low = CROWN * piece.height if piece.kind == "tree" else 0.0
     return x, y, z + low, FOLIAGE * piece.length, FOLIAGE * piece.width, piece.height - low, h
@@ -142,7 +142,7 @@ def _corners(boxes: Array) -> Array:
     return np.concatenate([low, low + boxes[:, None, 5:6] * (0.0, 0.0, 1.0)], axis=1)
 
 
-def _cells(piece: Fixture) -> Iterator[tuple[int, int]]:
+def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
     """The squares that a piece may touch."""
     steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
     cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
@@ -155,7 +155,7 @@ def _cells(piece: Fixture) -> Iterator[tuple[int, int]]:
             yield math.floor((x + ox) / SQUARE), math.floor((y + oy) / SQUARE)
 
 
-def _gap(piece: Fixture, x: float, y: float) -> float:
+def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
     """How far a point lies outside of a piece [m]."""
     dx, dy = x - piece.pose.x, y - piece.pose.y
     if piece.radius:

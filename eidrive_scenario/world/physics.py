@@ -100,7 +100,7 @@ class Physics:
             self._step_through(bodies, passing, watched, demands, touches)
         for name, body in driven.items():
             if name not in watched:
-                body.roll_on(demands[name], self._substeps)
+                body.coast(demands[name], self._substeps)
         if watched:
             self.refresh(bodies.values())
         return touches

@@ -8,10 +8,10 @@ import numpy as np
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads.signal_states import GREEN, RED, YELLOW, lamp_colours, lamps, lit
-from eidrive_scenario.world.furniture import Fixture, SignalHead
-from eidrive_scenario.world.meshes.furniture import furniture, traffic_light
+from eidrive_scenario.world.meshes.road_objects import road_object_mesh, traffic_light
 from eidrive_scenario.world.meshes.signs import sign
-from eidrive_scenario.world.render.model import Array, Instance, Light, Model, gridded, model
+from eidrive_scenario.world.render.model import Array, Light, MeshInstance, Model, gridded, model
+from eidrive_scenario.world.road_objects import RoadObjectBody, SignalHead
 from eidrive_scenario.world.signs import sign_face
 
 FIRST_LABEL = -10
@@ -30,34 +30,34 @@ UNLIT = {RED: (0.20, 0.03, 0.03), YELLOW: (0.20, 0.15, 0.03), GREEN: (0.03, 0.16
 class Roadside:
     """The models of one road network's furniture and signals."""
 
-    def __init__(self, pieces: Sequence[Fixture], heads: Sequence[SignalHead]) -> None:
+    def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead]) -> None:
         self._still: Model | None = _standing(pieces)
         self._heads = tuple(heads)
         self._models = [_head_model(head) for head in heads]
         self._turns = [rotation_matrix(head.pose.h, 0.0, 0.0) for head in heads]
         self._places = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
 
-    def instances(self, eye: Array, states: Mapping[str, str], time: float) -> list[Instance]:
+    def instances(self, eye: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
         """All that may be in sight of a camera at `eye` (3,), with the signals in their states at `time` [s]."""
-        found = [] if self._still is None else [Instance(self._still, np.eye(3), np.zeros(3))]
+        found = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
         near = np.flatnonzero(np.linalg.norm(self._places - eye, axis=1) < IN_SIGHT)
         for row in near.tolist():
             glow = _glow(self._heads[row], states.get(self._heads[row].signal.id), time)
             label = FIRST_LABEL - row
-            found.append(Instance(self._models[row], self._turns[row], self._places[row], label, glow))
+            found.append(MeshInstance(self._models[row], self._turns[row], self._places[row], label, glow))
         return found
 
 
-def _standing(pieces: Iterable[Fixture]) -> Model | None:
+def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
     """All furniture in one model; equal pieces are placed together."""
-    equal: dict[tuple[str, str, float, float, float, float], list[Fixture]] = {}
+    equal: dict[tuple[str, str, float, float, float, float], list[RoadObjectBody]] = {}
     for piece in pieces:
         key = (piece.kind, piece.name, piece.length, piece.width, piece.height, piece.radius)
         equal.setdefault(key, []).append(piece)
     triangles: dict[str, list[Array]] = {}
     for key, group in equal.items():
         poses = np.array([piece.pose for piece in group])
-        for material, part in furniture(*key).items():
+        for material, part in road_object_mesh(*key).items():
             triangles.setdefault(material, []).append(_placed(part, poses))
     if not triangles:
         return None

@@ -13,10 +13,10 @@ from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_o
 from eidrive_scenario.world.actor import Vector3
 from eidrive_scenario.world.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
 from eidrive_scenario.world.bullet import bullet
-from eidrive_scenario.world.furniture import Fixture, fixtures
 from eidrive_scenario.world.ground import is_level
-from eidrive_scenario.world.nearby import Nearby, squares
 from eidrive_scenario.world.obstacles import MOST_FACES, Obstacles
+from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies
+from eidrive_scenario.world.spatial_grid import SpatialGrid, grid_cells
 from eidrive_scenario.world.triangle_shape import create_triangle_shape
 
 GROUND = "ground"
@@ -46,7 +46,7 @@ class Scenery:
     def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
         self.roads = roads
         self.buildings: list[Building] = []
-        self._nearby: Nearby[tuple[float, float, float]] = Nearby()
+        self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
         """Middle and radius of each building, seen from above [m]."""
         self._client = client
         self._entities = frozenset(entities)
@@ -67,7 +67,7 @@ class Scenery:
         """Put up a building that stops vehicles and rays."""
         self.buildings.append(Building(name, centre, size, yaw, colour))
         radius = math.hypot(size[0], size[1]) / 2
-        self._nearby.add((centre[0], centre[1], radius), squares(centre[0], centre[1], radius))
+        self._nearby.add((centre[0], centre[1], radius), grid_cells(centre[0], centre[1], radius))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
         self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
@@ -97,9 +97,9 @@ class Scenery:
         return True
 
     @cached_property
-    def furniture(self) -> tuple[Fixture, ...]:
+    def furniture(self) -> tuple[RoadObjectBody, ...]:
         """What stands at the roads, buildings aside."""
-        return tuple(fixtures(self.roads, self._entities)) if self.roads is not None else ()
+        return tuple(road_object_bodies(self.roads, self._entities)) if self.roads is not None else ()
 
     def raise_obstacles(self) -> bool:
         """Give what stands at the roads its bodies, where it has none yet; True if they were made now."""
@@ -124,7 +124,7 @@ class Scenery:
     def clearance(self, x: float, y: float, most: float) -> float:
         """How far from a point nothing stands, at most `most` [m]."""
         free = most if self._obstacles is None else self._obstacles.clearance(x, y, most)
-        for bx, by, radius in self._nearby.around(x, y, most):
+        for bx, by, radius in self._nearby.query(x, y, most):
             free = min(free, math.hypot(bx - x, by - y) - radius)
         return free
 

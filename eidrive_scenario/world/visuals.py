@@ -16,15 +16,15 @@ from eidrive_scenario.world.actor import ActorSpec, ExtraAxle
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body
 from eidrive_scenario.world.camera import Pinhole, Radiance
-from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.meshes import actor_mesh
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
 from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.render.lamps import Beam
-from eidrive_scenario.world.render.model import Array, Instance, Light, Model, gridded, merged, model, placed
+from eidrive_scenario.world.render.model import Array, Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.world.render.renderer import Renderer, Subjects
+from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.roadside import Roadside
 from eidrive_scenario.world.scenery import Building, Scenery
 from eidrive_scenario.world.vehicle_lamps import beam, glow
@@ -40,7 +40,7 @@ WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
 """Luminance of a lit window [cd/m²]."""
 
 
-class Shown(NamedTuple):
+class DisplayState(NamedTuple):
     """What changes beside the poses: the time [s], what signals show, and how actors look."""
 
     time: float = 0.0
@@ -68,7 +68,7 @@ class Visuals:
         pose: Array,
         pinhole: Pinhole,
         weather: Weather,
-        shown: Shown = Shown(),  # noqa: B008 - it is immutable
+        shown: DisplayState = DisplayState(),  # noqa: B008 - it is immutable
     ) -> Radiance:
         """The light that reaches a camera; `bodies` by their rows. Hidden ones are not seen, but shade and shine.
 
@@ -89,7 +89,7 @@ class Visuals:
         glowing = {"window_lit": WINDOW_LIGHT} if dark and weather.sun_elevation < 3.0 else {}
         houses = []
         if self._buildings is not None:
-            houses = [Instance(self._buildings, np.eye(3), np.zeros(3), -1, glowing)]
+            houses = [MeshInstance(self._buildings, np.eye(3), np.zeros(3), -1, glowing)]
         beams = [
             _beam(body, *lit)
             for body in bodies.values()
@@ -106,7 +106,7 @@ class Visuals:
         ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
         return self._renderer.render(subjects, beams, weather, pose, pinhole, ground)
 
-    def _ground_parts(self) -> list[Instance]:
+    def _ground_parts(self) -> list[MeshInstance]:
         """Roads, their markings, and the land around, cut along a grid."""
         low, high = np.zeros(3), np.zeros(3)
         parts: list[Model] = []
@@ -120,7 +120,7 @@ class Visuals:
         kind = "grass" if self._scenery.roads is not None else "asphalt"
         land = model({kind: polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])}, {})
         pieces = [land, gridded(merged(parts))] if parts else [land]
-        return [Instance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
+        return [MeshInstance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
 
 
 _USUAL = Appearance()
@@ -134,12 +134,12 @@ def _beam(body: Body, brightness: float, high: bool) -> Beam:
     return Beam(foot + rotation @ lamp, rotation, brightness, high)
 
 
-def _actor_instance(row: int, body: Body, emitted: Mapping[str, Light], motion: str) -> Instance:
+def _actor_instance(row: int, body: Body, emitted: Mapping[str, Light], motion: str) -> MeshInstance:
     spec = body.spec
     rotation, foot = _stance(body)
     axles = spec.wheelbase, spec.wheel_radius, spec.extra_axles
     shape = _actor_model(spec.shape, spec.size, spec.offset, axles, _paint(spec), motion)
-    return Instance(shape, rotation, foot, row, emitted)
+    return MeshInstance(shape, rotation, foot, row, emitted)
 
 
 def _paint(spec: ActorSpec) -> Colour:

@@ -13,22 +13,22 @@ from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, s
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
+from eidrive_scenario.world.actor_table import ActorTable
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.bodies import Body, ScriptedBody
 from eidrive_scenario.world.bullet import connect, disconnect
-from eidrive_scenario.world.camera import Picture, Pinhole, Radiance
-from eidrive_scenario.world.cast import Cast
+from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
 from eidrive_scenario.world.contacts import ContactTracker
 from eidrive_scenario.world.driven_body import DrivenBody
-from eidrive_scenario.world.furniture import signal_heads
 from eidrive_scenario.world.ground import GroundUnder
 from eidrive_scenario.world.physics import Physics, substeps_per_tick
 from eidrive_scenario.world.rays import Point, RayHits, cast_rays, first_met
-from eidrive_scenario.world.render.tones import toned, white_level
+from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
+from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.roadside import FIRST_LABEL
 from eidrive_scenario.world.scenery import Scenery
 from eidrive_scenario.world.view import Contact, WorldView
-from eidrive_scenario.world.visuals import Shown, Visuals
+from eidrive_scenario.world.visuals import DisplayState, Visuals
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ class World:
         self._tracker = ContactTracker()
         self._contacts: tuple[Contact, ...] = ()
         self._view: WorldView | None = None
-        self._cast: Cast | None = None
+        self._cast: ActorTable | None = None
         self._scenery = Scenery(self._client, roads, entities)
         self._physics = Physics(self._client, self._scenery, dt, substeps)
         self._visuals: Visuals | None = None
@@ -150,7 +150,7 @@ class World:
         self._weather = weather
         self._friction = weather.friction_scale
 
-    def show(self, signals: Mapping[str, str], appearances: Mapping[str, Appearance]) -> None:
+    def set_display_state(self, signals: Mapping[str, str], appearances: Mapping[str, Appearance]) -> None:
         """What traffic signals show from now on, by their ids, and how those actors look that are not as usual."""
         self._signals = signals
         if appearances is not self._appearances:
@@ -191,7 +191,7 @@ class World:
                 else:
                     body.place(placement)
             elif placement is not None:
-                self._driven[name].jump(placement)
+                self._driven[name].teleport(placement)
         touches = self._physics.tick(self._bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
@@ -207,7 +207,9 @@ class World:
         """Distance between the boxes of two actors [m], 0 where they touch. Raises SimulationError."""
         return box_distance(self._body(first).box, self._body(second).box)
 
-    def cast(self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = (), *, sensor: str = "") -> RayHits:
+    def raycast(
+        self, origins: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = (), *, sensor: str = ""
+    ) -> RayHits:
         """What rays (M, 3) to (M, 3) meet first; actors in `ignore`, and such that the sensor does not see, are passed.
 
         `sensor` is its name: without one, actors count that the scenario hides from sensors as such.
@@ -220,17 +222,17 @@ class World:
         begin, end = (np.ascontiguousarray(points) for points in np.broadcast_arrays(begin, end))
         return cast_rays(self._client, begin, end, self._actors.row_of_handle, passed)
 
-    def first_met(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
-        """The rows that rays meet first, as `cast` has them: quicker for up to a thousand rays in plain numbers."""
+    def first_hit(self, origins: Sequence[Point], targets: Sequence[Point]) -> list[int]:
+        """The rows that rays meet first, as `raycast` has them: quicker for up to a thousand rays in plain numbers."""
         self._refresh()
         if self._unseen:
-            rows: list[int] = self.cast(origins, targets).rows.tolist()
+            rows: list[int] = self.raycast(origins, targets).rows.tolist()
             return rows
         return first_met(self._client, origins, targets, self._actors.row_in_list)
 
     def line_of_sight(self, origin: ArrayLike, targets: ArrayLike, ignore: Iterable[str] = ()) -> NDArray[np.bool_]:
         """(M,) whether nothing stands between the origin (3,) and the targets (M, 3), those in `ignore` aside."""
-        clear: NDArray[np.bool_] = self.cast(origin, targets, ignore).fraction >= 1.0
+        clear: NDArray[np.bool_] = self.raycast(origin, targets, ignore).fraction >= 1.0
         return clear
 
     def camera(
@@ -243,7 +245,7 @@ class World:
         far: float = 300.0,
         *,
         ignore: Iterable[str] = (),
-    ) -> Picture:
+    ) -> CameraImage:
         """What a camera sees: rgb, depth and segmentation.
 
         An ideal camera, with automatic exposure and without noise; `radiance` is for others. pose (4, 4) camera to
@@ -251,8 +253,8 @@ class World:
         The first picture of a world makes all models; a world without pictures never does.
         """
         seen = self.radiance(pose, Pinhole.of_fov(width, height, fov, near, far), ignore=ignore)
-        rgb = toned(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
-        return Picture(rgb, seen.depth, seen.segmentation)
+        rgb = tone_map(seen.luminance * np.float32(1.0 / white_level(seen.luminance)))
+        return CameraImage(rgb, seen.depth, seen.segmentation)
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         """The light that a camera at this pose (4, 4) receives in the present weather, and what it comes from."""
@@ -260,7 +262,7 @@ class World:
             self._visuals = Visuals(self._scenery)
         rows = self.view().rows
         bodies = {rows[name]: body for name, body in self._bodies.items()}
-        shown = Shown(self.time, self._signals, self._appearances)
+        shown = DisplayState(self.time, self._signals, self._appearances)
         return self._visuals.radiance(bodies, ignore, np.asarray(pose, dtype=float), pinhole, self._weather, shown)
 
     def _body(self, name: str) -> Body:
@@ -288,9 +290,9 @@ class World:
         self._cast = None
 
     @property
-    def _actors(self) -> Cast:
+    def _actors(self) -> ActorTable:
         if self._cast is None:
-            self._cast = Cast.of(self._bodies, self._scenery.highest_handle)
+            self._cast = ActorTable.of(self._bodies, self._scenery.highest_handle)
         return self._cast
 
     def _refresh(self) -> None:

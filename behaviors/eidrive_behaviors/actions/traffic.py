@@ -39,7 +39,7 @@ class TrafficInstanceAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
-        self._instance: traffic.Instance | None = None
+        self._instance: traffic.TrafficGenerator | None = None
         if context.roads is None:
             raise self.problem("needs lanes to drive on", "name an OpenDRIVE file in RoadNetwork/LogicFile")
         self.check()
@@ -58,7 +58,7 @@ class TrafficInstanceAction(ActionBehaviour):
         """Find what is wrong with the action before the run."""
 
     @abstractmethod
-    def make(self) -> traffic.Instance:
+    def make(self) -> traffic.TrafficGenerator:
         """The instance, as it is at the start of the action."""
 
     def initialise(self) -> None:
@@ -83,9 +83,9 @@ class TrafficInstanceAction(ActionBehaviour):
             if value is not None and not value >= 0.0:
                 raise self.problem(f"has {name}={value:g}", "give a number of at least 0")
 
-    def mixture(self) -> traffic.Mixture:
+    def mixture(self) -> traffic.TrafficMix:
         """Who the traffic is made of."""
-        return traffic.Mixture(
+        return traffic.TrafficMix(
             self.context.scenario,
             getattr(self.action, "traffic_definition", None),
             getattr(self.action, "traffic_distribution", None),
@@ -168,7 +168,8 @@ class TrafficSourceAction(TrafficInstanceAction):
         lanes, ground = self.background.fleet.lanes, self.background.ground
         x, y, radius = place.pose.x, place.pose.y, self.action.radius
         driving, walking = (
-            traffic.around(lanes, sites, x, y, radius, place.location) for sites in (ground.driving, ground.walking)
+            traffic.sites_within_radius(lanes, sites, x, y, radius, place.location)
+            for sites in (ground.driving, ground.walking)
         )
         if not len(driving) and not len(walking):
             raise self.problem(f"lies at x = {x:.1f} m, y = {y:.1f} m, where no lane is near", "move it to a lane")

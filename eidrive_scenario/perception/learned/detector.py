@@ -14,9 +14,9 @@ from pydantic import Field, model_validator
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.learned.classes import misspelt, object_category
-from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork, Layout
+from eidrive_scenario.perception.learned.external_network import ExternalNetwork, Layout
 from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.weight_files import (
@@ -27,7 +27,7 @@ from eidrive_scenario.perception.learned.weight_files import (
 )
 from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.surroundings import Surroundings
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.visibility import in_camera
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
@@ -93,7 +93,7 @@ class LearnedDetector(Detector):
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
-    usual_sensors: ClassVar[Mapping[str, SensorSettings]] = {
+    default_sensors: ClassVar[Mapping[str, SensorSettings]] = {
         "camera": CameraSettings(width=512, height=384, rate=10.0),
         "lidar": LidarSettings(rate=10.0, field_of_view=110.0),
     }
@@ -102,11 +102,11 @@ class LearnedDetector(Detector):
 
     def __init__(self, settings: LearnedSettings | None = None) -> None:
         self.settings = settings or LearnedSettings()
-        self.pictures: Mapping[str, ImageDetections] = {}
+        self.image_detections: Mapping[str, ImageDetections] = {}
         self._signals: tuple[SignalReading, ...] = ()
         check_weights_exist(weights_path(self.network, self.settings))
         self._network: ImageNetwork | None = None
-        self._surroundings = Surroundings(None)
+        self._surroundings = MapContext(None)
         self._patterns: dict[str, Pattern] = {}
         self._lights = LightsOnMap(None)
 
@@ -114,11 +114,11 @@ class LearnedDetector(Detector):
         """Build the network. Raises SettingError if its weights do not fit."""
         if self._network is None:
             self._network = build_network(self.network, self.settings, allow_torchscript=allow_torchscript)
-            self.sees_signals = signal_kinds(self._network.classes)
+            self.detectable_signals = signal_kinds(self._network.classes)
 
-    def install(self, installation: Installation) -> None:
+    def setup(self, installation: DetectorContext) -> None:
         """Learn the map and the patterns of the LiDARs."""
-        self._surroundings = Surroundings(installation.roads)
+        self._surroundings = MapContext(installation.roads)
         self._lights = LightsOnMap(installation.roads)
         for name, sensor in installation.sensors.items():
             if isinstance(sensor, LidarSettings):
@@ -129,13 +129,15 @@ class LearnedDetector(Detector):
         self.load_weights()
         assert self._network is not None
         name, sweep = next(iter(readings.lidars.items()), ("", None))
-        self.pictures = {camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()}
-        self._signals = self._lights.read(self.pictures, readings.cameras)
+        self.image_detections = {
+            camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()
+        }
+        self._signals = self._lights.read(self.image_detections, readings.cameras)
         parts = [
             self._lifted(found, readings, camera, sweep, self._patterns.get(name))
-            for camera, found in self.pictures.items()
+            for camera, found in self.image_detections.items()
         ]
-        return distinct(parts, readings.time)
+        return merge_duplicates(parts, readings.time)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
         """(N,) the largest share of each box (N, 7) that one of the cameras can show."""
@@ -201,7 +203,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
         raise SettingError(Diagnostic(message, "run: pip install eidrive-scenario[learned]"))
     if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
         confidence = settings.confidence or USUAL_CONFIDENCE
-        return ForeignNetwork(
+        return ExternalNetwork(
             path,
             settings.classes,
             settings.input_size,
@@ -220,7 +222,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     return network
 
 
-def distinct(parts: list[Detections], time: float) -> Detections:
+def merge_duplicates(parts: list[Detections], time: float) -> Detections:
     """All detections, those left out that lie on the place of a surer one."""
     parts = [part for part in parts if len(part)]
     if not parts:

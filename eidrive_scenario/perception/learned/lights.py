@@ -17,7 +17,7 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.signal_states import GREEN, RED, YELLOW, lamp_colours
 from eidrive_scenario.sensing.readings import CameraReading, SignalReading
 from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
-from eidrive_scenario.world.furniture import signal_heads
+from eidrive_scenario.world.road_objects import signal_heads
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

@@ -25,8 +25,8 @@ from eidrive_scenario.roads.model import (
 from eidrive_scenario.roads.polynomials import Polynomials
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 from eidrive_scenario.roads.reading.extent import check_extent
-from eidrive_scenario.roads.reading.furniture import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
+from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
 from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 

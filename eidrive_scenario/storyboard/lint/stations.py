@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from eidrive_scenario.driving.area_checks import areas_off_road
-from eidrive_scenario.driving.declared import declared_settings
+from eidrive_scenario.driving.station_declarations import declared_settings
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
 

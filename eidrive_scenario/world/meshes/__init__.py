@@ -7,16 +7,16 @@ from dataclasses import replace
 from functools import lru_cache
 
 from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions
 from eidrive_scenario.world.meshes.cars import car
 from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
 from eidrive_scenario.world.meshes.figures import crate, roadside_unit
-from eidrive_scenario.world.meshes.frame import Frame
 from eidrive_scenario.world.meshes.heavy import bus, firetruck, trailer, truck
 from eidrive_scenario.world.meshes.people import in_motion, pedestrian
 from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
 from eidrive_scenario.world.meshes.vans import ambulance, van
 
-BUILDERS: Mapping[str, Callable[[Frame], Mesh]] = {
+BUILDERS: Mapping[str, Callable[[BodyDimensions], Mesh]] = {
     "car": car,
     "firetruck": firetruck,
     "ambulance": ambulance,
@@ -45,7 +45,7 @@ def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
     shape, extra = spec.shape, tuple(replace(axle, x=axle.x - spec.offset[0]) for axle in spec.extra_axles)
     if spec.wheelbase <= 0.0 and extra:
         shape, extra = ("trailer", extra) if shape == "truck" else (shape, ())
-    return _mesh(shape, Frame(length, width, height, front, rear, radius, extra), motion)
+    return _mesh(shape, BodyDimensions(length, width, height, front, rear, radius, extra), motion)
 
 
 def shadow(spec: ActorSpec) -> Array:
@@ -65,7 +65,7 @@ _ABOVE_GROUND = 0.035
 
 
 @lru_cache(maxsize=256)
-def _mesh(shape: str, frame: Frame, motion: str) -> Mapping[str, Array]:
+def _mesh(shape: str, frame: BodyDimensions, motion: str) -> Mapping[str, Array]:
     if shape == "pedestrian" and motion:
         return in_motion(frame, motion)
     return (trailer if shape == "trailer" else BUILDERS[shape])(frame).materials()

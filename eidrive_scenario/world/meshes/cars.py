@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.world.meshes.frame import Frame, add_wheels
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_wheels
 from eidrive_scenario.world.meshes.solids import Array, Mesh, box, loft, polygon
 
 _TALL = 0.37
 """Height over length above which a car is built as an off-roader or hatchback, without a boot."""
 
 
-def car(frame: Frame) -> Mesh:
+def car(frame: BodyDimensions) -> Mesh:
     """A saloon with bonnet and boot; a tall or short one gets an upright tail instead."""
     mesh = Mesh()
     upright = frame.height / frame.length > _TALL or frame.length < 4.3
@@ -25,7 +25,7 @@ def car(frame: Frame) -> Mesh:
     return mesh
 
 
-def _ring(frame: Frame, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
+def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, waist: float, top: float) -> Array:
     """A section of the shell at a share x of the length: shares of half the width and of the height."""
     y, tilt = width * frame.side, 0.9
     half = [(y * 0.86, bottom), (y, bottom + 0.07), (y * 1.0, waist), (y * tilt, top - 0.015), (y * 0.55, top)]
@@ -33,7 +33,7 @@ def _ring(frame: Frame, x: float, width: float, bottom: float, waist: float, top
     return np.array([(frame.x(x), a, frame.z(b)) for a, b in points])
 
 
-def _shell(mesh: Mesh, frame: Frame, belt: float, side: float, upright: bool) -> None:
+def _shell(mesh: Mesh, frame: BodyDimensions, belt: float, side: float, upright: bool) -> None:
     """The body below the windows."""
     tail = belt if upright else belt + 0.02
     sections = [
@@ -52,7 +52,9 @@ def _shell(mesh: Mesh, frame: Frame, belt: float, side: float, upright: bool) ->
     mesh.add("paint", loft([_ring(frame, *section) for section in sections]))
 
 
-def _cabin(mesh: Mesh, frame: Frame, belt: float, sill: tuple[float, float], roof: tuple[float, float]) -> None:
+def _cabin(
+    mesh: Mesh, frame: BodyDimensions, belt: float, sill: tuple[float, float], roof: tuple[float, float]
+) -> None:
     """Roof, pillars and windows above the belt line."""
     low, high = frame.z(belt - 0.01), frame.z(0.975)
     wide, narrow = 0.87 * frame.side, 0.66 * frame.side
@@ -91,7 +93,7 @@ def _pane(face: Array, left: float, right: float, low: float, high: float) -> Ar
     return polygon([at(left, low), at(right, low), at(right, high), at(left, high)])
 
 
-def _details(mesh: Mesh, frame: Frame, belt: float, upright: bool) -> None:
+def _details(mesh: Mesh, frame: BodyDimensions, belt: float, upright: bool) -> None:
     """Lights, grille, bumpers, plates, mirrors, door lines, handles."""
     x, z, side = frame.x, frame.z, frame.side
     nose, tail = x(1.0), x(0.0)

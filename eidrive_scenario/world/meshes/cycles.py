@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.world.meshes.frame import Frame, add_extra_wheels
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_extra_wheels
 from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, box, cylinder, tapered_box
 
 
-def motorbike(frame: Frame) -> Mesh:
+def motorbike(frame: BodyDimensions) -> Mesh:
     """A motorbike and a rider with helmet, as high as the frame."""
     mesh = Mesh()
     radius, x0, x1 = min(frame.wheel_radius, 0.34), frame.rear, frame.front
@@ -33,7 +33,7 @@ def motorbike(frame: Frame) -> Mesh:
     return mesh
 
 
-def bicycle(frame: Frame) -> Mesh:
+def bicycle(frame: BodyDimensions) -> Mesh:
     """A bicycle and a rider."""
     mesh = Mesh()
     radius, x0, x1 = min(frame.wheel_radius, 0.36), frame.rear, frame.front
@@ -70,7 +70,7 @@ def _wheel(mesh: Mesh, x: float, radius: float, wide: float, rim: float) -> None
 
 def _rider(
     mesh: Mesh,
-    frame: Frame,
+    frame: BodyDimensions,
     seat_x: float,
     seat_z: float,
     bar: tuple[float, float, float],

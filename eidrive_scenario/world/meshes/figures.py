@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.world.meshes.frame import Frame
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions
 from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylinder
 
 
-def roadside_unit(frame: Frame) -> Mesh:
+def roadside_unit(frame: BodyDimensions) -> Mesh:
     """A mast with a cabinet at its foot and a head of camera, LiDAR and antenna."""
     mesh = Mesh()
     z, side = frame.z, frame.side
@@ -29,7 +29,7 @@ def roadside_unit(frame: Frame) -> Mesh:
     return mesh
 
 
-def crate(frame: Frame) -> Mesh:
+def crate(frame: BodyDimensions) -> Mesh:
     """A box with battens, for whatever has no shape of its own."""
     mesh = Mesh()
     length, width, height = frame.length, frame.width, frame.height

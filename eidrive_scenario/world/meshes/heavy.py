@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.world.meshes.frame import Frame, add_extra_wheels, add_wheels
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_extra_wheels, add_wheels
 from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, cylinder, tapered_box
 
 
-def truck(frame: Frame) -> Mesh:
+def truck(frame: BodyDimensions) -> Mesh:
     """A cab over the engine and a closed cargo body."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
@@ -25,7 +25,7 @@ def truck(frame: Frame) -> Mesh:
     return mesh
 
 
-def trailer(frame: Frame) -> Mesh:
+def trailer(frame: BodyDimensions) -> Mesh:
     """A closed cargo body on its own axles, with legs to stand on."""
     mesh = Mesh()
     radius = max((axle.wheel_radius for axle in frame.extra_axles), default=0.0) or frame.wheel_radius
@@ -39,7 +39,7 @@ def trailer(frame: Frame) -> Mesh:
     return mesh
 
 
-def _cargo(mesh: Mesh, frame: Frame, cargo: float, floor: float) -> None:
+def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> None:
     """A closed body over `cargo` metres from the rear end on, with seams and a stripe."""
     x, side = frame.x, frame.side
     middle = x(0.0) + cargo / 2
@@ -54,7 +54,7 @@ def _cargo(mesh: Mesh, frame: Frame, cargo: float, floor: float) -> None:
     mesh.add_mirrored("paint", box((middle, side, floor + 0.35 * (frame.height - floor)), (cargo, 0.016, 0.22)))
 
 
-def firetruck(frame: Frame) -> Mesh:
+def firetruck(frame: BodyDimensions) -> Mesh:
     """A crew cab, lockers with roller shutters, a ladder on the roof and blue lights."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
@@ -95,7 +95,7 @@ def firetruck(frame: Frame) -> Mesh:
     return mesh
 
 
-def bus(frame: Frame) -> Mesh:
+def bus(frame: BodyDimensions) -> Mesh:
     """A bus with a band of windows, doors on the right and a sign above the windscreen."""
     mesh = Mesh()
     x, z, side = frame.x, frame.z, frame.side
@@ -143,7 +143,7 @@ def bus(frame: Frame) -> Mesh:
     return mesh
 
 
-def _cab(mesh: Mesh, frame: Frame, length: float, top: float, material: str, *, crew: bool = False) -> None:
+def _cab(mesh: Mesh, frame: BodyDimensions, length: float, top: float, material: str, *, crew: bool = False) -> None:
     """The driver's cab at the front end, as high as a share of the height."""
     x, z, side = frame.x, frame.z, frame.side
     nose, floor, roof = x(1.0), 0.75 * frame.wheel_radius, z(top)
@@ -202,7 +202,7 @@ def _cab(mesh: Mesh, frame: Frame, length: float, top: float, material: str, *, 
     )
 
 
-def _tail(mesh: Mesh, frame: Frame, floor: float) -> None:
+def _tail(mesh: Mesh, frame: BodyDimensions, floor: float) -> None:
     x, side = frame.x(0.0), frame.side
     mesh.add("plastic", box((x + 0.08, 0, floor - 0.30), (0.12, 1.84 * side, 0.16)))
     mesh.add_mirrored("taillight", box((x + 0.02, 0.82 * side, floor - 0.13), (0.06, 0.26 * side, 0.14)))
@@ -211,7 +211,7 @@ def _tail(mesh: Mesh, frame: Frame, floor: float) -> None:
     mesh.add("plate", box((x + 0.015, 0, floor - 0.30), (0.03, 0.52, 0.11)))
 
 
-def _chassis(mesh: Mesh, frame: Frame) -> None:
+def _chassis(mesh: Mesh, frame: BodyDimensions) -> None:
     """Frame, tank and wheels; twin tyres at the rear."""
     radius, side = frame.wheel_radius, frame.side
     mesh.add("trim", box((-0.02, 0, 1.3 * radius), (0.94 * frame.length, 0.9 * side, 0.6 * radius)))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.world.meshes.frame import Frame
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions
 from eidrive_scenario.world.meshes.solids import Array, Mesh, ball, bevelled_box, cylinder, moved, tapered_box
 
 
@@ -50,17 +50,17 @@ POSTURES: Mapping[str, Posture] = {
 """By the standard's PedestrianMotionType; without one people walk."""
 
 
-def in_motion(frame: Frame, motion: str) -> dict[str, Array]:
+def in_motion(frame: BodyDimensions, motion: str) -> dict[str, Array]:
     """Material to triangles of a pedestrian in a motion; in one that is not known it stands."""
     return _held(frame, POSTURES.get(motion, POSTURES["standing"])).materials()
 
 
-def pedestrian(frame: Frame) -> Mesh:
+def pedestrian(frame: BodyDimensions) -> Mesh:
     """Somebody in mid-stride, arms swinging, inside the box."""
     return _held(frame, WALKING)
 
 
-def _held(frame: Frame, posture: Posture) -> Mesh:
+def _held(frame: BodyDimensions, posture: Posture) -> Mesh:
     mesh = Mesh()
     _legs(mesh, frame, posture)
     _upper_body(mesh, frame, posture)
@@ -71,15 +71,15 @@ def _held(frame: Frame, posture: Posture) -> Mesh:
     return mesh
 
 
-def _stride(frame: Frame, posture: Posture) -> float:
+def _stride(frame: BodyDimensions, posture: Posture) -> float:
     return posture.pace * min(0.5 * frame.length - 0.11, 0.16 * frame.height)
 
 
-def _shoulder(frame: Frame) -> float:
+def _shoulder(frame: BodyDimensions) -> float:
     return min(0.132 * frame.height, frame.side - 0.06)
 
 
-def _legs(mesh: Mesh, frame: Frame, posture: Posture) -> None:
+def _legs(mesh: Mesh, frame: BodyDimensions, posture: Posture) -> None:
     z, stride, hip = frame.z, _stride(frame, posture), frame.z(posture.hip)
     thigh, calf = 0.047 * frame.height, 0.034 * frame.height
     for sign in (-1, 1):
@@ -95,7 +95,7 @@ def _legs(mesh: Mesh, frame: Frame, posture: Posture) -> None:
     mesh.add("trousers", bevelled_box((0, 0, hip), (0.2, 1.5 * _shoulder(frame), z(0.08)), 0.04))
 
 
-def _upper_body(mesh: Mesh, frame: Frame, posture: Posture) -> None:
+def _upper_body(mesh: Mesh, frame: BodyDimensions, posture: Posture) -> None:
     """From the hip up, bent about it; the arms hang and swing."""
     z, shoulder, head = frame.z, _shoulder(frame), 0.068 * frame.height
     hip, neck = z(0.50), z(0.835)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.world.meshes.frame import Frame, add_wheels
+from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_wheels
 from eidrive_scenario.world.meshes.solids import Array, Mesh, bevelled_box, box, loft, polygon
 
 
-def van(frame: Frame) -> Mesh:
+def van(frame: BodyDimensions) -> Mesh:
     """A delivery van with a closed body."""
     mesh = Mesh()
     _body(mesh, frame, roof_from=0.0)
@@ -22,7 +22,7 @@ def van(frame: Frame) -> Mesh:
     return mesh
 
 
-def ambulance(frame: Frame) -> Mesh:
+def ambulance(frame: BodyDimensions) -> Mesh:
     """A van with a box behind the cab, stripes and blue lights."""
     mesh = Mesh()
     _body(mesh, frame, roof_from=0.60)
@@ -55,7 +55,7 @@ def ambulance(frame: Frame) -> Mesh:
     return mesh
 
 
-def _ring(frame: Frame, x: float, width: float, bottom: float, shoulder: float, top: float) -> Array:
+def _ring(frame: BodyDimensions, x: float, width: float, bottom: float, shoulder: float, top: float) -> Array:
     """A section of the body: `width` is a share of half the width, the others of the height."""
     y = width * frame.side
     half = [(0.94 * y, bottom), (y, bottom + 0.05), (y, shoulder), (0.90 * y, top - 0.04), (0.80 * y, top)]
@@ -63,7 +63,7 @@ def _ring(frame: Frame, x: float, width: float, bottom: float, shoulder: float, 
     return np.array([(frame.x(x), a, frame.z(b)) for a, b in points])
 
 
-def _body(mesh: Mesh, frame: Frame, roof_from: float) -> None:
+def _body(mesh: Mesh, frame: BodyDimensions, roof_from: float) -> None:
     """Bonnet, cab, and the closed body back to a share of the length."""
     sections = [
         (0.80, 0.965, 0.13, 0.53, 0.985),
@@ -88,7 +88,7 @@ def _body(mesh: Mesh, frame: Frame, roof_from: float) -> None:
     mesh.add("paint", loft([_ring(frame, *section) for section in sections]))
 
 
-def _cab_details(mesh: Mesh, frame: Frame) -> None:
+def _cab_details(mesh: Mesh, frame: BodyDimensions) -> None:
     x, z, side = frame.x, frame.z, frame.side
     # Between the sections at 0.835 and 0.925, where the windscreen lies on the skin.
     low, high = (x(0.921), z(0.60)), (x(0.840), z(0.905))
@@ -116,7 +116,7 @@ def _cab_details(mesh: Mesh, frame: Frame) -> None:
     mesh.add_mirrored("trim", box((x(0.90), 0.985 * side, z(0.60)), (0.12, 0.10, 0.26)))
 
 
-def _rear_doors(mesh: Mesh, frame: Frame, _: str) -> None:
+def _rear_doors(mesh: Mesh, frame: BodyDimensions, _: str) -> None:
     x, z, side = frame.x, frame.z, frame.side
     tail = x(0.0)
     mesh.add("trim", box((tail + 0.01, 0, z(0.53)), (0.03, 0.02, z(0.74))))

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.render.eye import Eye
-from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import Cover
+from eidrive_scenario.world.render.camera_view import CameraView
+from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.rasterization import Cover
 
 _LEAST = 0.12
 """Share of the sky's light in the middle below a body."""
@@ -29,7 +29,7 @@ class _Window(NamedTuple):
     columns: slice
 
 
-def dimmed(bodies: Sequence[Instance], cover: Cover, upright: NDArray[np.bool_], eye: Eye) -> Floats:
+def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.bool_], eye: CameraView) -> Floats:
     """(H, W) share of the sky's light that bodies leave to the ground that the pixels show; `upright` by triangle."""
     share = np.ones(eye.shape, dtype=np.float32)
     for body in bodies:
@@ -45,7 +45,13 @@ def dimmed(bodies: Sequence[Instance], cover: Cover, upright: NDArray[np.bool_],
 
 
 def _dim(
-    share: Floats, window: _Window, middle: Array, body: Instance, cover: Cover, upright: NDArray[np.bool_], eye: Eye
+    share: Floats,
+    window: _Window,
+    middle: Array,
+    body: MeshInstance,
+    cover: Cover,
+    upright: NDArray[np.bool_],
+    eye: CameraView,
 ) -> None:
     """What one body leaves in its window of the picture."""
     triangle = cover.triangle[window]
@@ -70,7 +76,7 @@ def _dim(
     share[lines, columns] = np.minimum(share[lines, columns], np.float32(_LEAST) + np.float32(1.0 - _LEAST) * rise)
 
 
-def _window(middle: Array, body: Instance, half: Array, eye: Eye) -> _Window | None:
+def _window(middle: Array, body: MeshInstance, half: Array, eye: CameraView) -> _Window | None:
     """The part of the picture that the dimmed ground around a body can fill; None where it is out of the picture."""
     pinhole = eye.pinhole
     signs = np.array([(1, 1, 0), (1, -1, 0), (-1, -1, 0), (-1, 1, 0)], dtype=float)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.render import lamps
-from eidrive_scenario.world.render.eye import Eye
+from eidrive_scenario.world.render.camera_view import CameraView
+from eidrive_scenario.world.render.culling import Surfaces
 from eidrive_scenario.world.render.model import Floats
-from eidrive_scenario.world.render.rasterise import Cover
-from eidrive_scenario.world.render.staging import Surfaces
+from eidrive_scenario.world.render.rasterization import Cover
 
 _BESIDE_THE_CAMERA = 4.0
 """Lamps as near as this send light along the camera's own rays, so that sheeting returns it there [m]."""
@@ -27,7 +27,7 @@ class Lamplight(NamedTuple):
     across: Floats
 
 
-def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, eye: Eye) -> Lamplight | None:
+def lamplight(beams: Sequence[lamps.Beam], cover: Cover, surfaces: Surfaces, eye: CameraView) -> Lamplight | None:
     """The light of all beams; None where the picture shows nothing."""
     triangle = cover.triangle[::2, ::2]
     seen = triangle >= 0

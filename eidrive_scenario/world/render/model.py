@@ -74,7 +74,7 @@ class Cells(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Instance:
+class MeshInstance:
     """A model somewhere: rotation (3, 3) and position (3,) to the world, label in the segmentation.
 
     glow   what its materials emit [cd/m²], by material

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
+from eidrive_scenario.world.render.camera_view import CameraView, runs
 from eidrive_scenario.world.render.contact import dimmed
+from eidrive_scenario.world.render.culling import cull_and_project
 from eidrive_scenario.world.render.daylight import Daylight, daylight
-from eidrive_scenario.world.render.eye import Eye, runs
 from eidrive_scenario.world.render.lamplight import Lamplight, lamplight
 from eidrive_scenario.world.render.lamps import Beam
 from eidrive_scenario.world.render.materials import SOAKS
-from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import Cover, rasterise, rasterised
+from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.rasterization import Cover, rasterize, rasterize_reference
 from eidrive_scenario.world.render.shading import Lit, lit_surfaces, points_at, sampled, shade, together
 from eidrive_scenario.world.render.shadows import ShadowGrid, ShadowMap, shadow_grid
 from eidrive_scenario.world.render.sky import dome, horizon
-from eidrive_scenario.world.render.staging import stage
 from eidrive_scenario.world.weather import Weather
 
 DAYLIGHT = 1000.0
@@ -37,13 +37,13 @@ class Subjects(NamedTuple):
     """What there is to see: what lies on the ground, what stands on it and shades, actors, and such that are not seen,
     but shade."""
 
-    ground: Sequence[Instance]
-    standing: Sequence[Instance]
-    actors: Sequence[Instance]
-    unseen: Sequence[Instance] = ()
+    ground: Sequence[MeshInstance]
+    standing: Sequence[MeshInstance]
+    actors: Sequence[MeshInstance]
+    unseen: Sequence[MeshInstance] = ()
 
     @property
-    def scenery(self) -> Sequence[Instance]:
+    def scenery(self) -> Sequence[MeshInstance]:
         """All but actors."""
         return (*self.ground, *self.standing)
 
@@ -51,7 +51,7 @@ class Subjects(NamedTuple):
 class _Circumstances(NamedTuple):
     """What all pixels have in common."""
 
-    eye: Eye
+    eye: CameraView
     weather: Weather
     light: Daylight
     sky: Floats
@@ -118,7 +118,7 @@ class Renderer:
         Scenery is kept from the second picture on that shows the same.
         """
         light = daylight(weather)
-        eye = Eye(pose, pinhole)
+        eye = CameraView(pose, pinhole)
         grid = shadow_grid(light.towards, eye) if light.sun.any() else None
         at = _Circumstances(eye, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
@@ -155,8 +155,8 @@ def _forget_first(memory: dict[object, Any], most: int) -> None:
 
 def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
     """The picture, all drawn anew."""
-    staged = stage([*subjects.scenery, *subjects.actors], at.eye.pose, at.eye.pinhole)
-    cover = rasterise(staged.x, staged.y, staged.nearness, at.eye.pinhole.width, at.eye.pinhole.height)
+    staged = cull_and_project([*subjects.scenery, *subjects.actors], at.eye.pose, at.eye.pinhole)
+    cover = rasterize(staged.x, staged.y, staged.nearness, at.eye.pinhole.width, at.eye.pinhole.height)
     lit = lit_surfaces(staged.surfaces, at.light, at.weather)
     casters = [*subjects.standing, *subjects.actors, *subjects.unseen]
     shadows = at.grid.drawn(casters) if at.grid is not None else None
@@ -166,7 +166,7 @@ def _whole(subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground
     return canvas
 
 
-def _dimming(subjects: Subjects) -> list[Instance]:
+def _dimming(subjects: Subjects) -> list[MeshInstance]:
     return [each for each in (*subjects.standing, *subjects.actors) if each.label >= 0]
 
 
@@ -234,8 +234,8 @@ def _through_air(luminance: Floats, distance: Floats, weather: Weather) -> Float
 def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
     """The picture without actors, and what is needed to draw them into it."""
     eye = at.eye
-    staged = stage(subjects.scenery, eye.pose, eye.pinhole)
-    cover = rasterise(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
+    staged = cull_and_project(subjects.scenery, eye.pose, eye.pinhole)
+    cover = rasterize(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
     lit = lit_surfaces(staged.surfaces, at.light, at.weather)
     canvas = _Canvas.blank(cover.triangle.size)
     heights = cells = still = None
@@ -254,8 +254,8 @@ def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
 def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
     """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbours too."""
     eye = at.eye
-    staged = stage(subjects.actors, eye.pose, eye.pinhole)
-    seen = rasterised(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
+    staged = cull_and_project(subjects.actors, eye.pose, eye.pinhole)
+    seen = rasterize_reference(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)
     lit = together(known.lit, lit_surfaces(staged.surfaces, at.light, at.weather))
     triangle, nearness = known.cover.triangle.copy(), known.cover.nearness.copy()
     before = (seen.triangle >= 0) & (seen.nearness >= nearness[seen.window])

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.render import lamps, wet_road
+from eidrive_scenario.world.render.camera_view import CameraView, Pixels
+from eidrive_scenario.world.render.culling import Surfaces
 from eidrive_scenario.world.render.daylight import GROUND_ALBEDO, Daylight
-from eidrive_scenario.world.render.eye import Eye, Pixels
 from eidrive_scenario.world.render.lamplight import Lamplight
 from eidrive_scenario.world.render.materials import GRAIN, MIRROR, RETURNS, SOAKS
 from eidrive_scenario.world.render.model import Array, Floats
-from eidrive_scenario.world.render.rasterise import Cover
+from eidrive_scenario.world.render.rasterization import Cover
 from eidrive_scenario.world.render.shadows import ShadowMap
 from eidrive_scenario.world.render.sky import sample
-from eidrive_scenario.world.render.staging import Surfaces
 from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather
 
@@ -38,7 +38,7 @@ class Points(NamedTuple):
     distance: Floats
 
 
-def points_at(pixels: Pixels, cover: Cover, eye: Eye) -> Points:
+def points_at(pixels: Pixels, cover: Cover, eye: CameraView) -> Points:
     """What pixels show that show something."""
     far = np.float32(1.0) / cover.nearness.reshape(-1)[pixels]
     rx, ry, rz = eye.rays(eye.x[pixels], eye.y[pixels])

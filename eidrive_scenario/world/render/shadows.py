@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.render.eye import Eye
-from eidrive_scenario.world.render.model import Array, Floats, Instance
-from eidrive_scenario.world.render.rasterise import greatest
+from eidrive_scenario.world.render.camera_view import CameraView
+from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.rasterization import greatest
 
 REACH = 80.0
 """How far from the camera shadows are drawn [m]."""
@@ -59,7 +59,7 @@ class ShadowGrid:
         found: NDArray[np.int32] = np.where(within, row * np.float32(self.width) + column, -1.0).astype(np.int32)
         return found
 
-    def drawn(self, casters: Sequence[Instance]) -> ShadowMap:
+    def drawn(self, casters: Sequence[MeshInstance]) -> ShadowMap:
         """What these bodies shade.
 
         It shows the sides that turn away from the sun: those facing it lie above, and so do not shade themselves.
@@ -150,7 +150,7 @@ class ShadowMap:
         return ShadowMap(self.grid, heights, 0, 0), np.append(around.ravel(), False)
 
 
-def shadow_grid(towards: Array, eye: Eye) -> ShadowGrid | None:
+def shadow_grid(towards: Array, eye: CameraView) -> ShadowGrid | None:
     """The grid for the part of the world that a camera sees; None if the sun is too low."""
     if towards[2] < _LOWEST:
         return None
@@ -167,7 +167,7 @@ def shadow_grid(towards: Array, eye: Eye) -> ShadowGrid | None:
     return ShadowGrid(axes, towards, low, high, width, height, scale, base, eye.place)
 
 
-def _seen_ground(eye: Eye) -> Array:
+def _seen_ground(eye: CameraView) -> Array:
     """(M, 3) points, relative to the camera, around the part of the view within reach, near the ground and above."""
     pinhole, pose = eye.pinhole, eye.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
@@ -189,7 +189,7 @@ def _seen_ground(eye: Eye) -> Array:
     return found
 
 
-def _away(caster: Instance, grid: ShadowGrid) -> Array | None:
+def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:
     """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
     them can shade the grid."""
     model, axes, eye, low, high = caster.model, grid.axes, grid.eye, grid.low, grid.high

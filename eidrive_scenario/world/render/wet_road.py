@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.eye import Eye
+from eidrive_scenario.world.render.camera_view import CameraView
 from eidrive_scenario.world.render.model import Array, Floats
-from eidrive_scenario.world.render.rasterise import Cover
+from eidrive_scenario.world.render.rasterization import Cover
 from eidrive_scenario.world.render.sky import sample
 from eidrive_scenario.world.render.surfaces import hollows
 
@@ -24,7 +24,7 @@ _HEIGHT = 0.15
 
 
 def add_reflections(
-    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, eye: Eye,
+    planes: Floats, on_road: NDArray[np.intp], cover: Cover, open_sky: Floats, dome: Floats, eye: CameraView,
     wetness: float, ground: float,
 ) -> None:  # fmt: skip
     """Add to luminance (3, P) of all pixels what a wet road mirrors in those that show one, from a picture of half as

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.building import build_agent, build_rig
+from eidrive_scenario.driving.agent_factory import build_agent, build_rig
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import SettingError

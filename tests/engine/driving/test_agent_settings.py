@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent
+from eidrive_scenario.driving.settings import AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario.model.controllers import Controller
 from eidrive_scenario.openscenario.model.properties import Properties, Property
@@ -44,10 +44,10 @@ def test_what_a_detector_usually_has_gives_way_to_what_the_station_says() -> Non
 
 
 def test_which_controllers_are_ours() -> None:
-    assert is_agent(controller(("module", "eidrive")))
-    assert not is_agent(controller(("module", "other")))
-    assert not is_agent(controller(("esminiController", "SumoController")))
-    assert not is_agent(Controller(name="empty"))
+    assert is_agent_controller(controller(("module", "eidrive")))
+    assert not is_agent_controller(controller(("module", "other")))
+    assert not is_agent_controller(controller(("esminiController", "SumoController")))
+    assert not is_agent_controller(Controller(name="empty"))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.building import build_agent
+from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.perception_metrics import recall_by_sight, snapshot
@@ -157,5 +157,5 @@ def test_who_listens_without_wheels(names: str | None, hears: bool) -> None:
     given = {} if names is None else {"cooperates_with": names}
     settings = AgentSettings.model_validate({"detector": "lidar", "fusion": "early", **given})
     station = build_agent(settings, MAST, None, seed=0, dt=0.05, own_perception=True)
-    assert station.listens is hears
+    assert station.receives_messages is hears
     assert station.own_perception is hears

@@ -9,8 +9,8 @@ import pytest
 from scenariogeneration import xodr
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import Controller
-from eidrive_scenario.driving.path import Path
+from eidrive_scenario.driving.control import VehicleController
+from eidrive_scenario.driving.path import PlannedPath
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Goal
@@ -27,7 +27,7 @@ def ego(x: float, y: float, yaw: float = 0.0, speed: float = 0.0) -> EgoState:
 
 def test_speed_in_a_curve_is_the_root_of_five_radii() -> None:
     angles = np.linspace(0.0, math.pi, 200)
-    path = Path(np.stack([20.0 * np.sin(angles), 20.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
+    path = PlannedPath(np.stack([20.0 * np.sin(angles), 20.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
     np.testing.assert_allclose(path.limits[8:-8], math.sqrt(5.0 * 20.0), rtol=0.02)
 
 
@@ -35,7 +35,7 @@ def test_before_a_curve_the_speed_falls_with_three_metres_per_second_squared() -
     angles = np.linspace(0.0, math.pi / 2, 100)[1:]
     straight = np.stack([np.linspace(-60.0, 0.0, 61), np.zeros(61)], axis=1)
     curve = np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1)
-    path = Path(np.concatenate([straight, curve]), ends=False)
+    path = PlannedPath(np.concatenate([straight, curve]), ends=False)
     square = path.limits[5:50] ** 2
     np.testing.assert_allclose(np.diff(square), -2 * 3.0 * 1.0, rtol=0.02)
     assert path.limits.min() == pytest.approx(math.sqrt(50.0), rel=0.05)
@@ -43,22 +43,22 @@ def test_before_a_curve_the_speed_falls_with_three_metres_per_second_squared() -
 
 def test_the_end_is_a_stop_and_the_horizon_is_not() -> None:
     line = np.array([[0.0, 0.0], [50.0, 0.0]])
-    assert Path(line, ends=True).limits[-1] == 0.0
-    assert Path(line, ends=True).limits[-25] == pytest.approx(math.sqrt(2 * 3.0 * 24), rel=1e-6)
-    assert Path(line, ends=False).limits.min() > 100.0
+    assert PlannedPath(line, ends=True).limits[-1] == 0.0
+    assert PlannedPath(line, ends=True).limits[-25] == pytest.approx(math.sqrt(2 * 3.0 * 24), rel=1e-6)
+    assert PlannedPath(line, ends=False).limits.min() > 100.0
 
 
 def test_points_are_a_metre_apart_and_doubled_ones_do_no_harm() -> None:
-    path = Path(np.array([[0.0, 0.0], [0.0, 0.0], [4.0, 3.0], [4.0, 3.0], [8.0, 6.0]]), ends=True)
+    path = PlannedPath(np.array([[0.0, 0.0], [0.0, 0.0], [4.0, 3.0], [4.0, 3.0], [8.0, 6.0]]), ends=True)
     np.testing.assert_allclose(np.hypot(*np.diff(path.points, axis=0).T), 1.0)
     assert len(path) == 11
     with pytest.raises(ValueError, match="two different points"):
-        Path(np.zeros((3, 2)), ends=True)
+        PlannedPath(np.zeros((3, 2)), ends=True)
 
 
 def test_smoothing_keeps_a_curve_within_a_decimetre() -> None:
     angles = np.linspace(0.0, math.pi, 200)
-    path = Path(np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
+    path = PlannedPath(np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
     radius = np.hypot(path.points[:, 0], path.points[:, 1] - 10.0)
     assert np.abs(radius - 10.0).max() < 0.11
 
@@ -67,7 +67,7 @@ def test_projection_goes_forward_only() -> None:
     """A path that crosses itself: the vehicle stays on the branch that it is on."""
     angles = np.linspace(0.0, 2 * math.pi, 300)
     eight = np.stack([30 * np.sin(angles), 20 * np.sin(2 * angles)], axis=1)
-    path = Path(eight, ends=True)
+    path = PlannedPath(eight, ends=True)
     progress = 0
     for x, y in path.points[1:-1]:
         onward = path.project(float(x), float(y), progress)
@@ -179,7 +179,7 @@ def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadN
     here = ego(0.0, 0.0, yaw=2.0)
     for network in (None, roads):
         plan = planner(car, network, target_speed=10.0).plan(here, NOTHING, goal, 0.0)
-        control = Controller(car, 0.05).control(here, plan)
+        control = VehicleController(car, 0.05).control(here, plan)
         assert (control.throttle, control.brake > 0.0) == (0.0, True)
 
 
@@ -190,7 +190,7 @@ def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) ->
     for x in (0.0, 3.9, 4.2, 3.0):
         plan = route.plan(ego(x, 0.0, speed=2.0), NOTHING, goal, 0.0)
         assert np.hypot(*np.diff(plan.points, axis=0).T).min() > 0.1
-        assert math.isfinite(Controller(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
+        assert math.isfinite(VehicleController(car, 0.05).control(ego(x, 0.0, speed=2.0), plan).steering)
 
 
 def test_speeds(car: ActorSpec) -> None:

@@ -106,7 +106,7 @@ def test_delay_costs_precision_where_the_overlap_of_a_car_says(least: float, kne
         stale = registry("fusion").load("average")().fuse([report], delay)
         assert precision_bev([entry(stale, now[0].objects)], least) == (0.0 if lost else 1.0)
         fusion = CovarianceIntersectionFusion()
-        fusion.hear(report)
+        fusion.add_report(report)
         assert precision_bev([entry(fusion.fuse([report], delay), now[0].objects)], least) == 1.0
 
 

@@ -163,7 +163,7 @@ def a_function(readings):
 
 
 class NoSignals(Detector):
-    sees_signals = frozenset({"light"})
+    detectable_signals = frozenset({"light"})
 
     def detect(self, readings):
         return Detections(readings.time)

@@ -12,7 +12,7 @@ class FusionNone(FusionMethod):
 
 
 class FusionHearRaises(FusionMethod):
-    def hear(self, report):
+    def add_report(self, report):
         raise ZeroDivisionError("division by zero")
 
     def fuse(self, reports, now):

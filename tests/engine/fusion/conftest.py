@@ -58,7 +58,7 @@ def fuse_reports(
     fusion = fusion or CovarianceIntersectionFusion()
     newest: dict[str, Report] = {}
     for report in reports:
-        fusion.hear(report)
+        fusion.add_report(report)
         held = newest.get(report.station)
         if held is None or report.detections.time >= held.detections.time:
             newest[report.station] = report

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.association import associate
-from eidrive_scenario.fusion.average import AverageFusion, joined, joined_few
+from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry
 
@@ -171,7 +171,7 @@ def several_reports(draw: st.DrawFn) -> tuple[list[Detections], list[int]]:
 @settings(max_examples=150, deadline=None)
 @given(several_reports())
 def test_few_and_many_boxes_are_joined_alike(given: tuple[list[Detections], list[int]]) -> None:
-    few, many = joined_few(*given, 1.0), joined(*given, 1.0)
+    few, many = fuse_average_small(*given, 1.0), fuse_average(*given, 1.0)
     assert (few.time, few.classes) == (many.time, many.classes)
     np.testing.assert_allclose(few.boxes[:, :6], many.boxes[:, :6], atol=1e-12)
     lengths = [np.hypot(np.cos(box[6]) - np.cos(other[6]), np.sin(box[6]) - np.sin(other[6]))

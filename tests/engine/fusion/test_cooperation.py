@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.building import build_agent
+from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
@@ -93,7 +93,7 @@ def test_a_rumour_that_somebody_does_spread_makes_nobody_surer() -> None:
     box = np.array([[10.0, 0.0, 0.75, *CAR_SIZE, 0.0]])
     known = Detections(0.0, box, np.ones(1), ("car",), np.array([[8.0, 0.0]]), np.array([np.eye(2) * 0.09]))
     for station in "ABCDE":
-        fusion.hear(Report(station, known, 0.0))
+        fusion.add_report(Report(station, known, 0.0))
     fused = fusion.fuse([Report(station, known, 0.0) for station in "ABCDE"], 0.0)
     np.testing.assert_allclose(fused.covariance, known.covariance, rtol=1e-9)
     np.testing.assert_allclose(fused.boxes, known.boxes, atol=1e-9)
@@ -111,7 +111,7 @@ def test_no_delay_and_no_loss_equal_shared_memory() -> None:
         reports = [Report("B", before, now)] if before is not None else []
         reports.append(Report("A", talk.sent["A"], now))
         for report in reports:
-            shared.hear(report)
+            shared.add_report(report)
         expected = shared.fuse(reports, now)
         for name in ("boxes", "scores", "velocity", "covariance"):
             np.testing.assert_array_equal(getattr(fused, name), getattr(expected, name))

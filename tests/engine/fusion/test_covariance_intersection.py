@@ -176,7 +176,7 @@ def test_what_a_station_no_longer_sees_goes(report: Make) -> None:
     counts = []
     for tick in range(8):
         heard = report("A", 0.05 * tick, [(10.0, 0.0)] if tick < 4 else [])
-        fusion.hear(heard)
+        fusion.add_report(heard)
         counts.append(len(fusion.fuse([heard], 0.05 * tick)))
     assert counts[:4] == [1] * 4
     assert counts[-1] == 0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.building import build_agent
+from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion, EarlyFusionSettings
@@ -77,16 +77,16 @@ def test_it_comes_through_its_entry_point() -> None:
 def test_points_of_others_stand_where_they_were_measured() -> None:
     fusion = EarlyFusion(EarlyFusionSettings(cell=0.05))
     other = readings(0.0, (40.0, -5.0, 2.5), car(*CAR, "f"))
-    cloud = fusion.cloud(other)
+    cloud = fusion.shared_cloud(other)
     assert cloud is not None
     own = readings(0.0, (1.0, 2.0, 0.3))
-    joined = fusion.joined(own, [cloud.points()]).lidars["lidar"]
+    joined = fusion.merge_readings(own, [cloud.points()]).lidars["lidar"]
     world = joined.points @ joined.pose[:3, :3].T + joined.pose[:3, 3]
     count = len(own.lidars["lidar"].points)
     np.testing.assert_array_equal(joined.points[:count], own.lidars["lidar"].points)
     np.testing.assert_allclose(world[count:], cloud.points(), atol=1e-9)
     assert len(joined.intensity) == len(joined.points)
-    assert fusion.cloud(Readings(0.0, own.ego)) is None
+    assert fusion.shared_cloud(Readings(0.0, own.ego)) is None
 
 
 def test_a_car_that_only_the_other_can_see_is_found_and_passed_to_nobody() -> None:

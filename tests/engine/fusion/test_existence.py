@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.fusion.average import AverageFusion, joined, joined_few
+from eidrive_scenario.fusion.average import AverageFusion, fuse_average, fuse_average_small
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion, CovarianceIntersectionSettings
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.perception.existence import LIFETIME, missed
@@ -50,7 +50,7 @@ def test_a_track_that_loses_existence_at_its_station_loses_it_everywhere(report:
     counts = []
     for tick, existence in enumerate((0.95, 0.7, 0.45, 0.2)):
         known = judged(report("A", 0.1 * tick, [(10.0, 0.0)], velocity=(0.0, 0.0)), existence)
-        fusion.hear(known)
+        fusion.add_report(known)
         counts.append(len(fusion.fuse([known], 0.1 * tick)))
     assert counts == [1, 1, 0, 0]
 
@@ -59,7 +59,7 @@ def test_existence_of_two_stations_is_that_of_at_least_one(report: Make) -> None
     one, other = judged(report("A", 0.0, [(10.0, 0.0)]), 0.6), judged(report("B", 0.0, [(10.1, 0.0)]), 0.5)
     for fusion in (CovarianceIntersectionFusion(), AverageFusion()):
         for held in (one, other):
-            fusion.hear(held)
+            fusion.add_report(held)
         assert fusion.fuse([one, other], 0.0).existence.tolist() == pytest.approx([0.8])
 
 
@@ -72,7 +72,7 @@ def test_existence_does_not_depend_on_the_order_of_stations(report: Make) -> Non
     for order in permutations(reports):
         fusion = CovarianceIntersectionFusion(ALL)
         for one in order:
-            fusion.hear(one)
+            fusion.add_report(one)
         found.append(fusion.fuse(order, 0.0).existence)
         np.testing.assert_allclose(np.sort(AverageFusion().fuse(order, 0.0).existence), np.sort(found[0]))
     for existence in found[1:]:
@@ -84,7 +84,7 @@ def test_untracked_miss_follows_the_tracker_and_time_takes_its_share(report: Mak
     """One report of 0.9, one without it 0.1 s later: survival, then r (1 - p) / (1 - r p)."""
     fusion = CovarianceIntersectionFusion(ALL)
     for held in (report("A", 0.0, [(10.0, 0.0)], score=0.9), report("A", 0.1, [])):
-        fusion.hear(held)
+        fusion.add_report(held)
     found = fusion.fuse([held], 0.1).existence
     assert found[0] == pytest.approx(float(missed(np.array(0.9 * np.exp(-0.1 / LIFETIME)))), rel=1e-6)
 
@@ -105,4 +105,8 @@ def test_average_takes_scores_where_one_station_states_no_existence(report: Make
 def test_average_ways_agree_on_all_but_existence(report: Make) -> None:
     """The ways in plain numbers and in arrays leave existence to their caller."""
     known = [report("A", 0.0, [(10.0, 0.0)]).detections, report("B", 0.0, [(10.5, 0.0)]).detections]
-    assert joined(known, [0, 0], 0.0).existence.shape == joined_few(known, [0, 0], 0.0).existence.shape == (0,)
+    assert (
+        fuse_average(known, [0, 0], 0.0).existence.shape
+        == fuse_average_small(known, [0, 0], 0.0).existence.shape
+        == (0,)
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.fusion.intersection import SLACK, intersect
+from eidrive_scenario.fusion.covariance import TRACE_TOLERANCE, intersect
 from eidrive_scenario.randomness import generator
 
 
@@ -39,7 +39,7 @@ def test_the_trace_is_the_least_of_all_weights_to_within_one_percent() -> None:
     )
     ratio = np.trace(covariance, axis1=1, axis2=2) / traces.min(axis=0)
     assert ratio.min() > 1.0 - 1e-9
-    assert ratio.max() < 1.0 + SLACK + 1e-6
+    assert ratio.max() < 1.0 + TRACE_TOLERANCE + 1e-6
     assert np.all((weight >= 0.0) & (weight <= 1.0))
 
 
@@ -66,7 +66,7 @@ def test_the_weight_does_not_jump_where_both_are_about_as_good() -> None:
 def test_the_better_of_two_of_one_shape_is_taken_nearly_whole() -> None:
     mean, covariance, weight = intersect(np.zeros(2), np.eye(2), np.ones(2), 9.0 * np.eye(2))
     assert weight > 0.98
-    assert np.trace(covariance) <= 2.0 * (1.0 + SLACK) + 1e-12
+    assert np.trace(covariance) <= 2.0 * (1.0 + TRACE_TOLERANCE) + 1e-12
     assert mean[0] < 0.01
 
 

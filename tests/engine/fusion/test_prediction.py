@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from eidrive_scenario.fusion.prediction import predicted
+from eidrive_scenario.fusion.prediction import predict
 from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
 
 STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
@@ -17,11 +17,11 @@ SPREAD = np.array([[[0.5, 0.1, 0.02, 0.0], [0.1, 0.4, 0.0, 0.03], [0.02, 0.0, 0.
 
 def test_straight_on_as_the_tracker_has_it() -> None:
     """White noise acceleration: q [[T³/3, T²/2], [T²/2, T]] for each axis."""
-    mean, covariance = predicted(STATE, SPREAD, np.array([0.3]), np.array([0.0]))
+    mean, covariance = predict(STATE, SPREAD, np.array([0.3]), np.array([0.0]))
     other = ConstantVelocity().predict(Estimates(STATE, SPREAD), 0.3)
     np.testing.assert_allclose(mean, other.state, atol=1e-12)
     np.testing.assert_allclose(covariance, other.covariance, atol=1e-12)
-    still, noise = predicted(STATE, np.zeros((1, 4, 4)), np.array([0.3]), np.array([0.0]))
+    still, noise = predict(STATE, np.zeros((1, 4, 4)), np.array([0.3]), np.array([0.0]))
     assert noise[0, 0, 0] == pytest.approx(ACCELERATION_DENSITY * 0.009)
     assert noise[0, 0, 2] == pytest.approx(ACCELERATION_DENSITY * 0.045)
     assert noise[0, 3, 3] == pytest.approx(ACCELERATION_DENSITY * 0.3)
@@ -31,9 +31,9 @@ def test_straight_on_as_the_tracker_has_it() -> None:
 def test_a_turn_is_an_arc() -> None:
     """A quarter of a circle at 10 m/s and 1 rad/s: radius 10 m."""
     quarter = math.pi / 2.0
-    mean, _ = predicted(np.array([[0.0, 0.0, 10.0, 0.0]]), SPREAD, np.array([quarter]), np.array([1.0]))
+    mean, _ = predict(np.array([[0.0, 0.0, 10.0, 0.0]]), SPREAD, np.array([quarter]), np.array([1.0]))
     np.testing.assert_allclose(mean, [[10.0, 10.0, 0.0, 10.0]], atol=1e-9)
-    right, _ = predicted(np.array([[0.0, 0.0, 10.0, 0.0]]), SPREAD, np.array([quarter]), np.array([-1.0]))
+    right, _ = predict(np.array([[0.0, 0.0, 10.0, 0.0]]), SPREAD, np.array([quarter]), np.array([-1.0]))
     np.testing.assert_allclose(right, [[10.0, -10.0, 0.0, -10.0]], atol=1e-9)
 
 
@@ -44,21 +44,21 @@ def test_the_transition_of_a_turn_solves_its_differential_equation(turn: float) 
     generator[0, 2] = generator[1, 3] = 1.0
     generator[2, 3], generator[3, 2] = -turn, turn
     forward = expm(0.4 * generator)
-    mean, covariance = predicted(STATE, SPREAD, np.array([0.4]), np.array([turn]))
-    _, noise = predicted(STATE, np.zeros((1, 4, 4)), np.array([0.4]), np.array([turn]))
+    mean, covariance = predict(STATE, SPREAD, np.array([0.4]), np.array([turn]))
+    _, noise = predict(STATE, np.zeros((1, 4, 4)), np.array([0.4]), np.array([turn]))
     np.testing.assert_allclose(mean[0], forward @ STATE[0], atol=1e-9)
     np.testing.assert_allclose((covariance - noise)[0], forward @ SPREAD[0] @ forward.T, atol=1e-9)
 
 
 def test_two_steps_are_one_and_each_track_has_its_own() -> None:
     steps = np.array([0.1, 0.25])
-    both = predicted(np.repeat(STATE, 2, 0), np.repeat(SPREAD, 2, 0), steps, np.zeros(2))
-    half = predicted(*predicted(STATE, SPREAD, np.array([0.1]), np.zeros(1)), np.array([0.15]), np.zeros(1))
+    both = predict(np.repeat(STATE, 2, 0), np.repeat(SPREAD, 2, 0), steps, np.zeros(2))
+    half = predict(*predict(STATE, SPREAD, np.array([0.1]), np.zeros(1)), np.array([0.15]), np.zeros(1))
     np.testing.assert_allclose(both[0][1], half[0][0], atol=1e-12)
     np.testing.assert_allclose(both[1][1], half[1][0], atol=1e-12)
 
 
 def test_a_clock_that_is_fast_makes_nothing_more_certain() -> None:
-    _, covariance = predicted(STATE, SPREAD, np.array([-0.02]), np.zeros(1))
+    _, covariance = predict(STATE, SPREAD, np.array([-0.02]), np.zeros(1))
     assert np.linalg.eigvalsh(covariance[0]).min() > 0.0
     assert covariance[0, 2, 2] > SPREAD[0, 2, 2]

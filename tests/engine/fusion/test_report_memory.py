@@ -11,8 +11,8 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import Gate
-from eidrive_scenario.fusion.report_memory import ReportMemory
+from eidrive_scenario.fusion.pairs import AssociationGate
+from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.randomness import generator
 
 Make = Callable[..., Report]
@@ -68,9 +68,9 @@ def test_so_it_is_when_each_is_fused_as_it_comes(tracked: bool, report: Make) ->
     late = sorted(reports, key=lambda given: given.detections.time + rng.uniform(0.0, 0.6))
     in_order, out_of_order = CovarianceIntersectionFusion(), CovarianceIntersectionFusion()
     for first, second in zip(reports, late, strict=True):
-        in_order.hear(first)
+        in_order.add_report(first)
         in_order.fuse([first], first.detections.time)
-        out_of_order.hear(second)
+        out_of_order.add_report(second)
         out_of_order.fuse([second], second.detections.time + 0.3)
     newest = reports[-2:]
     assert_equal(in_order.fuse(newest, 1.5), out_of_order.fuse(newest, 1.5))
@@ -86,15 +86,15 @@ def test_a_late_report_counts(report: Make, fuse: Fuse) -> None:
 
 def test_one_that_is_older_than_all_that_is_remembered_comes_too_late(report: Make) -> None:
     """Then it does not count, and is not taken for the start of all."""
-    memory = ReportMemory(1.0, Gate.of(0.99, 4.0))
+    memory = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
     times = np.arange(0.0, 3.01, 0.1).tolist()
     for time in times:
-        memory.hear(report("A", time, [(10.0 * time, 0.0)], covariance=0.01))
+        memory.add_report(report("A", time, [(10.0 * time, 0.0)], covariance=0.01))
         memory.tracks()
     before = memory.tracks().copy()
-    memory.hear(report("A", 1.0, [(10.0, 0.0)], covariance=0.01))
+    memory.add_report(report("A", 1.0, [(10.0, 0.0)], covariance=0.01))
     np.testing.assert_array_equal(memory.tracks(), before)
-    memory.hear(report("A", 2.05, [(20.5, 0.0)], covariance=0.01))
+    memory.add_report(report("A", 2.05, [(20.5, 0.0)], covariance=0.01))
     assert not np.array_equal(memory.tracks(), before)
 
 
@@ -104,9 +104,9 @@ def test_a_report_heard_twice_counts_once(report: Make, fuse: Fuse) -> None:
 
 
 def test_the_memory_stays_small(report: Make) -> None:
-    memory = ReportMemory(1.0, Gate.of(0.99, 4.0))
+    memory = ReportHistory(1.0, AssociationGate.of(0.99, 4.0))
     for tick in range(400):
-        memory.hear(report("A", 0.05 * tick, [(0.5 * tick, 0.0)], covariance=0.01))
+        memory.add_report(report("A", 0.05 * tick, [(0.5 * tick, 0.0)], covariance=0.01))
         memory.tracks()
     assert len(memory._histories[0].entries) <= 22
     assert len(memory.tracks()) == 1
@@ -134,7 +134,7 @@ def test_stations_that_have_gone_are_forgotten_and_nobody_notices(
             now = 0.05 * tick
             while waiting and waiting[-1][0] <= now:
                 said = waiting.pop()[1]
-                fusion.hear(said)
+                fusion.add_report(said)
                 newest[said.station] = max(said, newest.get(said.station, said), key=lambda one: one.detections.time)
             pictures.append(fusion.fuse(list(newest.values()), now))
         return pictures, fusion
@@ -142,7 +142,7 @@ def test_stations_that_have_gone_are_forgotten_and_nobody_notices(
     forgetting, fusion = fused()
     assert len(fusion._memory.stations) < 12
     assert len(fusion._memory.tracks()) < 12
-    monkeypatch.setattr(ReportMemory, "forget", lambda memory, now: None)
+    monkeypatch.setattr(ReportHistory, "evict_stale", lambda memory, now: None)
     remembering, fusion = fused()
     assert len(fusion._memory.stations) == 60
     assert max(map(len, forgetting)) > 2

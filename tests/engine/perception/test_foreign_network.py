@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.perception.learned.foreign_network import ForeignNetwork
+from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_network import MARGIN_GREY, letterboxed
 
 ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
@@ -56,7 +56,7 @@ def red_square() -> NDArray[np.uint8]:
     return picture
 
 
-def assert_finds_the_square(network: ForeignNetwork) -> None:
+def assert_finds_the_square(network: ExternalNetwork) -> None:
     found = network.find(red_square())
     assert found.classes == ("car",)
     np.testing.assert_allclose(found.boxes, [[72.0, 40.0, 104.0, 72.0]], atol=1e-3)
@@ -65,18 +65,18 @@ def assert_finds_the_square(network: ForeignNetwork) -> None:
 
 
 def test_an_onnx_model_finds_what_it_was_made_for() -> None:
-    assert_finds_the_square(ForeignNetwork(ONNX, CLASSES, SIZE, 0.5))
+    assert_finds_the_square(ExternalNetwork(ONNX, CLASSES, SIZE, 0.5))
 
 
 def test_a_torchscript_model_finds_the_same(torchscript: Path) -> None:
-    assert_finds_the_square(ForeignNetwork(torchscript, CLASSES, SIZE, 0.5, allow_torchscript=True))
+    assert_finds_the_square(ExternalNetwork(torchscript, CLASSES, SIZE, 0.5, allow_torchscript=True))
 
 
 def test_a_letterboxed_picture_keeps_its_shape_and_its_boxes_their_place() -> None:
     """A square picture in the middle of a network's input of 96 x 64: 16 pixels of margin at either side."""
     picture = np.full((128, 128, 3), 90, dtype=np.uint8)
     picture[48:64, 48:64] = (255, 0, 0)
-    found = ForeignNetwork(ONNX, CLASSES, SIZE, 0.5, letterbox=True).find(picture)
+    found = ExternalNetwork(ONNX, CLASSES, SIZE, 0.5, letterbox=True).find(picture)
     assert found.classes == ("car",)
     np.testing.assert_allclose(found.boxes, [[40.0, 40.0, 72.0, 72.0]], atol=1e-3)
     small, scale, corner = letterboxed(np.full((50, 300, 3), 7, dtype=np.uint8), SIZE)
@@ -89,17 +89,17 @@ def test_a_letterboxed_picture_keeps_its_shape_and_its_boxes_their_place() -> No
 
 def test_weights_that_do_not_fit_are_told_with_a_remedy(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=r"give \(1, 96, 7\), which fits no layout for 3 classes; check 'classes'"):
-        ForeignNetwork(ONNX, ("car", "truck", "bus"), SIZE, 0.5)
+        ExternalNetwork(ONNX, ("car", "truck", "bus"), SIZE, 0.5)
     with pytest.raises(
         SettingError, match=r"do not take pictures of 640 x 640.*say the network's own with 'input_size'"
     ):
-        ForeignNetwork(ONNX, CLASSES, (640, 640), 0.5)
+        ExternalNetwork(ONNX, CLASSES, (640, 640), 0.5)
     with pytest.raises(SettingError, match="is not 'yolov8' for 2 classes"):
-        ForeignNetwork(ONNX, CLASSES, SIZE, 0.5, layout="yolov8")
+        ExternalNetwork(ONNX, CLASSES, SIZE, 0.5, layout="yolov8")
     empty = tmp_path / "empty.onnx"
     empty.write_bytes(b"not a model")
     with pytest.raises(SettingError, match=r"are not an ONNX model.*export the model again"):
-        ForeignNetwork(empty, CLASSES, SIZE, 0.5)
+        ExternalNetwork(empty, CLASSES, SIZE, 0.5)
 
 
 def test_a_torchscript_file_that_is_none(tmp_path: Path) -> None:
@@ -107,17 +107,17 @@ def test_a_torchscript_file_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "empty.pt"
     path.write_bytes(b"not a model")
     with pytest.raises(SettingError, match="are not a TorchScript model"):
-        ForeignNetwork(path, CLASSES, SIZE, 0.5, allow_torchscript=True)
+        ExternalNetwork(path, CLASSES, SIZE, 0.5, allow_torchscript=True)
 
 
 def test_foreign_network_with_torchscript_without_permission_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "any.pt"
     path.write_bytes(b"is not even read")
     with pytest.raises(SettingError, match=r"can execute any code with your rights; export the model to ONNX"):
-        ForeignNetwork(path, CLASSES, SIZE, 0.5)
+        ExternalNetwork(path, CLASSES, SIZE, 0.5)
 
 
-class Fixed(ForeignNetwork):
+class Fixed(ExternalNetwork):
     """A network of which the outputs are given."""
 
     def __init__(self, outputs: list[NDArray[np.float32]], classes: tuple[str, ...]) -> None:

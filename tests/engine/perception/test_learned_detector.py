@@ -12,7 +12,7 @@ import pytest
 
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.learned import detector as module
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.detector import (
@@ -22,7 +22,7 @@ from eidrive_scenario.perception.learned.detector import (
     SsdDetector,
     YoloDetector,
     build_network,
-    distinct,
+    merge_duplicates,
 )
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.readings import Readings
@@ -62,7 +62,7 @@ def readings() -> Iterator[Readings]:
 def built(kind: type[LearnedDetector], **settings: object) -> LearnedDetector:
     pytest.importorskip("torch", reason="needs the extra 'learned'")
     detector = kind(LearnedSettings(**settings))  # type: ignore[arg-type]
-    detector.install(Installation(car("Ego"), SENSORS))
+    detector.setup(DetectorContext(car("Ego"), SENSORS))
     return detector
 
 
@@ -94,8 +94,8 @@ def test_the_same_picture_gives_the_same_bits(kind: type[LearnedDetector], readi
     for other in (b, c):
         np.testing.assert_array_equal(a.boxes, other.boxes)
         np.testing.assert_array_equal(a.scores, other.scores)
-    picture = first.pictures["camera"]
-    assert picture.classes == second.pictures["camera"].classes
+    picture = first.image_detections["camera"]
+    assert picture.classes == second.image_detections["camera"].classes
     assert (picture.boxes >= 0.0).all()
     assert (picture.boxes <= np.array([800, 600, 800, 600])).all()
 
@@ -130,7 +130,7 @@ def test_they_come_through_their_entry_points() -> None:
     assert registry("detectors").load("yolov5") is YoloDetector
     assert registry("detectors").load("ssd") is SsdDetector
     assert YoloDetector.needs == {"camera"}
-    assert [type(sensor) for sensor in YoloDetector.usual_sensors.values()] == [CameraSettings, LidarSettings]
+    assert [type(sensor) for sensor in YoloDetector.default_sensors.values()] == [CameraSettings, LidarSettings]
 
 
 def test_the_surest_of_several_boxes_on_one_place_counts() -> None:
@@ -141,17 +141,17 @@ def test_the_surest_of_several_boxes_on_one_place_counts() -> None:
 
     here, there = [10.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0], [20.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]
     beside = [11.0, 0.2, 0.75, 4.5, 1.8, 1.5, 0.1]
-    found = distinct([part([here, there], [0.6, 0.9], "car"), part([beside], [0.8], "truck")], 1.0)
+    found = merge_duplicates([part([here, there], [0.6, 0.9], "car"), part([beside], [0.8], "truck")], 1.0)
     assert found.scores.tolist() == [0.9, 0.8]
     assert found.classes == ("car", "truck")
-    assert len(distinct([], 2.0)) == 0
+    assert len(merge_duplicates([], 2.0)) == 0
 
 
 def test_own_weights_come_through_the_same_door(readings: Readings) -> None:
     settings = {"weights": str(ONNX), "classes": ["truck", "car"], "input_size": [96, 64], "confidence": 0.3}
     parsed = parse_settings(LearnedSettings, settings)
     found = YoloDetector(parsed)
-    found.install(Installation(car("Ego"), SENSORS))
+    found.setup(DetectorContext(car("Ego"), SENSORS))
     assert set(found.detect(readings).classes) <= {"car"}
 
 

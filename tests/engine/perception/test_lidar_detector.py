@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
-from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.lidar_detector import LidarDetector, LidarDetectorSettings
 from eidrive_scenario.perception.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
 from eidrive_scenario.perception.oracle import OracleDetector
@@ -182,13 +182,13 @@ def test_with_a_map_only_what_is_on_roads_counts_and_lanes_tell_front_from_back(
     ]
     readings = street.readings(things, {"roof": CLEAN})
     detector = LidarDetector()
-    detector.install(Installation(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    detector.setup(DetectorContext(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
     found = detector.detect(readings)
     assert len(found) == 2
     assert math.cos(found.boxes[nearest(found, things[1].box), 6]) > 0.99
     assert math.cos(found.boxes[nearest(found, things[2].box), 6]) < -0.99
     everywhere = LidarDetector(LidarDetectorSettings(off_road=None))
-    everywhere.install(Installation(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
+    everywhere.setup(DetectorContext(street.spec(things[0]), {"roof": CLEAN}, RoadNetwork.parse(ROAD)))
     assert len(everywhere.detect(readings)) == 3
 
 
@@ -221,7 +221,7 @@ def test_parts_of_a_revolution_are_put_together(street: Any) -> None:
         for side in (ahead, ~ahead)
     ]
     detector = LidarDetector()
-    detector.install(Installation(street.spec(things[0]), {"roof": half}))
+    detector.setup(DetectorContext(street.spec(things[0]), {"roof": half}))
     counts = [
         len(detector.detect(replace(readings, time=tick * 0.05, lidars={"roof": halves[tick % 2]})))
         for tick in range(4)

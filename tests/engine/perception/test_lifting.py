@@ -13,8 +13,8 @@ import pytest
 from eidrive_scenario.geometry import iou_bev, rotation_matrix
 from eidrive_scenario.perception.lidar_geometry import pattern_from_settings
 from eidrive_scenario.perception.lifting import lift
+from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.perception.projection import pixels, straight_boxes
-from eidrive_scenario.perception.surroundings import Surroundings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount
@@ -227,7 +227,7 @@ def test_a_map_tells_which_way_a_car_heads() -> None:
     view = camera(y=-1.75)
     oncoming = box("car", 25, 1.75, math.pi)
     edges = np.array([outline(oncoming, view)])
-    roads = Surroundings(RoadNetwork.parse(ROAD.format(a=0.0, b=0.0)))
+    roads = MapContext(RoadNetwork.parse(ROAD.format(a=0.0, b=0.0)))
     found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=roads)
     assert math.cos(found.boxes[0, 6]) == pytest.approx(-1.0, abs=1e-6)
     assert math.cos(lift(edges, ["car"], [1.0], view, time=0.0).boxes[0, 6]) > 0.5
@@ -238,7 +238,7 @@ def test_a_map_tells_how_high_the_road_is() -> None:
     view = camera(y=-1.75)
     target = box("car", 30, -1.75, 0.0, ground=1.5)
     edges = np.array([outline(target, view)])
-    roads = Surroundings(RoadNetwork.parse(ROAD.format(a=-1.0, b=0.05)))
+    roads = MapContext(RoadNetwork.parse(ROAD.format(a=-1.0, b=0.05)))
     found = lift(edges, ["car"], [1.0], view, time=0.0, surroundings=roads)
     assert math.dist(found.boxes[0, :2], target[:2]) < 1.0
     assert found.boxes[0, 2] == pytest.approx(target[2], abs=0.15)

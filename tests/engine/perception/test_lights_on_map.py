@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.library import library_path
-from eidrive_scenario.perception.detector import Installation
+from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.learned.detector import LearnedSettings, YoloDetector
 from eidrive_scenario.perception.learned.image_network import ImageDetections
 from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, WEIGHTS, crops, lamp_network
@@ -19,13 +19,13 @@ from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.camera import Photographer
+from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
-from eidrive_scenario.world.furniture import signal_heads
+from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.weather import Weather
 
 ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
@@ -58,8 +58,8 @@ def photograph(
             world.add(spec, there)
         if weather is not None:
             world.set_weather(weather)
-        world.show(states, {})
-        return Photographer(CameraSettings(width=800, height=600, fov=80.0)).take(world, pose, generator(3, "lights"))
+        world.set_display_state(states, {})
+        return ImageSensor(CameraSettings(width=800, height=600, fov=80.0)).capture(world, pose, generator(3, "lights"))
 
 
 def box_around(roads: RoadNetwork, signal: str, camera: CameraReading) -> list[float]:
@@ -149,8 +149,8 @@ def test_what_a_station_reads_itself_depends_on_the_classes_of_the_network() -> 
     settings = LearnedSettings(weights=str(ONNX), classes=("truck", "car"), input_size=(96, 64))
     detector = YoloDetector(settings)
     detector.load_weights()
-    assert detector.sees_signals == {"light"}
-    detector.install(Installation(TRUCK, {}, CROSSING))
+    assert detector.detectable_signals == {"light"}
+    detector.setup(DetectorContext(TRUCK, {}, CROSSING))
     camera = photograph(CROSSING, before(CROSSING, "10", 15.0), {"10": "red"})
     x, y, _ = camera.pose[:3, 3].tolist()
     detector.detect(Readings(0.0, EgoState(0.0, np.array([x, y, 0.0]), 0, 0, 0, 0, 0, 0), cameras={"camera": camera}))

@@ -165,7 +165,7 @@ def test_it_knows_how_wrong_it_is_in_the_world() -> None:
             localizer = Localizer("Ego", seed, noise=motion_noise(unit))
             for tick in range(400):
                 readings = rig.read(world, world.view())
-                localizer.located(readings)
+                localizer.with_estimated_pose(readings)
                 state, covariance = localizer.estimate
                 true = readings.ego
                 off = np.array(
@@ -185,14 +185,16 @@ def test_it_knows_how_wrong_it_is_in_the_world() -> None:
 def test_the_start_is_drawn_by_seed_and_station() -> None:
     truth = Readings(0.0, ego(5.0, 6.0, 1.0, 3.0))
     starts = {
-        (seed, name): Localizer(name, seed).located(truth).ego.position.tolist()
+        (seed, name): Localizer(name, seed).with_estimated_pose(truth).ego.position.tolist()
         for seed in (1, 2)
         for name in ("Ego", "Other")
     }
     assert len({tuple(place) for place in starts.values()}) == 4
-    again = Localizer("Ego", 1).located(truth).ego.position.tolist()
+    again = Localizer("Ego", 1).with_estimated_pose(truth).ego.position.tolist()
     assert again == starts[1, "Ego"]
-    draws = np.array([Localizer("Ego", seed).located(truth).ego.position[:2] - (5.0, 6.0) for seed in range(300)])
+    draws = np.array(
+        [Localizer("Ego", seed).with_estimated_pose(truth).ego.position[:2] - (5.0, 6.0) for seed in range(300)]
+    )
     np.testing.assert_allclose(draws.std(axis=0), [0.5, 0.5], rtol=0.12)
 
 
@@ -213,7 +215,7 @@ def test_readings_move_with_the_estimate() -> None:
         },
         {"roof": LidarReading(np.ones((1, 3)), np.ones(1), pose)},
     )
-    found = localizer.located(truth)
+    found = localizer.with_estimated_pose(truth)
     shift, turn = found.ego.position - truth.ego.position, found.ego.yaw
     assert np.linalg.norm(shift) > 0.01
     assert abs(turn) > 1e-4
@@ -236,7 +238,9 @@ def test_between_fixes_it_goes_by_the_inertial_unit() -> None:
     for tick in range(40):
         time = tick * DT
         fix = GnssReading(np.array([10.0 * time, 0.0, 0.0]), 0.01 * np.eye(3)) if tick % 20 == 0 else None
-        found = localizer.located(Readings(time, ego(10.0 * time, 0.0, 0.0, 10.0, time), gnss=fix, imu=imu()))
+        found = localizer.with_estimated_pose(
+            Readings(time, ego(10.0 * time, 0.0, 0.0, 10.0, time), gnss=fix, imu=imu())
+        )
         xs.append(float(found.ego.position[0]))
     np.testing.assert_allclose(np.diff(xs), 0.5, atol=0.05)
 

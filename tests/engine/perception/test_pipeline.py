@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.building import build_agent
+from eidrive_scenario.driving.agent_factory import build_agent
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.perception.pipeline import Perception
@@ -94,12 +94,12 @@ class Blind(Detector):
     """Finds one box without velocity, and a light."""
 
     needs: ClassVar[frozenset[str]] = frozenset({"truth"})
-    sees_signals = frozenset({"light"})
+    detectable_signals = frozenset({"light"})
 
     def __init__(self) -> None:
-        self.installed: Installation | None = None
+        self.installed: DetectorContext | None = None
 
-    def install(self, installation: Installation) -> None:
+    def setup(self, installation: DetectorContext) -> None:
         self.installed = installation
 
     def detect(self, readings: Readings) -> Detections:

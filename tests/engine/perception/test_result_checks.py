@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.building import build_detector
+from eidrive_scenario.driving.agent_factory import build_detector
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult, RegistryError
 from eidrive_scenario.perception.detector import Detector

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.control import VehicleController
 from eidrive_scenario.driving.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.signal_stops import BEFORE_LINE, WAIT, SignalStops
@@ -20,7 +20,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.rig import Rig
-from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalLookout
+from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.simulation import run_file
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -136,7 +136,7 @@ def seen(
         world.add(CAR, Placement(x, -1.75, yaw=yaw))
         if truck:
             world.add(TRUCK, Placement(x + 14, -2.5))
-        readings = SignalLookout(CAR, roads, kinds).read(world, world.view(), 0, states)
+        readings = SignalSensor(CAR, roads, kinds).read(world, world.view(), 0, states)
     return {f"{reading.id} {reading.state}".strip() for reading in readings}
 
 
@@ -160,8 +160,8 @@ class Drive:
         self.world.add(CAR, Placement(20.0, -1.75, speed=10.0), driven=True)
         settings = AgentSettings.model_validate({"obey_signals": obeys, "target_speed": 10.0})
         self.planner = RoutePlanner(settings, CAR, roads, dt=0.05, seed=0)
-        self.controller = Controller(CAR, 0.05)
-        self.lookout = SignalLookout(CAR, roads)
+        self.controller = VehicleController(CAR, 0.05)
+        self.lookout = SignalSensor(CAR, roads)
         self.rig = Rig(CAR, {})
         self.reasons: list[str] = []
 
@@ -170,7 +170,7 @@ class Drive:
         for _ in range(round(seconds / 0.05)):
             view = self.world.view()
             ego = self.rig.read(self.world, view).ego
-            self.planner.heed(self.lookout.read(self.world, view, 0, states))
+            self.planner.observe_signals(self.lookout.read(self.world, view, 0, states))
             plan = self.planner.plan(ego, Detections(view.time), Goal(), view.time)
             self.reasons.append(plan.reason)
             self.world.step({}, {"Ego": self.controller.control(ego, plan)})

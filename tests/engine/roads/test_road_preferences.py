@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.roads import RoadNetwork, by_chance, fastest, fewest_junctions
+from eidrive_scenario.roads import RoadNetwork, fastest, fewest_junctions, random_costs
 from eidrive_scenario.storyboard.motion import ResolvedPosition
 from eidrive_scenario.storyboard.route import build_route
 
@@ -77,9 +77,9 @@ def test_each_preference_has_its_way(three_ways: RoadNetwork) -> None:
         return three_ways.route(here, there, costs=[cost]).lanes[1].road[0]  # type: ignore[list-item]
 
     assert [way(cost) for cost in (None, fastest(three_ways), fewest_junctions(three_ways))] == ["a", "b", "c"]
-    by_seed = [way(by_chance(three_ways, generator(seed, "route", "r"))) for seed in range(40)]
+    by_seed = [way(random_costs(three_ways, generator(seed, "route", "r"))) for seed in range(40)]
     assert set(by_seed) == {"a", "b", "c"}
-    assert by_seed[7] == way(by_chance(three_ways, generator(7, "route", "r")))
+    assert by_seed[7] == way(random_costs(three_ways, generator(7, "route", "r")))
 
 
 def test_each_leg_has_a_cost_of_its_own(three_ways: RoadNetwork) -> None:

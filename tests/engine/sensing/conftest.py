@@ -36,7 +36,7 @@ class BoxScene:
     pictures: list[tuple[Array, Pinhole]] = field(default_factory=list)
     weather: Weather = field(default_factory=Weather)
 
-    def cast(self, origins: Array, targets: Array) -> Hits:
+    def raycast(self, origins: Array, targets: Array) -> Hits:
         self.casts.append(len(origins))
         bodies = [(row, tuple(box)) for row, box in enumerate(self.view.boxes.tolist())]
         bodies += [(-1, wall) for wall in self.walls]
@@ -54,8 +54,8 @@ class BoxScene:
             normals.append(normal)
         return Hits(np.array(rows, dtype=np.int64), np.array(fractions), np.array(normals).reshape(-1, 3))
 
-    def first_met(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
-        return self.cast(np.array(origins), np.array(targets)).rows.tolist()
+    def first_hit(self, origins: Sequence[tuple[float, ...]], targets: Sequence[tuple[float, ...]]) -> list[int]:
+        return self.raycast(np.array(origins), np.array(targets)).rows.tolist()
 
     def radiance(self, pose: Array, pinhole: Pinhole, *, ignore: Iterable[str] = ()) -> Radiance:
         self.pictures.append((pose, pinhole))

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.sensing.camera import Camera, Photographer
+from eidrive_scenario.sensing.camera import Camera, ImageSensor
 from eidrive_scenario.sensing.exposure import BASE_SPEED, LENS, SATURATION, Exposure, develop, metered, noise_of
 from eidrive_scenario.sensing.optics import Optics, lens_of
 from eidrive_scenario.sensing.precipitation import drops_before
@@ -44,7 +44,7 @@ def test_a_known_point_lands_where_opencv_projects_it(
     settings = CameraSettings(width=400, height=300, fov=90, distortion=distortion)
     with World() as world:
         world.add(CRATE, Placement(*place))
-        reading = Photographer(settings).take(world, level(z=0.2), generator(1, "test"))
+        reading = ImageSensor(settings).capture(world, level(z=0.2), generator(1, "test"))
     rows, columns = np.nonzero(reading.segmentation == 0)
     corners = np.array(
         [(-place[1] + x, y, place[0] + z) for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)]
@@ -201,8 +201,8 @@ def test_rain_streaks_change_the_picture_and_dry_weather_does_not() -> None:
     def pictures(weather: Weather) -> list[np.ndarray]:
         with World() as world:
             world.set_weather(weather)
-            camera = Photographer(settings)
-            return [camera.take(world, level(), generator(seed, "rain")).rgb.astype(int) for seed in (1, 2)]
+            camera = ImageSensor(settings)
+            return [camera.capture(world, level(), generator(seed, "rain")).rgb.astype(int) for seed in (1, 2)]
 
     first, second = pictures(Weather())
     np.testing.assert_array_equal(first, second)

@@ -91,7 +91,7 @@ def test_an_actor_may_be_hidden_from_some_sensors_by_their_names(world: World) -
     camera = CameraSettings(width=64, height=48, mount=Mount(x=2.5, y=0, z=1.0))
     world.add_building("wall", (60, 0, 5), (4, 200, 10))
     for blind in ("eyes", "roof", "front"):
-        world.show({}, {"Truck": Appearance(visibility=Visibility(named={blind: False}))})
+        world.set_display_state({}, {"Truck": Appearance(visibility=Visibility(named={blind: False}))})
         rig = Rig(spec("Ego"), {"eyes": TruthSettings(), "roof": lidar, "front": camera})
         readings = rig.read(world, world.view())
         assert readings.truth is not None
@@ -102,7 +102,7 @@ def test_an_actor_may_be_hidden_from_some_sensors_by_their_names(world: World) -
         assert ahead[:, 0].min() == pytest.approx(30 - 2.446 if blind == "roof" else 15 - 4.234, abs=0.02)
         seen = "Hidden" if blind == "front" else "Truck"
         assert readings.cameras["front"].segmentation[24, 32] == world.view().rows[seen]
-    world.show({}, {"Truck": Appearance(visibility=Visibility(sensors=False, named={"eyes": True}))})
+    world.set_display_state({}, {"Truck": Appearance(visibility=Visibility(sensors=False, named={"eyes": True}))})
     assert names(Rig(spec("Ego"), {"eyes": TruthSettings()}), world) == {"Truck", "Beside"}
     assert names(Rig(spec("Ego"), {"truth": TruthSettings()}), world) == {"Hidden", "Beside"}
 

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.sensing.crossing import few_past_box, past_box
+from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_small
 from eidrive_scenario.sensing.settings import Mount, TruthSettings
 from eidrive_scenario.sensing.truth import (
     TruthSensor,
@@ -29,8 +29,8 @@ box = st.tuples(coordinate, coordinate, coordinate, length, length, length, st.f
 @settings(max_examples=300, deadline=None)
 @given(origin=point, targets=st.lists(point, min_size=1, max_size=12), box=box)
 def test_rays_start_behind_the_same_box(origin: Any, targets: Any, box: Any) -> None:
-    few = few_past_box(origin, targets, box)
-    many = past_box(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
+    few = is_occluded_by_small(origin, targets, box)
+    many = is_occluded_by(np.broadcast_to(origin, (1, len(targets), 3)), np.array([targets]), np.array([box]))[0]
     np.testing.assert_allclose(np.array(few), many, rtol=0.0, atol=1e-9)
 
 
@@ -39,8 +39,8 @@ def test_rays_along_and_from_a_face() -> None:
     box = (2.0, 1.0, 1.0, 4.0, 2.0, 2.0, 0.0)
     for origin in [(2.0, 1.0, 2.0), (4.0, 1.0, 1.0)]:
         targets = [(9.0, 1.0, 2.0), (9.0, 1.0, 0.0), (-9.0, 1.0, 2.0), (4.0, 7.0, 1.0), (2.0, 1.0, -3.0)]
-        many = past_box(np.broadcast_to(origin, (1, 5, 3)), np.array([targets]), np.array([box]))[0]
-        np.testing.assert_allclose(np.array(few_past_box(origin, targets, box)), many, atol=1e-12)
+        many = is_occluded_by(np.broadcast_to(origin, (1, 5, 3)), np.array([targets]), np.array([box]))[0]
+        np.testing.assert_allclose(np.array(is_occluded_by_small(origin, targets, box)), many, atol=1e-12)
 
 
 def stations(boxes: Any, view: WorldView) -> list[TruthSensor]:

@@ -25,35 +25,35 @@ class Builder:
     """Elements of one tree; paths do not matter here."""
 
     def __init__(self, context: Any, script: Any) -> None:
-        self.stage, self.script = context, script
+        self.context, self.script = context, script
 
     def wait(self, values: Any) -> Any:
         if values is None:
             return None
         trigger = Trigger([ConditionGroup((ConditionEvaluator(self.script(values)),))])
-        return WaitForTrigger("trigger", trigger, self.stage)
+        return WaitForTrigger("trigger", trigger, self.context)
 
     def action(self, name: Any, *tasks: Any) -> Any:
         by_actor = {task.actor_name: [task] for task in tasks}
-        return ActionElement(self.stage, (name,), lambda actor: by_actor[actor], list(by_actor))
+        return ActionElement(self.context, (name,), lambda actor: by_actor[actor], list(by_actor))
 
     def event(self, name: Any, *tasks: Any, start: Any = None, priority: Any = "parallel", limit: Any = 1) -> Any:
         actions = [self.action(f"{name}.{number}", task) for number, task in enumerate(tasks)]
-        return EventElement(self.stage, (name,), actions, priority=priority, start=self.wait(start), limit=limit)
+        return EventElement(self.context, (name,), actions, priority=priority, start=self.wait(start), limit=limit)
 
     def maneuver(self, *events: Any) -> Any:
         EventElement.resolve_priorities(events)
-        return ManeuverElement(self.stage, ("maneuver",), events)
+        return ManeuverElement(self.context, ("maneuver",), events)
 
     def group(self, *maneuvers: Any, limit: Any = 1) -> Any:
-        return ManeuverGroupElement(self.stage, ("group",), maneuvers, limit=limit)
+        return ManeuverGroupElement(self.context, ("group",), maneuvers, limit=limit)
 
     def act(self, *groups: Any, start: Any = None, stop: Any = None, name: Any = "act") -> Any:
-        return ActElement(self.stage, (name,), groups, start=self.wait(start), stop=self.wait(stop))
+        return ActElement(self.context, (name,), groups, start=self.wait(start), stop=self.wait(stop))
 
     def storyboard(self, *acts: Any, stop: Any = None) -> Any:
-        story = StoryNode(self.stage, ("story",), acts)
-        return StoryboardElement(self.stage, ("storyboard",), [story], stop=self.wait(stop))
+        story = StoryNode(self.context, ("story",), acts)
+        return StoryboardElement(self.context, ("storyboard",), [story], stop=self.wait(stop))
 
 
 @pytest.fixture

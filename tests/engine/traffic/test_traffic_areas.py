@@ -9,9 +9,9 @@ import pytest
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.traffic import Cursor, Sites, Stretch, polygon, road_range, stretches_cover
+from eidrive_scenario.traffic import Cursor, SpawnSites, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.sites import Ground
+from eidrive_scenario.traffic.sites import SpawnAreas
 
 Street = Callable[..., RoadNetwork]
 
@@ -118,12 +118,12 @@ def test_roads_must_exist_and_be_linked(street: Street) -> None:
 
 def test_places_in_a_stretch_and_in_a_polygon(street: Street) -> None:
     lanes = TrafficLanes(street(1, 1))
-    sites = Ground(lanes).driving
-    inside = sites.some(stretches_cover(lanes, [Stretch("1", 100.0, 200.0, (-1,))])(sites))
+    sites = SpawnAreas(lanes).driving
+    inside = sites.subset(stretches_cover(lanes, [Stretch("1", 100.0, 200.0, (-1,))])(sites))
     assert len(inside) == 20
     assert inside.x.min() >= 100.0
     assert inside.x.max() <= 200.0
     assert np.all(inside.y < 0.0)
-    within: Sites = sites.some(polygon([(100.0, -10.0), (200.0, -10.0), (200.0, 10.0), (100.0, 10.0)])(sites))
+    within: SpawnSites = sites.subset(polygon([(100.0, -10.0), (200.0, -10.0), (200.0, 10.0), (100.0, 10.0)])(sites))
     assert len(within) == 40
     assert sorted({round(float(y), 2) for y in within.y}) == [-1.75, 1.75]

@@ -11,7 +11,7 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.traffic import Mixture
+from eidrive_scenario.traffic import TrafficMix
 from eidrive_scenario.traffic.bodies import library_bodies
 
 NO_CONTROLLER = model.ControllerDistribution(
@@ -21,7 +21,7 @@ NO_CONTROLLER = model.ControllerDistribution(
 )
 
 
-def definition(categories: dict[VehicleCategory, float], roles: dict[Role, float] | None = None) -> Mixture:
+def definition(categories: dict[VehicleCategory, float], roles: dict[Role, float] | None = None) -> TrafficMix:
     entries = tuple(model.VehicleCategoryDistributionEntry(category=c, weight=w) for c, w in categories.items())
     shares = None
     if roles is not None:
@@ -36,15 +36,15 @@ def definition(categories: dict[VehicleCategory, float], roles: dict[Role, float
         vehicle_role_distribution=shares,
         controller_distribution=NO_CONTROLLER,
     )
-    return Mixture(SimpleNamespace(), element, None)  # type: ignore[arg-type]
+    return TrafficMix(SimpleNamespace(), element, None)  # type: ignore[arg-type]
 
 
-def drawn(mixture: Mixture, count: int = 400) -> Counter[str]:
+def drawn(mixture: TrafficMix, count: int = 400) -> Counter[str]:
     return Counter(mixture.draw(generator(5, "bodies", n)).spec.name for n in range(count))
 
 
 def test_without_a_definition_there_are_the_cars_of_the_library() -> None:
-    found = drawn(Mixture(SimpleNamespace(), None, None))  # type: ignore[arg-type]
+    found = drawn(TrafficMix(SimpleNamespace(), None, None))  # type: ignore[arg-type]
     assert set(found) == {spec.name for spec, role in library_bodies(VehicleCategory.CAR) if role is Role.NONE}
     assert len(found) >= 3
 
@@ -77,7 +77,7 @@ def test_drivers_that_cannot_be_are_told_by_line(name: str, value: str) -> None:
         controller_distribution=model.ControllerDistribution(controller_distribution_entry=(entry,)),
     )
     with pytest.raises(SettingError, match=f"a.xosc:4: setting '{name}' is '{value}'"):
-        Mixture(SimpleNamespace(), element, None)  # type: ignore[arg-type]
+        TrafficMix(SimpleNamespace(), element, None)  # type: ignore[arg-type]
 
 
 def test_dimensions_are_those_of_the_catalog() -> None:

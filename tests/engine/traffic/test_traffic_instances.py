@@ -19,12 +19,12 @@ from eidrive_scenario.traffic import (
     Sink,
     Source,
     Swarm,
-    around,
     polygon,
+    sites_within_radius,
 )
-from eidrive_scenario.traffic.bodies import Mixture
+from eidrive_scenario.traffic.bodies import TrafficMix
+from eidrive_scenario.traffic.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.traffic.idm import IntelligentDriver
-from eidrive_scenario.traffic.instances import Centre, Instance
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
@@ -34,7 +34,7 @@ ViewOf = Callable[..., WorldView]
 DT = 0.1
 
 
-class Cars(Mixture):
+class Cars(TrafficMix):
     """Cars of one kind."""
 
     def __init__(self, spec: ActorSpec) -> None:
@@ -59,16 +59,18 @@ class Scene:
         self.traffic = BackgroundTraffic(
             roads,
             seed=seed,
-            centre=lambda name: Centre(self.ego.x, self.ego.y, self.ego.yaw, self.ego.speed) if name == "Ego" else None,
+            centre=lambda name: (
+                CentralObject(self.ego.x, self.ego.y, self.ego.yaw, self.ego.speed) if name == "Ego" else None
+            ),
             taken=frozenset({"swarm.0003"}),
         )
         self.placements: dict[str, Placement] = {}
 
     @property
-    def mixture(self) -> Mixture:
+    def mixture(self) -> TrafficMix:
         return Cars(self.spec)
 
-    def start(self, instance: Instance) -> None:
+    def start(self, instance: TrafficGenerator) -> None:
         self.traffic.start(instance)
 
     def play(self, seconds: float) -> Iterator[Changes]:
@@ -203,7 +205,7 @@ def source(
     stage: Scene, *, rate: float, at: float = 1200.0, radius: float = 10.0, speed: float | None = 12.0
 ) -> Source:
     lanes, ground = stage.traffic.fleet.lanes, stage.traffic.ground
-    sites = around(lanes, ground.driving, at, -1.75, radius, None)
+    sites = sites_within_radius(lanes, ground.driving, at, -1.75, radius, None)
     instance = Source(
         "source",
         stage.traffic.key("source"),

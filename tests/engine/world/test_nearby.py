@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from eidrive_scenario.world.nearby import Nearby, squares
+from eidrive_scenario.world.spatial_grid import SpatialGrid, grid_cells
 
 
 @pytest.fixture
-def houses() -> Nearby[tuple[float, float]]:
-    found: Nearby[tuple[float, float]] = Nearby()
+def houses() -> SpatialGrid[tuple[float, float]]:
+    found: SpatialGrid[tuple[float, float]] = SpatialGrid()
     for x, y in np.random.default_rng(1).uniform(-2000.0, 2000.0, (300, 2)).tolist():
-        found.add((x, y), squares(x, y, 4.0))
+        found.add((x, y), grid_cells(x, y, 4.0))
     return found
 
 
 @pytest.mark.parametrize("reach", [0.0, 5.0, 299.0, 301.0, 1500.0])
-def test_all_within_reach_are_among_those_around(houses: Nearby[tuple[float, float]], reach: float) -> None:
-    near = {place for place in houses.around(-40.0, 12.0, 1e7) if np.hypot(place[0] + 40.0, place[1] - 12.0) <= reach}
-    around = set(houses.around(-40.0, 12.0, reach))
+def test_all_within_reach_are_among_those_around(houses: SpatialGrid[tuple[float, float]], reach: float) -> None:
+    near = {place for place in houses.query(-40.0, 12.0, 1e7) if np.hypot(place[0] + 40.0, place[1] - 12.0) <= reach}
+    around = set(houses.query(-40.0, 12.0, reach))
     assert near <= around
     assert all(max(abs(x + 40.0), abs(y - 12.0)) <= reach + 4.0 + 20.0 for x, y in around)
 
 
-def test_an_endless_reach_costs_no_more_than_what_there_is(houses: Nearby[tuple[float, float]]) -> None:
-    assert len(set(houses.around(0.0, 0.0, 1e12))) == 300
+def test_an_endless_reach_costs_no_more_than_what_there_is(houses: SpatialGrid[tuple[float, float]]) -> None:
+    assert len(set(houses.query(0.0, 0.0, 1e12))) == 300

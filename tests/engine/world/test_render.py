@@ -13,7 +13,7 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.render.daylight import LUMA, daylight
 from eidrive_scenario.world.render.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
-from eidrive_scenario.world.render.rasterise import rasterise
+from eidrive_scenario.world.render.rasterization import rasterize
 from eidrive_scenario.world.render.sky import SIZE, dome, horizon
 from eidrive_scenario.world.weather import Weather, load_weather
 
@@ -46,7 +46,7 @@ def test_pixels_whose_centres_lie_inside_are_covered() -> None:
     rng = np.random.default_rng(1)
     corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
     nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[None], 3, axis=0)
-    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 20, 16).triangle.ravel()
+    shown = rasterize(corners[..., 0].T, corners[..., 1].T, nearness, 20, 16).triangle.ravel()
     for pixel in range(20 * 16):
         x, y = pixel % 20 + 0.5, pixel // 20 + 0.5
         holders = [k for k in range(40) if inside(corners[k], x, y)]
@@ -61,9 +61,9 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
     triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
     counts = np.zeros(400, dtype=int)
     for one in triangles:
-        counts += (rasterise(one[:, :1], one[:, 1:], np.ones((3, 1)), 20, 20).triangle >= 0).ravel()
+        counts += (rasterize(one[:, :1], one[:, 1:], np.ones((3, 1)), 20, 20).triangle >= 0).ravel()
     assert counts.max() == 1
-    together = rasterise(triangles[..., 0].T, triangles[..., 1].T, np.ones((3, 5)), 20, 20).triangle >= 0
+    together = rasterize(triangles[..., 0].T, triangles[..., 1].T, np.ones((3, 5)), 20, 20).triangle >= 0
     assert counts.sum() == together.sum()
     grid = together.reshape(20, 20)
     for line in grid:
@@ -78,7 +78,7 @@ def test_large_triangles_cover_what_small_ones_do() -> None:
     corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [gap_in_its_tip]])
     nearness = rng.uniform(0.1, 1.0, (3, len(corners)))
     nearness[:, -1] = 2.0
-    shown = rasterise(corners[..., 0].T, corners[..., 1].T, nearness, 300, 300)
+    shown = rasterize(corners[..., 0].T, corners[..., 1].T, nearness, 300, 300)
     lines, columns = np.indices((300, 300)) + 0.5
     best, nearest = np.zeros((300, 300)), np.full((300, 300), -1)
     for number, (a, b, c) in enumerate(corners):
@@ -97,7 +97,7 @@ def test_large_triangles_cover_what_small_ones_do() -> None:
 def test_nearness_is_that_of_the_plane() -> None:
     corners = np.array([[0.0, 0.0], [20.0, 0.0], [0.0, 20.0]])
     nearness = np.array([[0.1], [0.5], [0.3]])
-    cover = rasterise(corners[:, :1], corners[:, 1:], nearness, 20, 20)
+    cover = rasterize(corners[:, :1], corners[:, 1:], nearness, 20, 20)
     lines, columns = np.nonzero(cover.triangle == 0)
     x, y = columns + 0.5, lines + 0.5
     np.testing.assert_allclose(cover.nearness[lines, columns], 0.1 + 0.4 * x / 20 + 0.2 * y / 20, rtol=1e-5)

@@ -14,8 +14,8 @@ from eidrive_scenario.library import names
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.environment import Environment
+from eidrive_scenario.world.environment_weather import solar_position, weather_from_environment
 from eidrive_scenario.world.weather import Weather, load_weather
-from eidrive_scenario.world.weather_of import solar_position, weather_of
 
 
 def test_presets_are_what_their_names_say() -> None:
@@ -79,7 +79,7 @@ def test_mistakes_name_file_and_line(tmp_path: Path) -> None:
 
 
 def test_an_environment_becomes_a_weather() -> None:
-    weather = weather_of(
+    weather = weather_from_environment(
         Environment(
             name="Wet",
             friction=0.6,
@@ -112,21 +112,28 @@ def test_an_environment_becomes_a_weather() -> None:
 
 
 def test_what_an_environment_does_not_say_is_as_usual() -> None:
-    assert weather_of(Environment()) == Weather(friction=1.0)
-    assert weather_of(Environment(friction=0.0)).friction_scale > 0.0
-    assert weather_of(Environment(precipitation="rain", precipitation_share=0.2)).precipitation_intensity == 10.0
-    assert weather_of(Environment(precipitation="dry", precipitation_share=0.2)).precipitation == "none"
+    assert weather_from_environment(Environment()) == Weather(friction=1.0)
+    assert weather_from_environment(Environment(friction=0.0)).friction_scale > 0.0
+    assert (
+        weather_from_environment(Environment(precipitation="rain", precipitation_share=0.2)).precipitation_intensity
+        == 10.0
+    )
+    assert weather_from_environment(Environment(precipitation="dry", precipitation_share=0.2)).precipitation == "none"
 
 
 def test_shares_of_sunlight_as_scenario_runner_s_files_write_them() -> None:
-    weather = weather_of(Environment(sun_azimuth=0.0, sun_elevation=1.31, illuminance=0.85))
+    weather = weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=1.31, illuminance=0.85))
     assert (weather.sun_share, weather.sun_illuminance) == (0.85, None)
 
 
 def test_a_sun_past_the_zenith_comes_down_on_the_other_side() -> None:
-    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=math.pi / 2)).sun_elevation == pytest.approx(90.0)
-    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=math.pi * 0.75)).sun_elevation == pytest.approx(45.0)
-    assert weather_of(Environment(sun_azimuth=0.0, sun_elevation=-1.1)).lamps_on
+    assert weather_from_environment(
+        Environment(sun_azimuth=0.0, sun_elevation=math.pi / 2)
+    ).sun_elevation == pytest.approx(90.0)
+    assert weather_from_environment(
+        Environment(sun_azimuth=0.0, sun_elevation=math.pi * 0.75)
+    ).sun_elevation == pytest.approx(45.0)
+    assert weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=-1.1)).lamps_on
 
 
 def test_the_sun_by_the_clock() -> None:
@@ -136,10 +143,10 @@ def test_the_sun_by_the_clock() -> None:
     assert solar_position(datetime(2026, 12, 21, 12)) == pytest.approx((180.0, 18.55), abs=0.1)
     azimuth, elevation = solar_position(datetime(2026, 3, 22, 6))
     assert (azimuth, elevation) == pytest.approx((90.0, 0.0), abs=0.6)
-    night = weather_of(Environment(date_time="2026-06-21T00:00:00"))
+    night = weather_from_environment(Environment(date_time="2026-06-21T00:00:00"))
     assert night.sun_elevation == pytest.approx(-18.55, abs=0.1)
     running = Environment(date_time="2026-06-21T00:00:00", clock_runs=True, clock_since=5.0)
-    assert weather_of(running, 12 * 3600.0 + 5.0).sun_elevation == pytest.approx(65.45, abs=0.1)
+    assert weather_from_environment(running, 12 * 3600.0 + 5.0).sun_elevation == pytest.approx(65.45, abs=0.1)
 
 
 @pytest.mark.parametrize("grip", [1.0, 0.5, 0.2])

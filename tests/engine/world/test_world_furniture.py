@@ -9,7 +9,7 @@ import pytest
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.furniture import Fixture, fixtures, signal_heads
+from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies, signal_heads
 
 ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
   <road name="" length="200" id="1" junction="-1"><link/>
@@ -25,8 +25,8 @@ def network(*objects: str, signals: str = "") -> RoadNetwork:
     return RoadNetwork.parse(ROAD.format(objects=listed, signals=signals))
 
 
-def only(*objects: str) -> Fixture:
-    (found,) = fixtures(network(*objects))
+def only(*objects: str) -> RoadObjectBody:
+    (found,) = road_object_bodies(network(*objects))
     return found
 
 
@@ -56,7 +56,7 @@ def test_an_outline_without_three_corners_is_none(kind: str, outline: str) -> No
         f'type="{kind}" s="50" t="-9" zOffset="0" length="6" width="4" height="3"><outline>{outline}</outline>'
     )
     with World(roads) as world:
-        hits = world.cast([[50.0, -2.0, 1.0]], [[50.0, -20.0, 1.0]])
+        hits = world.raycast([[50.0, -2.0, 1.0]], [[50.0, -20.0, 1.0]])
     assert hits.position[0] == pytest.approx([50.0, -7.0, 1.0], abs=1e-3)
 
 
@@ -72,7 +72,7 @@ def test_an_outline_without_three_corners_is_none(kind: str, outline: str) -> No
     ],
 )
 def test_paint_buildings_and_things_without_a_body_are_no_furniture(attributes: str) -> None:
-    assert list(fixtures(network(attributes))) == []
+    assert list(road_object_bodies(network(attributes))) == []
 
 
 def test_a_nameless_type_with_a_body_is_an_obstacle() -> None:
@@ -90,7 +90,7 @@ def test_an_outline_gives_place_and_size() -> None:
 
 def test_a_sign_beside_the_road_has_a_post() -> None:
     roads = network(signals=signal('s="50" t="-6" zOffset="2.2" height="0.75" width="0.75"'))
-    (post,) = fixtures(roads)
+    (post,) = road_object_bodies(roads)
     assert (post.kind, post.name, post.height) == ("post", "signal 7", pytest.approx(2.95))
     (head,) = signal_heads(roads)
     assert (head.pose.z, head.width, head.height, head.carried) == (2.2, 0.75, 0.75, True)
@@ -102,7 +102,7 @@ def test_a_light_over_the_lane_hangs_and_paint_has_no_head() -> None:
     light = signal('s="50" t="-2" zOffset="5" height="0.9" width="0.3"', "1000001", "yes")
     roads = network(signals=light)
     assert [head.carried for head in signal_heads(roads)] == [False]
-    assert list(fixtures(roads)) == []
+    assert list(road_object_bodies(roads)) == []
     line = signal('s="50" t="-2" zOffset="0" height="0.01" width="3.5"', "294")
     assert signal_heads(network(signals=line)) == []
 
@@ -179,7 +179,7 @@ def test_a_ray_meets_one_of_ten_thousand_posts() -> None:
     repeat = '<repeat s="0" length="200" distance="0.02" tStart="{0}" tEnd="{0}" widthStart="0.1" widthEnd="0.1"'
     post = 'type="pole" name="post" s="0" t="-9" zOffset="0" height="1">' + repeat.format(-9)
     roads = network(f'{post} heightStart="1" heightEnd="1" zOffsetStart="0" zOffsetEnd="0"/>')
-    assert len(list(fixtures(roads))) == 10_001
+    assert len(list(road_object_bodies(roads))) == 10_001
     with World(roads) as world:
-        hit = world.cast((50.0, -2.0, 0.5), [(50.0, -20.0, 0.5)])
+        hit = world.raycast((50.0, -2.0, 0.5), [(50.0, -20.0, 0.5)])
     assert hit.position[0, 1] == pytest.approx(-8.91, abs=0.05)

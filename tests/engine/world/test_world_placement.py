@@ -172,7 +172,7 @@ def test_looking_changes_nothing(car: CarFactory) -> None:
             world.add(car("Other"), Placement(12.0, 0.5), driven=True)
             for _ in range(60):
                 if look:
-                    world.cast([[-10.0, 0.0, 0.5]], [[50.0, 0.0, 0.5]])
+                    world.raycast([[-10.0, 0.0, 0.5]], [[50.0, 0.0, 0.5]])
                     world.camera(np.eye(4), 16, 12, 1.0)
                 world.step({}, {"Ego": Control(throttle=0.5, steering=0.02)})
             return world.view().position.tobytes()

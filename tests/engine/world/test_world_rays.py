@@ -16,7 +16,7 @@ CarFactory = Callable[..., ActorSpec]
 def test_the_first_box_is_hit(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(10.0, 0.0))
     world.add(car("B"), Placement(30.0, 0.0))
-    hits = world.cast(
+    hits = world.raycast(
         [[0, 0, 0.7], [0, 0, 0.7], [0, 0, 5.0], [0, 0, 2.0]], [[50, 0, 0.7], [0, 50, 0.7], [50, 0, 5.0], [0, 5, -2.0]]
     )
     assert hits.rows.tolist() == [0, -2, -2, -1]
@@ -31,10 +31,10 @@ def test_the_first_box_is_hit(world: World, car: CarFactory) -> None:
 def test_ignored_actors_are_looked_through(world: World, car: CarFactory) -> None:
     for index in range(3):
         world.add(car(f"C{index}"), Placement(10.0 + 10.0 * index, 0.0))
-    assert world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1")).rows.tolist() == [2]
-    hits = world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1", "C2"))
+    assert world.raycast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1")).rows.tolist() == [2]
+    hits = world.raycast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0", "C1", "C2"))
     assert (hits.rows.tolist(), hits.fraction.tolist()) == ([-2], [1.0])
-    assert world.cast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0",)).position[0, 0] == pytest.approx(19.1, abs=1e-3)
+    assert world.raycast([[0, 0, 0.7]], [[60, 0, 0.7]], ignore=("C0",)).position[0, 0] == pytest.approx(19.1, abs=1e-3)
 
 
 def test_ignored_actors_are_looked_through_from_everywhere(world: World, car: CarFactory) -> None:
@@ -46,10 +46,10 @@ def test_ignored_actors_are_looked_through_from_everywhere(world: World, car: Ca
     direction = rng.normal(size=(3000, 3)) * (1.0, 1.0, 0.3)
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     begin, end = hidden - 20.0 * direction, hidden + rng.normal(size=(3000, 3)) * 0.6 + 15.0 * direction
-    assert np.count_nonzero(world.cast(begin, end).rows == 0) > 1500
-    assert not np.any(world.cast(begin, end, ignore=("Hidden",)).rows == 0)
+    assert np.count_nonzero(world.raycast(begin, end).rows == 0) > 1500
+    assert not np.any(world.raycast(begin, end, ignore=("Hidden",)).rows == 0)
     through = hidden + (hidden - behind) + rng.uniform(-0.3, 0.3, size=(500, 3))
-    assert world.cast(through, np.broadcast_to(behind, (500, 3)), ignore=("Hidden",)).rows.tolist() == [1] * 500
+    assert world.raycast(through, np.broadcast_to(behind, (500, 3)), ignore=("Hidden",)).rows.tolist() == [1] * 500
 
 
 def test_line_of_sight_behind_a_lorry(world: World, car: CarFactory) -> None:
@@ -60,13 +60,13 @@ def test_line_of_sight_behind_a_lorry(world: World, car: CarFactory) -> None:
 
 def test_rays_know_where_actors_are_now(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(10.0, 0.0))
-    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [0]
+    assert world.raycast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [0]
     world.step({"A": Placement(10.0, 5.0)}, {})
-    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
+    assert world.raycast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
     world.step({"A": Placement(30.0, 0.0, teleport=True)}, {})
-    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).position[0, 0] == pytest.approx(29.1, abs=1e-3)
+    assert world.raycast([[0, 0, 0.7]], [[50, 0, 0.7]]).position[0, 0] == pytest.approx(29.1, abs=1e-3)
     world.remove("A")
-    assert world.cast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
+    assert world.raycast([[0, 0, 0.7]], [[50, 0, 0.7]]).rows.tolist() == [-2]
 
 
 def test_a_moving_driven_car_is_met_where_it_is(world: World, car: CarFactory) -> None:
@@ -74,20 +74,20 @@ def test_a_moving_driven_car_is_met_where_it_is(world: World, car: CarFactory) -
     for _ in range(5):
         world.step({}, {})
         x = float(world.view().position[0, 0])
-        hits = world.cast([[100.0, 0.0, 0.7]], [[-100.0, 0.0, 0.7]])
+        hits = world.raycast([[100.0, 0.0, 0.7]], [[-100.0, 0.0, 0.7]])
         assert hits.position[0, 0] == pytest.approx(x + 3.6, abs=1e-3)
 
 
 def test_buildings_block_and_are_no_actors(world: World) -> None:
     world.add_building("House", (20.0, 0.0, 4.0), (10.0, 10.0, 8.0), yaw=0.3)
-    assert world.cast([[0, 0, 2.0]], [[40, 0, 2.0]]).rows.tolist() == [-1]
+    assert world.raycast([[0, 0, 2.0]], [[40, 0, 2.0]]).rows.tolist() == [-1]
     assert not world.line_of_sight((0, 0, 2.0), [[40, 0, 2.0]])[0]
 
 
 def test_many_rays_in_one_batch(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(10.0, 0.0))
     targets = np.column_stack([np.full(20_000, 30.0), np.linspace(-10, 10, 20_000), np.full(20_000, 0.7)])
-    hits = world.cast([[0.0, 0.0, 0.7]], targets)
+    hits = world.raycast([[0.0, 0.0, 0.7]], targets)
     assert hits.rows.shape == (20_000,)
     # Seen from the origin the box's rear covers |y| / 30 up to 0.9 / 9.1; its flanks lie in that shadow.
     assert (hits.rows == 0).mean() == pytest.approx(2 * 30 * 0.9 / 9.1 / 20, abs=0.002)

@@ -85,9 +85,9 @@ def test_a_crest_hides_what_is_behind_it(car: CarFactory) -> None:
     crest = '<elevation s="0" a="0" b="0.1" c="0" d="0"/><elevation s="100" a="10" b="-0.1" c="0" d="0"/>'
     with World(road(crest)) as world:
         world.add(car("Behind"), Placement(150.0, -4.0, 5.0))
-        assert world.cast([[50.0, -4.0, 6.5]], [[151.0, -4.0, 6.0]]).rows.tolist() == [-1]
-        assert world.cast([[50.0, -4.0, 16.0]], [[151.0, -4.0, 6.0]]).rows.tolist() == [0]
-        ground = world.cast([[60.0, -4.0, 20.0]], [[60.0, -4.0, -5.0]])
+        assert world.raycast([[50.0, -4.0, 6.5]], [[151.0, -4.0, 6.0]]).rows.tolist() == [-1]
+        assert world.raycast([[50.0, -4.0, 16.0]], [[151.0, -4.0, 6.0]]).rows.tolist() == [0]
+        ground = world.raycast([[60.0, -4.0, 20.0]], [[60.0, -4.0, -5.0]])
         assert ground.position[0, 2] == pytest.approx(6.0, abs=0.05)
 
 
@@ -95,7 +95,7 @@ def test_a_building_of_the_map_stands_in_the_way() -> None:
     place = 's="50" t="20" zOffset="0" hdg="0"'
     house = f'<object id="7" type="building" name="School" {place} length="20" width="10" height="9"/>'
     with World(road(objects=house)) as world:
-        hits = world.cast([[50.0, 0.0, 3.0], [50.0, 0.0, 12.0]], [[50.0, 40.0, 3.0], [50.0, 40.0, 12.0]])
+        hits = world.raycast([[50.0, 0.0, 3.0], [50.0, 0.0, 12.0]], [[50.0, 40.0, 3.0], [50.0, 40.0, 12.0]])
     assert hits.rows.tolist() == [-1, -2]
     assert hits.position[0] == pytest.approx((50.0, 15.0, 3.0), abs=1e-3)
 

@@ -60,7 +60,7 @@ def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) ->
     """Colours of the thirds (or halves) of a light's head that shine, from the top."""
     while world.time < time - 1e-9:
         world.step({}, {})
-    world.show({signal: state}, {})
+    world.set_display_state({signal: state}, {})
     label = next(label for label, name in world.signal_labels.items() if name == signal)
     shot = picture(world, 22.0, -5.0 if signal == "L" else -7.0, 2.45)
     rows, columns = np.nonzero(shot.segmentation == label)
@@ -93,7 +93,7 @@ def test_the_lamps_of_a_light_shine_by_its_state(street: World, state: str, expe
 def test_a_light_for_pedestrians_has_two_lamps_and_unset_ones_are_dark(street: World) -> None:
     assert lit_lamps(street, "off;on", "P") == ["", "green"]
     assert lit_lamps(street, "red", "P") == ["red", ""]
-    street.show({}, {})
+    street.set_display_state({}, {})
     assert lit_lamps(street, "off") == ["", "", ""]
 
 
@@ -194,16 +194,16 @@ def grey(car: CarFactory) -> ActorSpec:
 def test_brake_lights_brighten_both_sides(world: World, grey: ActorSpec) -> None:
     world.add(grey, Placement(8.0, 0.0))
     dark = tail(world)
-    world.show({}, lights(LightState("brakeLights", "on")))
+    world.set_display_state({}, lights(LightState("brakeLights", "on")))
     assert (tail(world)[:, 0] > dark[:, 0] + 25.0).all()
-    world.show({}, lights(LightState("brakeLights", "off")))
+    world.set_display_state({}, lights(LightState("brakeLights", "off")))
     assert tail(world) == pytest.approx(dark, abs=3.0)
 
 
 def test_an_indicator_flashes_on_its_side(world: World, grey: ActorSpec) -> None:
     world.add(grey, Placement(8.0, 0.0))
     dark = tail(world)[:, 1]
-    world.show({}, lights(LightState("indicatorLeft", "flashing")))
+    world.set_display_state({}, lights(LightState("indicatorLeft", "flashing")))
     left, right = tail(world)[:, 1]
     assert left > dark[0] + 30.0
     assert right == pytest.approx(dark[1], abs=3.0)
@@ -220,9 +220,9 @@ def test_low_beam_lights_the_road_at_night_by_itself_or_by_the_scenario(world: W
         return float(world.radiance(looking(-2.0, 3.0, 3.0), _pinhole()).luminance[200:].mean())
 
     by_itself = road()
-    world.show({}, lights(LightState("lowBeam", "off")))
+    world.set_display_state({}, lights(LightState("lowBeam", "off")))
     switched_off = road()
-    world.show({}, lights(LightState("lowBeam", "off"), LightState("highBeam", "on")))
+    world.set_display_state({}, lights(LightState("lowBeam", "off"), LightState("highBeam", "on")))
     assert switched_off < 0.8 * by_itself
     assert road() > 1.05 * switched_off
 
@@ -237,19 +237,19 @@ def _pinhole() -> Pinhole:
 def test_an_actor_without_graphics_is_in_no_picture(world: World, grey: ActorSpec) -> None:
     world.add(grey, Placement(8.0, 0.0))
     assert (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
-    world.show({}, {"Ego": Appearance(visibility=Visibility(graphics=False))})
+    world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(graphics=False))})
     assert not (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
-    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
+    assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
 
 
 def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, grey: ActorSpec) -> None:
     world.add(grey, Placement(8.0, 0.0))
-    world.show({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
-    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
+    world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
+    assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
     assert world.view().unseen == ("Ego",)
-    world.show({}, {})
+    world.set_display_state({}, {})
     assert world.view().unseen == ()
-    assert world.cast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
+    assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
 
 
 def test_a_view_without_some_actors(world: World, car: CarFactory) -> None:
@@ -284,6 +284,6 @@ def test_a_posture_shows_in_the_picture(world: World) -> None:
 
     wide, tall = extent()
     assert tall > 2 * wide
-    world.show({}, {"Anna": Appearance(animations={"motion": AnimationState("motion", "lying")})})
+    world.set_display_state({}, {"Anna": Appearance(animations={"motion": AnimationState("motion", "lying")})})
     wide, tall = extent()
     assert wide > 2 * tall

@@ -108,7 +108,7 @@ def test_a_parked_car_stays_and_sets_off_when_it_is_told(car: CarFactory) -> Non
         parked = world.view()
         assert (parked.speed[0], parked.yaw_rate[0]) == (0.0, 0.0)
         assert parked.position[0].tolist() == [3.0, 1.0, 0.0]
-        hit = world.cast([[3.0, 1.0, 10.0]], [[3.0, 1.0, 0.0]])
+        hit = world.raycast([[3.0, 1.0, 10.0]], [[3.0, 1.0, 0.0]])
         assert hit.rows.tolist() == [0]
         world.step({}, {"Ego": Control(throttle=1.0, steering=0.2)})
         assert world.view().speed[0] == pytest.approx(0.05 * 4.0, rel=0.05)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import Gate
-from eidrive_scenario.fusion.tracks import TRACK, Table, advanced
+from eidrive_scenario.fusion.pairs import AssociationGate
+from eidrive_scenario.fusion.tracks import TRACK, Table, update_tracks
 
 
 class _Entry(NamedTuple):
@@ -31,7 +31,7 @@ class _History:
     begin: float = -math.inf
 
 
-class ReportMemory:
+class ReportHistory:
     """The tracks of every station as its reports make them, and the reports of the last `span` seconds.
 
     A report older than another of its station rolls the station's tracks back to the last report before it, and takes
@@ -41,7 +41,7 @@ class ReportMemory:
     is older than all that is remembered comes too late. Of two of one instant the one that arrives last counts.
     """
 
-    def __init__(self, span: float, gate: Gate) -> None:
+    def __init__(self, span: float, gate: AssociationGate) -> None:
         self.span = span
         self.stations: list[str | None] = []
         """Rows of `tracks` name a station by its place here; places of those who are forgotten are None, or reused."""
@@ -50,14 +50,14 @@ class ReportMemory:
         self._histories: list[_History] = []
         self._places: dict[str, int] = {}
 
-    def hear(self, report: Report) -> None:
+    def add_report(self, report: Report) -> None:
         """Remember a report; it enters the tracks when they are next asked for."""
         place = self._places.get(report.station)
         if place is None:
-            place = self._places[report.station] = self._free_place(report.station)
+            place = self._places[report.station] = self._allocate_slot(report.station)
         self._histories[place].new.append(report)
 
-    def forget(self, now: float) -> None:
+    def evict_stale(self, now: float) -> None:
         """Drop the stations that have been silent for so long that nothing of what is known of them can count again.
 
         What is older than `span` is not used, and no newer report can continue a track that ended `span` before it.
@@ -75,7 +75,7 @@ class ReportMemory:
             self.stations[place], self._histories[place] = None, _History()
             self._tracks = self._tracks[self._tracks["station"] != place]
 
-    def _free_place(self, station: str) -> int:
+    def _allocate_slot(self, station: str) -> int:
         if None in self.stations:
             place = self.stations.index(None)
             self.stations[place] = station
@@ -117,7 +117,7 @@ class ReportMemory:
         return reports[kept:]
 
     def _advance(self, stations: list[int], reports: list[Report]) -> None:
-        self._tracks = advanced(self._tracks, stations, reports, self._gate, self.span)
+        self._tracks = update_tracks(self._tracks, stations, reports, self._gate, self.span)
         for station, report in zip(stations, reports, strict=True):
             history = self._histories[station]
             history.entries.append(_Entry(report, self._tracks))

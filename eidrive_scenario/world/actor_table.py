@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Cast:
+class ActorTable:
     """What stays as long as nobody enters or leaves.
 
     row_of_handle  the row of the actor whose body has that number in pybullet, GROUND for what is no actor; the last
@@ -34,7 +34,7 @@ class Cast:
     """The same as a list."""
 
     @classmethod
-    def of(cls, bodies: Mapping[str, Body], highest_handle: int) -> Cast:
+    def of(cls, bodies: Mapping[str, Body], highest_handle: int) -> ActorTable:
         """From the bodies by name; `highest_handle` is that of other bodies in pybullet."""
         order = tuple(bodies.values())
         size = np.array([body.spec.size for body in order], dtype=float).reshape(-1, 3)

@@ -25,7 +25,7 @@ _MOST_BODIES = 16
 """So many bodies on one ray are looked at; whatever comes after them changes no path loss."""
 
 
-def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Place:
+def antenna_position(view: WorldView, spec: ActorSpec, height: float | None) -> Place:
     """The antenna of a station: above the middle of its box, at this height over its reference point, or on the roof.
 
     In the world frame [m]; pitch and roll are neglected.
@@ -38,7 +38,7 @@ def antenna_place(view: WorldView, spec: ActorSpec, height: float | None) -> Pla
     return (x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + over)
 
 
-def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
+def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
     """What the rays between the antennas of these pairs meet; their own two bodies do not count.
 
     A vehicle or any other actor in between makes NLOSv, a building or the ground NLOS.
@@ -46,7 +46,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
     count = len(pairs)
     view = world.view()
     if count <= _FEW:
-        met = world.first_met(*_ends(places, pairs))
+        met = world.first_hit(*_ends(places, pairs))
         if all(row in (NOTHING, view.rows.get(second)) for row, (_, second) in zip(met, pairs, strict=True)):
             return LineOfSightStates(np.full(count, LOS), np.full(count, -np.inf), {})
     origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
@@ -60,7 +60,7 @@ def sight_lines(world: World, places: dict[str, Place], pairs: Sequence[tuple[st
         if not len(open_rays):
             break
         way = targets[open_rays] - origins[open_rays]
-        hits = world.cast(origins[open_rays] + begun[open_rays, None] * way, targets[open_rays])
+        hits = world.raycast(origins[open_rays] + begun[open_rays, None] * way, targets[open_rays])
         going_on = []
         for ray, row, fraction in zip(open_rays.tolist(), hits.rows.tolist(), hits.fraction.tolist(), strict=True):
             if fraction >= 1.0:

@@ -32,7 +32,7 @@ LAYOUTS = (
 )
 
 
-class ForeignNetwork(ImageNetwork):
+class ExternalNetwork(ImageNetwork):
     """A network from a file `.onnx` (by OpenCV) or `.pt` (TorchScript, by torch).
 
     It gets (1, 3, H, W) float32, red green blue in [0, 1], and gives boxes in pixels of that in one of the layouts

@@ -10,14 +10,14 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.message import Message
 
 
-class ReceivedObjects:
+class PartialReportAssembler:
     """Keeps what was last said of each object, until that is `timeout` old [s]."""
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
         self._rows: dict[int, tuple[float, Detections]] = {}
 
-    def take(self, message: Message) -> Detections:
+    def update(self, message: Message) -> Detections:
         """A message has come in: all that is known by now, moved on to the instant of the newest measurement.
 
         Objects move at their last velocity, and stand where that is unknown.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SLACK = 0.01
+TRACE_TOLERANCE = 0.01
 """How much larger than the least trace that of the result may be, so that estimates which are about as good count about
 the same: the least trace alone would take either of two equal ones whole, and rounding would say which."""
 
@@ -38,11 +38,11 @@ def covariances(both: Array) -> Array:
 
 def intersect(a: Array, cov_a: Array, b: Array, cov_b: Array) -> tuple[Array, Array, Array]:
     """The estimate from means (..., 2) with covariances (..., 2, 2): its mean, its covariance, and the weight of a."""
-    both, w = intersected(estimates(a, cov_a), estimates(b, cov_b))
+    both, w = intersect_batch(estimates(a, cov_a), estimates(b, cov_b))
     return means(both), covariances(both), w
 
 
-def intersected(a: Array, b: Array) -> tuple[Array, Array]:
+def intersect_batch(a: Array, b: Array) -> tuple[Array, Array]:
     """The estimates (5, ...) from both, and the weights (...) of a.
 
     P⁻¹ = w A⁻¹ + (1 - w) B⁻¹, x = P (w A⁻¹ a + (1 - w) B⁻¹ b). P is no smaller than the true covariance of the error,
@@ -83,7 +83,7 @@ def weight(trace_a: Array, det_a: Array, trace_b: Array, det_b: Array, mixed: Ar
     best = np.where(mixes, np.minimum(np.maximum(root, -0.5), 0.5), np.copysign(0.5, v))
     # Where the middle is too bad, go as far towards the best as need be: the root nearest to 0 of
     # (u + v t) - limit (d + s t + p t²).
-    limit = (1.0 + SLACK) * (u + v * best) / (d + best * (s + best * p))
+    limit = (1.0 + TRACE_TOLERANCE) * (u + v * best) / (d + best * (s + best * p))
     excess, slope = u - limit * d, v - limit * s
     if not (excess > 0.0).any():
         return np.full_like(excess, 0.5)

@@ -15,7 +15,7 @@ _FAR = 300.0
 """Reach from which on there may be more squares than any that have something in them [m]: steps of many seconds."""
 
 
-class Nearby(Generic[Thing]):
+class SpatialGrid(Generic[Thing]):
     """Things that do not move, each in the squares that it may touch."""
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class Nearby(Generic[Thing]):
         for cell in dict.fromkeys(cells):
             self._in_cell.setdefault(cell, []).append(thing)
 
-    def around(self, x: float, y: float, reach: float) -> list[Thing]:
+    def query(self, x: float, y: float, reach: float) -> list[Thing]:
         """Those in the squares within reach of a point [m]; one may come several times."""
         found: list[Thing] = []
         if reach > _FAR:
@@ -35,13 +35,13 @@ class Nearby(Generic[Thing]):
                 if abs((column + 0.5) * SQUARE - x) <= side and abs((line + 0.5) * SQUARE - y) <= side:
                     found += things
         elif self._in_cell:
-            for cell in squares(x, y, reach):
+            for cell in grid_cells(x, y, reach):
                 if cell in self._in_cell:
                     found += self._in_cell[cell]
         return found
 
 
-def squares(x: float, y: float, reach: float) -> list[Cell]:
+def grid_cells(x: float, y: float, reach: float) -> list[Cell]:
     """The squares that touch the square around a point that reaches as far to each side [m]."""
     left, right = math.floor((x - reach) / SQUARE), math.floor((x + reach) / SQUARE)
     low, high = math.floor((y - reach) / SQUARE), math.floor((y + reach) / SQUARE)

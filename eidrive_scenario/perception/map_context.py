@@ -23,7 +23,7 @@ BEYOND = 20.0
 UNKNOWN, OFF, ON = -1, 0, 1
 
 
-class Surroundings:
+class MapContext:
     """The roads around a station, asked for many points at once; without a map it knows nothing.
 
     margin   how far beside a road something may be to count as near it [m]

@@ -14,7 +14,7 @@ Pixels = NDArray[np.intp] | slice
 """Numbers of pixels, line by line."""
 
 
-class Eye:
+class CameraView:
     """A camera at a pose (4, 4): camera to world, x right, y down, z forward.
 
     place (3,) in the world [m]; x, y (P,) of the rays through the pixels in its own frame at depth 1, and their length

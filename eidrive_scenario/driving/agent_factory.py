@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.control import Controller
+from eidrive_scenario.driving.control import VehicleController
+from eidrive_scenario.driving.message_generator import MessageGenerator
 from eidrive_scenario.driving.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
-from eidrive_scenario.driving.shared_points import SharedPoints
-from eidrive_scenario.driving.speaker import Speaker
+from eidrive_scenario.driving.shared_points import PointCloudSharing
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod
-from eidrive_scenario.perception.detector import Detector, Installation
+from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.tracker_settings import TrackerSettings
@@ -33,7 +33,7 @@ _SEEING = frozenset({"truth", "camera", "lidar"})
 def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
     """The sensors of a station. Raises SettingError if the detector needs one that the settings leave out."""
     kind: type[Detector] = _detector_class(settings.detector)
-    return Rig(spec, settings.rig_sensors(kind.needs, kind.usual_sensors), seed=seed)
+    return Rig(spec, settings.rig_sensors(kind.needs, kind.default_sensors), seed=seed)
 
 
 def _detector_class(name: str) -> type[Detector]:
@@ -109,14 +109,14 @@ def build_agent(
     if planner != NO_PLANNER and not wheels:
         raise SettingError(Diagnostic(f"{spec.name!r} has no wheels for planner {planner!r}", "remove the property"))
     detector = detector or build_detector(settings)
-    sensors = settings.rig_sensors(detector.needs, detector.usual_sensors)
-    installation = Installation(spec, sensors, roads, seed)
-    detector.install(installation)
+    sensors = settings.rig_sensors(detector.needs, detector.default_sensors)
+    installation = DetectorContext(spec, sensors, roads, seed)
+    detector.setup(installation)
     fusion = build_fusion(settings, detector)
     points = None
-    listens = planner != NO_PLANNER or settings.names_senders
+    listens = planner != NO_PLANNER or settings.restricts_senders
     if isinstance(fusion, EarlyFusion):
-        points = SharedPoints(fusion, _joint(settings, installation) if listens else None)
+        points = PointCloudSharing(fusion, _joint(settings, installation) if listens else None)
     return Agent(
         spec,
         settings,
@@ -130,26 +130,26 @@ def build_agent(
         planner=None
         if planner == NO_PLANNER
         else construct(registry("planners").load(planner, Planner), settings, spec, roads, dt=dt, seed=seed),
-        controller=Controller(spec, dt) if wheels else None,
-        speaker=Speaker(spec, settings, sensors=len(sensors), encoder=encoder),
+        controller=VehicleController(spec, dt) if wheels else None,
+        speaker=MessageGenerator(spec, settings, sensors=len(sensors), encoder=encoder),
         dt=dt,
-        listens=listens,
+        receives_messages=listens,
         own_perception=own_perception and listens,
         points=points,
     )
 
 
-def _joint(settings: AgentSettings, installation: Installation) -> Perception:
+def _joint(settings: AgentSettings, installation: DetectorContext) -> Perception:
     """What looks for objects in the points of all stations: as the station's own, on readings that are located."""
     detector = build_detector(settings)
-    detector.install(installation)
+    detector.setup(installation)
     return Perception(detector, tracker=_tracker(settings, detector), latency=settings.detector_latency)
 
 
 def _tracker(settings: AgentSettings, detector: Detector) -> Tracker | None:
     """The tracker that the settings ask for; without a word of theirs, one where the detector gives no velocities."""
     if settings.tracker is None:
-        return None if detector.gives_velocity else Tracker(TrackerSettings())
+        return None if detector.provides_velocity else Tracker(TrackerSettings())
     return None if settings.tracker.kind == "none" else Tracker(settings.tracker)
 
 

@@ -11,7 +11,9 @@ CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
 
 
 @lru_cache(maxsize=512)
-def furniture(kind: str, name: str, length: float, width: float, height: float, radius: float) -> Mapping[str, Array]:
+def road_object_mesh(
+    kind: str, name: str, length: float, width: float, height: float, radius: float
+) -> Mapping[str, Array]:
     """Material to triangles (K, 3, 3) of one piece."""
     mesh = Mesh()
     _BUILDERS[kind](mesh, name, length, width, height, radius)

@@ -56,14 +56,14 @@ class _Spans(NamedTuple):
     right: Integers
 
 
-def rasterise(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
+def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
     """Cover a picture with triangles, given by x, y [px] and nearness (3, N) of their corners.
 
     A pixel shows a triangle that holds its centre, the one of greatest nearness there. Nearness must be positive and
     linear across the picture: 1 / depth in perspective. Of equals the later one wins. A centre on an edge belongs to
     the triangle right of or below that edge, so that neighbours neither overlap nor leave gaps.
     """
-    found = rasterised(x, y, nearness, width, height)
+    found = rasterize_reference(x, y, nearness, width, height)
     if found.triangle.shape == (height, width):
         return found
     triangle, near = np.full((height, width), -1, dtype=np.int32), np.zeros((height, width), dtype=np.float32)
@@ -71,7 +71,7 @@ def rasterise(x: Array, y: Array, nearness: Array, width: int, height: int) -> C
     return Cover(triangle, near)
 
 
-def rasterised(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
+def rasterize_reference(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
     """The same for the part of the picture that holds all of them. What one triangle shows does not depend on others
     but for what lies before it."""
     rows = _rows(x, y, nearness, width, height)

@@ -20,7 +20,7 @@ from eidrive_scenario.v2x.size import cam_size, cpm_size, objects_that_fit
 from eidrive_scenario.world.actor import ActorSpec
 
 
-class Speaker:
+class MessageGenerator:
     """Makes the messages of one station, by the rules that its settings name.
 
     sensors  how many the station has;  encoder  writes messages to learn their size, None: by the size model
@@ -36,13 +36,13 @@ class Speaker:
         self._clock = settings.clock
         self._number = 0
         self._periods = -1
-        self._cam = CamGenerationRules()
-        self._cpm = CpmGenerationRules()
+        self._cam_rules = CamGenerationRules()
+        self._cpm_rules = CpmGenerationRules()
         self._numbering = ObjectIdAssigner()
         self._said = dict.fromkeys(settings.messages, -math.inf)
         """When each kind of message was last made [s]."""
 
-    def speak(
+    def generate(
         self,
         state: StationState,
         detections: Detections,
@@ -70,7 +70,7 @@ class Speaker:
             if etsi:
                 messages = self._due(kind, state, detections, now, max(interval, SHORTEST))
             else:
-                messages = [self._awareness(state, now) if kind == "cam" else self._everything(state, detections, now)]
+                messages = [self._cam(state, now) if kind == "cam" else self._full_cpm(state, detections, now)]
             if points is not None and messages and kind == "cpm":
                 messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
             if messages:
@@ -83,8 +83,8 @@ class Speaker:
     ) -> list[Message]:
         """The messages of this kind that the rules of ETSI ask for now."""
         if kind == "cpm":
-            return self._triggered(state, detections, now, shortest)
-        return [self._awareness(state, now)] if self._cam.is_due(state, now, shortest) else []
+            return self._triggered_cpms(state, detections, now, shortest)
+        return [self._cam(state, now)] if self._cam_rules.is_due(state, now, shortest) else []
 
     def _in_turn(self, now: float) -> bool:
         """Each tick, or at a rate."""
@@ -97,15 +97,17 @@ class Speaker:
         self._periods = period
         return True
 
-    def _everything(self, state: StationState, detections: Detections, now: float) -> Message:
+    def _full_cpm(self, state: StationState, detections: Detections, now: float) -> Message:
         """All that is in sight; also where that is nothing, as that is news too."""
         size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
         return self._sized(Message(self._spec.name, self._take_number(), now, state, detections, size), self._sensors)
 
-    def _triggered(self, state: StationState, detections: Detections, now: float, shortest: float) -> list[Message]:
+    def _triggered_cpms(
+        self, state: StationState, detections: Detections, now: float, shortest: float
+    ) -> list[Message]:
         """What the rules of ETSI choose, in as many messages as it needs."""
         numbers = self._numbering.assign_ids(detections)
-        contents = self._cpm.contents(detections, numbers, now, shortest)
+        contents = self._cpm_rules.contents(detections, numbers, now, shortest)
         if contents is None:
             return []
         security, mtu = self._settings.security_bytes, self._settings.mtu
@@ -128,9 +130,9 @@ class Speaker:
             sensors = 0
         return said
 
-    def _awareness(self, state: StationState, now: float) -> Message:
+    def _cam(self, state: StationState, now: float) -> Message:
         """The station itself."""
-        low_frequency = self._cam.low_frequency(now)
+        low_frequency = self._cam_rules.low_frequency(now)
         message = Message(
             self._spec.name,
             self._take_number(),

@@ -59,7 +59,7 @@ CLEARANCE = 2.1
 """Usual height of the lower edge of a signal, where the map has it on the ground [m]."""
 
 
-class Fixture(NamedTuple):
+class RoadObjectBody(NamedTuple):
     """One piece: kind (a key of SIZES, or `post` for a signal's), pose of its foot, length, width and height [m].
 
     radius   of a round one; 0 for a box
@@ -89,7 +89,7 @@ class SignalHead(NamedTuple):
     carried: bool
 
 
-def fixtures(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Fixture]:
+def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[RoadObjectBody]:
     """All furniture of a road network, posts of signals included, but for objects with some ids."""
     for placed in placed_objects(roads):
         found = _fixture(roads, placed) if placed.object.id not in without else None
@@ -100,7 +100,7 @@ def fixtures(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Fixt
             foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t)
             top = head.pose.z + head.height - foot.z
             name = f"signal {head.signal.id}"
-            yield Fixture(name, "post", foot._replace(h=head.pose.h, p=0.0, r=0.0), 0.0, 0.0, top, POST)
+            yield RoadObjectBody(name, "post", foot._replace(h=head.pose.h, p=0.0, r=0.0), 0.0, 0.0, top, POST)
 
 
 def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
@@ -147,7 +147,7 @@ def _drivable(roads: RoadNetwork, here: tuple[str, int, float, float, float]) ->
     return found is not None and found.drivable
 
 
-def _fixture(roads: RoadNetwork, placed: PlacedObject) -> Fixture | None:
+def _fixture(roads: RoadNetwork, placed: PlacedObject) -> RoadObjectBody | None:
     entry = placed.object
     kind = _KINDS.get(entry.type)
     if kind is None and entry.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
@@ -164,12 +164,12 @@ def _fixture(roads: RoadNetwork, placed: PlacedObject) -> Fixture | None:
         return None
     name = entry.name or f"{kind} {entry.id}"
     if kind == "tree":
-        return Fixture(name, kind, pose, length, width, height, TRUNK * height)
+        return RoadObjectBody(name, kind, pose, length, width, height, TRUNK * height)
     if kind == "vegetation":
-        return Fixture(name, kind, pose, length, width, height, solid=False)
+        return RoadObjectBody(name, kind, pose, length, width, height, solid=False)
     if kind in ("pole", "lamp", "guide post") or entry.radius:
-        return Fixture(name, kind, pose, length, width, height, max(length, width) / 2)
-    return Fixture(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+        return RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
+    return RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
 
 
 def _around(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float, float]:

@@ -40,7 +40,7 @@ def _luma(luminance: Floats) -> Floats:
     return found
 
 
-def toned(signal: Floats) -> NDArray[np.uint8]:
+def tone_map(signal: Floats) -> NDArray[np.uint8]:
     """The numbers of a picture whose light is given as shares of white; what is brighter is white."""
     steps: Floats = np.clip(signal, np.float32(0.0), np.float32(1.0))
     steps *= np.float32(_STEPS - 1)

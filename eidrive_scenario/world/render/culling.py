@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.model import Array, Floats, Instance
+from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
 
 _COARSE_PIXELS = 14.0
 """A model whose diameter covers fewer pixels is drawn coarsely."""
@@ -26,7 +26,7 @@ class Surfaces(NamedTuple):
     glow: Floats
 
 
-class Stage(NamedTuple):
+class VisibleGeometry(NamedTuple):
     """Triangles in front of a camera: x, y [px] and 1 / depth [1/m] (3, N) of their corners; of each the row among the
     M that were not cut (N,), and what those are: normal, albedo (M, 3), finish, label (M,) and glow (M, 3)."""
 
@@ -62,7 +62,7 @@ class _Chosen(NamedTuple):
     glow: Floats
 
 
-def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage:
+def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole) -> VisibleGeometry:
     """Triangles that face the camera and may lie in its picture, cut off at its near plane."""
     sides = _sides(pinhole)
     chosen = []
@@ -80,7 +80,7 @@ def stage(instances: Sequence[Instance], pose: Array, pinhole: Pinhole) -> Stage
     nearness = 1.0 / depth
     x = pinhole.focal * x * nearness + pinhole.centre_x
     y = pinhole.focal * y * nearness + pinhole.centre_y
-    return Stage(x, y, nearness, whose, normal, albedo, finish, label, glow)
+    return VisibleGeometry(x, y, nearness, whose, normal, albedo, finish, label, glow)
 
 
 _NOTHING = _Chosen(
@@ -103,8 +103,8 @@ def _sides(pinhole: Pinhole) -> Array:
 
 
 def _in_sight(
-    instances: Sequence[Instance], pose: Array, pinhole: Pinhole, sides: Array
-) -> list[tuple[Instance, float]]:
+    instances: Sequence[MeshInstance], pose: Array, pinhole: Pinhole, sides: Array
+) -> list[tuple[MeshInstance, float]]:
     """The instances whose spheres reach into the picture, and how many pixels these cover across."""
     if not instances:
         return []
@@ -116,7 +116,7 @@ def _in_sight(
     return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
 
 
-def _facing(instance: Instance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
+def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array, pixels: float) -> _Chosen | None:
     """The triangles of one instance that face the camera, corners in its frame; None where there are none."""
     model = instance.model
     to_camera = pose[:3, :3].T @ instance.rotation

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.traffic.bodies import Mixture, Participant
-from eidrive_scenario.traffic.sites import Covers, Sites
+from eidrive_scenario.traffic.bodies import Participant, TrafficMix
+from eidrive_scenario.traffic.sites import Covers, SpawnSites
 
 if TYPE_CHECKING:
     from eidrive_scenario.traffic.background import BackgroundTraffic
@@ -28,7 +28,7 @@ RIM = 0.8
 
 
 @dataclass(frozen=True)
-class Centre:
+class CentralObject:
     """The entity around which a swarm is: place [m], heading [rad] and speed along it [m/s]."""
 
     x: float
@@ -38,7 +38,7 @@ class Centre:
 
 
 @dataclass
-class Instance(ABC):
+class TrafficGenerator(ABC):
     """Traffic of one name, from the start of its action until it is stopped.
 
     name    trafficName, or what stands for it;  key  tells it from others of that name
@@ -56,7 +56,7 @@ class Instance(ABC):
         """Bring in and take out cars at this instant."""
 
     @abstractmethod
-    def wants(self, traffic: BackgroundTraffic) -> bool:
+    def is_due(self, traffic: BackgroundTraffic) -> bool:
         """Whether it may bring in a car now."""
 
     def rng(self, traffic: BackgroundTraffic) -> np.random.Generator:
@@ -66,7 +66,7 @@ class Instance(ABC):
 
 
 @dataclass
-class Swarm(Instance):
+class Swarm(TrafficGenerator):
     """Traffic around an entity, between a circle and an ellipse, both `offset` ahead of it along its x axis [m].
 
     The whole ring is filled once; what leaves the ellipse is taken out and replaced near its rim, where cars drive
@@ -83,14 +83,14 @@ class Swarm(Instance):
     minor: float
     offset: float
     count: int
-    mixture: Mixture
+    mixture: TrafficMix
     speeds: tuple[float, float] | None = None
     directions: tuple[float, float] | None = None
     sectors: tuple[float, float, float, float] | None = None
     _filled: bool = field(default=False, init=False)
     _again: float = field(default=0.0, init=False)
 
-    def wants(self, traffic: BackgroundTraffic) -> bool:
+    def is_due(self, traffic: BackgroundTraffic) -> bool:
         """While cars are missing."""
         return len(self.members) < self.count and traffic.time >= self._again - 1e-9
 
@@ -104,23 +104,23 @@ class Swarm(Instance):
             x, y = traffic.positions(names)
             _, share = self._place(centre, x, y)
             for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
-                traffic.take_out(name)
+                traffic.despawn(name)
         failures = 0
-        while self.wants(traffic) and failures < (1 if self._filled else 5):
+        while self.is_due(traffic) and failures < (1 if self._filled else 5):
             if not self._bring_one(traffic, centre):
                 failures += 1
         if failures:
             self._again = traffic.time + RETRY
         self._filled = True
 
-    def _place(self, centre: Centre, x: Array, y: Array) -> tuple[Array, Array]:
+    def _place(self, centre: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
         """Distance from the middle [m], and the share of the ellipse's axes at which places lie."""
         cos, sin = math.cos(centre.heading), math.sin(centre.heading)
         dx, dy = x - centre.x - self.offset * cos, y - centre.y - self.offset * sin
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
         return np.hypot(ahead, left), np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
 
-    def _bring_one(self, traffic: BackgroundTraffic, centre: Centre) -> bool:
+    def _bring_one(self, traffic: BackgroundTraffic, centre: CentralObject) -> bool:
         rng = self.rng(traffic)
         participant = self.mixture.draw(rng)
         sites = traffic.ground.for_body(participant)
@@ -139,19 +139,19 @@ class Swarm(Instance):
             choices = [rim & inwards, rim, fit]
         given = None if self.speeds is None else float(speed[0]) if len(speed) else None
         return any(
-            traffic.bring_in(self, participant, sites.some(choice), speed[choice], rng, given)
+            traffic.spawn(self, participant, sites.subset(choice), speed[choice], rng, given)
             for choice in choices
             if choice.any()
         )
 
-    def _direction(self, rng: np.random.Generator, centre: Centre, sites: Sites) -> Flags:
+    def _direction(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
         if self.directions is None:
             return np.ones(len(sites), dtype=bool)
         same, opposite = self.directions
         with_it: Flags = np.cos(sites.heading - centre.heading) >= 0.0
         return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
 
-    def _sector(self, rng: np.random.Generator, centre: Centre, sites: Sites) -> Flags:
+    def _sector(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
         """Quarters of the plane around the entity, 90° each."""
         if self.sectors is None:
             return np.ones(len(sites), dtype=bool)
@@ -163,35 +163,35 @@ class Swarm(Instance):
 
 
 @dataclass
-class Source(Instance):
+class Source(TrafficGenerator):
     """Cars appear at an even rate [1/s] at one of the places around a position; who finds none free waits.
 
     speed  at the start [m/s], None for the speed limit
     """
 
     place: tuple[float, float]
-    sites: Callable[[Participant], Sites]
+    sites: Callable[[Participant], SpawnSites]
     rate: float
-    mixture: Mixture
+    mixture: TrafficMix
     speed: float | None
     started: float
     _made: int = field(default=0, init=False)
     _waiting: Participant | None = field(default=None, init=False)
 
-    def wants(self, traffic: BackgroundTraffic) -> bool:
+    def is_due(self, traffic: BackgroundTraffic) -> bool:
         """When the next one is due."""
         return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - 1e-9
 
     def step(self, traffic: BackgroundTraffic) -> None:
         """Bring in who is due; the same one tries again as long as there is no place."""
-        while self.wants(traffic):
+        while self.is_due(traffic):
             rng = self.rng(traffic)
             participant = self._waiting or self.mixture.draw(rng)
             sites = self.sites(participant)
             speed = traffic.starting_speed(sites, participant)
             if self.speed is not None:
                 speed = np.full(len(sites), self.speed)
-            if not len(sites) or not traffic.bring_in(self, participant, sites, speed, rng, self.speed):
+            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, self.speed):
                 self._waiting = participant
                 return
             self._waiting = None
@@ -199,7 +199,7 @@ class Source(Instance):
 
 
 @dataclass
-class Sink(Instance):
+class Sink(TrafficGenerator):
     """Cars of background traffic disappear within a radius [m] around a position, at most at a rate [1/s].
 
     categories  whom it takes, None for all
@@ -211,7 +211,7 @@ class Sink(Instance):
     categories: frozenset[str] | None
     _next: float = field(default=-math.inf, init=False)
 
-    def wants(self, traffic: BackgroundTraffic) -> bool:
+    def is_due(self, traffic: BackgroundTraffic) -> bool:
         """It never brings in anybody."""
         return False
 
@@ -227,7 +227,7 @@ class Sink(Instance):
         for n in np.argsort(distance, kind="stable").tolist():
             if distance[n] > self.radius or self._next > traffic.time + 1e-9:
                 return
-            traffic.take_out(names[n])
+            traffic.despawn(names[n])
             # What was not used while nobody came is not saved up.
             self._next = max(self._next, traffic.time - traffic.dt) + 1.0 / self.rate
 
@@ -236,7 +236,7 @@ class Sink(Instance):
 
 
 @dataclass
-class Area(Instance):
+class Area(TrafficGenerator):
     """A number of participants in an area: brought in once, or kept there.
 
     covers  which of some places lie in the area
@@ -244,11 +244,11 @@ class Area(Instance):
 
     count: int
     continuous: bool
-    mixture: Mixture
+    mixture: TrafficMix
     covers: Covers
     _again: float = field(default=0.0, init=False)
 
-    def wants(self, traffic: BackgroundTraffic) -> bool:
+    def is_due(self, traffic: BackgroundTraffic) -> bool:
         """While participants are missing."""
         return len(self.members) < self.count and traffic.time >= self._again - 1e-9
 
@@ -258,15 +258,15 @@ class Area(Instance):
             names = list(self.members)
             outside = ~self.covers(traffic.sites(names))
             for name in [names[n] for n in np.flatnonzero(outside)]:
-                traffic.take_out(name)
+                traffic.despawn(name)
         failures = 0
-        while self.wants(traffic) and failures < 5:
+        while self.is_due(traffic) and failures < 5:
             rng = self.rng(traffic)
             participant = self.mixture.draw(rng)
             sites = traffic.ground.for_body(participant)
-            sites = sites.some(self.covers(sites))
+            sites = sites.subset(self.covers(sites))
             speed = traffic.starting_speed(sites, participant)
-            if not len(sites) or not traffic.bring_in(self, participant, sites, speed, rng, None):
+            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, None):
                 failures += 1
         if failures:
             self._again = traffic.time + RETRY

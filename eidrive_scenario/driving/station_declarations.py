@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.driving.building import build_detector, build_fusion
-from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings, agent_settings, is_agent
+from eidrive_scenario.driving.agent_factory import build_detector, build_fusion
+from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings, agent_settings, is_agent_controller
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Controller
@@ -31,7 +31,7 @@ def declared_settings(
     found: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
     for name, assigned in scenario.controllers.items():
-        for controller in filter(is_agent, assigned):
+        for controller in filter(is_agent_controller, assigned):
             try:
                 found[name] = agent_settings(controller)
             except SettingError as error:
@@ -51,7 +51,7 @@ def declared_settings(
     updated = {}
     for name, settings in found.items():
         update = _by_detector(settings, detector)
-        if cooperate is not None and (settings.names_senders or _drives(scenario, name, settings)):
+        if cooperate is not None and (settings.restricts_senders or _drives(scenario, name, settings)):
             update["cooperates_with"] = cooperate
         updated[name] = settings.model_copy(update=update)
     return updated
@@ -90,7 +90,7 @@ def declared_detectors(
     problems: list[Diagnostic] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
-        controller = list(filter(is_agent, scenario.controllers[name]))[-1]
+        controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
         by_option = option is not None and not station.detector_settings
         source = "--detector" if by_option else controller.source
         line = None if by_option else _line(controller, "detector_settings", "detector")
@@ -99,7 +99,7 @@ def declared_detectors(
             if load_weights:
                 found[name].load_weights(allow_torchscript=allow_torchscript)
             source, line = controller.source, _line(controller, "sensors")
-            station.rig_sensors(found[name].needs, found[name].usual_sensors)
+            station.rig_sensors(found[name].needs, found[name].default_sensors)
             line = _line(controller, "fusion_settings", "fusion")
             build_fusion(station, found[name], source=controller.source, line=line)
         except SettingError as error:
@@ -117,7 +117,7 @@ def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
     warnings = []
     for controller in dict.fromkeys(one for assigned in scenario.controllers.values() for one in assigned):
         entries = controller.properties.property if controller.properties is not None else ()
-        for entry in entries if is_agent(controller) else ():
+        for entry in entries if is_agent_controller(controller) else ():
             if entry.name != "detector_settings":
                 continue
             given = load_yaml(entry.value, source=controller.source, line=entry.line)
@@ -135,7 +135,7 @@ def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings])
     folder = Path(scenario.path).parent if scenario.path is not None else Path()
     for name, station in settings.items():
         if station.asn1_files:
-            controller = list(filter(is_agent, scenario.controllers[name]))[-1]
+            controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
             files = [folder / file for file in station.asn1_files]
             line = _line(controller, "asn1_files")
             category = actor_spec(name, scenario.entities[name]).category

@@ -11,7 +11,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, cylinder
 
 
 @dataclass(frozen=True)
-class Frame:
+class BodyDimensions:
     """The bounding box of an actor: origin at its centre on the ground, x forward; all in metres.
 
     front, rear  x of the axles
@@ -40,7 +40,7 @@ class Frame:
         return self.width / 2
 
 
-def add_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, *, axles: tuple[float, ...] = ()) -> None:
+def add_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tyre: float, *, axles: tuple[float, ...] = ()) -> None:
     """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side.
 
     Without `axles` those of all axles: the body then hides what lies further in.
@@ -51,7 +51,7 @@ def add_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, *, axles: tup
         _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, side, tyre)
 
 
-def add_extra_wheels(mesh: Mesh, frame: Frame, side: float, tyre: float, steered: float | None = None) -> None:
+def add_extra_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tyre: float, steered: float | None = None) -> None:
     """The wheels of the further axles below a body, on their own track, as far as that lies within y = ±side.
 
     tyre  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
