@@ -64,7 +64,7 @@ def play(path: Path, dt: float, limit: float) -> Play:
     simulation = Simulation(load_scenario(path), settings=RunSettings(dt=dt, time_limit=limit))
     loading = time.perf_counter() - started
     result = simulation.run()
-    return Play(result.simulated_s, loading, result.wall_s, result.end)
+    return Play(result.simulated_s, loading, result.wall_s, result.end_reason)
 
 
 def esmini_seconds(program: str, path: Path, patience: float) -> float | None:

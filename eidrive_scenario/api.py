@@ -26,7 +26,13 @@ from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.lifting import lift
 from eidrive_scenario.perception.map_context import MapContext
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
+from eidrive_scenario.recording.criterion import (
+    Criterion,
+    CriterionSettings,
+    Verdict,
+    actor_never_present,
+    evaluate_criteria,
+)
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
@@ -157,6 +163,7 @@ __all__ = [
     "Visibility",
     "WallLimitError",
     "WorldView",
+    "actor_never_present",
     "box_distance",
     "build_route",
     "closing_speed",
@@ -164,18 +171,17 @@ __all__ = [
     "describe_rule",
     "distance",
     "entity_box",
+    "evaluate_criteria",
     "facing",
     "footprint",
     "footprint_distance",
     "generator",
     "has_times",
     "is_agent_controller",
-    "judge",
     "lift",
     "load_yaml",
     "merge_environment",
     "model",
-    "never_appeared",
     "overlap",
     "parse_settings",
     "random_route",

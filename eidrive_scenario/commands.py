@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import drawn_parameters
-from eidrive_scenario.recording.criteria_text import parse_criteria
+from eidrive_scenario.recording.criteria_parser import parse_criteria
 from eidrive_scenario.v2x.profile import load_profile
 
 PREFIX = "eidrive."

@@ -6,7 +6,7 @@ from eidrive_scenario.commands import CHANNEL, CRITERION, PREFIX
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.recording.criteria_text import EXITS, exit_verdict, parse_criteria
+from eidrive_scenario.recording.criteria_parser import EXITS, exit_verdict, parse_criteria
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.run import RunSettings
 from eidrive_scenario.storyboard.commands import CustomCommand

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ NOT_ESTIMATED.flags.writeable = False
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Detections:
     """Perceived objects at one instant.

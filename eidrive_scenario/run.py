@@ -16,7 +16,7 @@ from eidrive_scenario.recording.result_views import result_html, result_row
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.v2x.link_statistics import LinkStatistics
 
-PASSED, FAILED, WRONG_INPUT, BROKEN = range(4)
+PASSED, FAILED, INVALID_INPUT, ABORTED = range(4)
 """Exit codes of a run."""
 
 DEFAULT_SEED = 1
@@ -79,7 +79,7 @@ class RunResult:
     seed: int
     channel: str
     passed: bool
-    end: str
+    end_reason: str
     """stop trigger, storyboard complete, criterion: NAME, or time limit"""
     exit_code: int
     criteria: tuple[Verdict, ...]
@@ -110,7 +110,7 @@ class RunResult:
         number = "" if self.run is None else f", run {self.run}"
         warned = f", {len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}" if self.warnings else ""
         head = f"{self.scenario}{number}, seed {self.seed}, channel {self.channel}"
-        return f"{head}: {outcome} ({self.end} at {self.simulated_s:.2f} s{warned})"
+        return f"{head}: {outcome} ({self.end_reason} at {self.simulated_s:.2f} s{warned})"
 
     def _repr_html_(self) -> str:
         """The outcome as HTML, for notebooks; all texts are escaped."""
@@ -134,7 +134,7 @@ class RunResult:
             "seed": self.seed,
             "channel": self.channel,
             "passed": self.passed,
-            "end": self.end,
+            "end_reason": self.end_reason,
             "criteria": [
                 {
                     "name": verdict.name,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.criterion import Criterion, Verdict, checked_metrics, checked_verdict
-from eidrive_scenario.run import BROKEN, FAILED, PASSED
+from eidrive_scenario.run import ABORTED, FAILED, PASSED
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.unstarted import unstarted
 from eidrive_scenario.storyboard.user_values import user_value_warnings
@@ -36,7 +36,7 @@ def exit_code_of(verdicts: Sequence[Verdict], end: str) -> int:
     """Return the exit code of a run with these verdicts and this reason for its end."""
     if not all(verdict.passed for verdict in verdicts):
         return FAILED
-    return BROKEN if end == TIME_LIMIT else PASSED
+    return ABORTED if end == TIME_LIMIT else PASSED
 
 
 def late_warnings(

@@ -12,7 +12,7 @@ from eidrive_scenario.driving.step_checks import short_channel_delay, short_dete
 from eidrive_scenario.errors import Diagnostic, ErrorCollector
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
-from eidrive_scenario.recording.criteria_text import stop_trigger_criteria, unbuilt_criteria
+from eidrive_scenario.recording.criteria_parser import stop_trigger_criteria, unsupported_criteria
 from eidrive_scenario.recording.criterion import Criterion
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.run import RunSettings
@@ -83,7 +83,7 @@ def _warnings(
 ) -> Iterator[Diagnostic]:
     """Everything that is doubtful about a run and known before it."""
     yield from scenario.warnings
-    yield from unbuilt_criteria(scenario)
+    yield from unsupported_criteria(scenario)
     yield from roads.map_warnings if roads is not None else ()
     yield from areas_off_road(scenario, stations.settings, roads)
     yield from short_detector_latencies(stations.settings, settings.dt)

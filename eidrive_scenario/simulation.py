@@ -23,11 +23,11 @@ from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.resolved_settings import ResolvedSettings
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.run import (
-    BROKEN,
+    ABORTED,
     DEFAULT_SEED,
     FAILED,
+    INVALID_INPUT,
     PASSED,
-    WRONG_INPUT,
     Observer,
     RunResult,
     RunSettings,
@@ -45,11 +45,11 @@ from eidrive_scenario.world.environment_weather import weather_from_environment
 from eidrive_scenario.world.specs import actor_spec
 
 __all__ = [
-    "BROKEN",
+    "ABORTED",
     "DEFAULT_SEED",
     "FAILED",
+    "INVALID_INPUT",
     "PASSED",
-    "WRONG_INPUT",
     "Observer",
     "RunResult",
     "RunSettings",
@@ -276,7 +276,7 @@ class Simulation:
             seed=self.seed,
             channel=self.stations.channel_name,
             passed=exit_code == PASSED,
-            end=end,
+            end_reason=end,
             exit_code=exit_code,
             criteria=verdicts,
             metrics=metrics,

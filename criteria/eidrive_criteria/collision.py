@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class CollisionSettings(CriterionSettings):
@@ -70,7 +70,7 @@ class Collision(Criterion):
                 f"({first.x:.1f}, {first.y:.1f}) m at a relative speed of {first.speed:.1f} m/s"
             )
         elif self._missing:
-            reason = never_appeared(self._missing)
+            reason = actor_never_present(self._missing)
         else:
             touched = f"did not touch {' or '.join(self._others)}" if self._others else "touched nothing"
             reason = f"{self._of} {touched}"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class DrivenDistanceSettings(CriterionSettings):
@@ -61,7 +61,7 @@ class DrivenDistance(Criterion):
             limit=limit,
             unit="m",
             first_violation=None,
-            reason=f"{of} drove {self._distance:.1f} m" if seen else never_appeared([of]),
+            reason=f"{of} drove {self._distance:.1f} m" if seen else actor_never_present([of]),
             fatal=self.fatal and self._late,
         )
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class MaxSpeedSettings(CriterionSettings):
@@ -44,7 +44,9 @@ class MaxSpeed(Criterion):
 
     def verdict(self) -> Verdict:
         of, seen = self._settings.of, math.isfinite(self._fastest)
-        reason = f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s" if seen else never_appeared([of])
+        reason = (
+            f"{of} drove up to {self._fastest:.2f} m/s at {self._when:.2f} s" if seen else actor_never_present([of])
+        )
         return Verdict(
             name=self.name,
             passed=seen and self._violated is None,

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, WorldView, never_appeared
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, WorldView, actor_never_present
 
 
 class PairSettings(CriterionSettings):
@@ -70,7 +70,7 @@ class PairCriterion(Criterion):
             reason = self.words()
         else:
             apart = f"{self.of} and {self.to} were never there together"
-            reason = never_appeared(self._missing) if self._missing else apart
+            reason = actor_never_present(self._missing) if self._missing else apart
         return Verdict(
             name=self.name,
             passed=self._together and self._violated is None,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, never_appeared
+from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class ReachPositionSettings(CriterionSettings):
@@ -59,7 +59,7 @@ class ReachPosition(Criterion):
             until = "" if settings.by is None else f" until {settings.by:.2f} s"
             reason = f"{settings.of} came no nearer to {place} than {self._nearest:.2f} m{until}"
         else:
-            reason = never_appeared([settings.of])
+            reason = actor_never_present([settings.of])
         return Verdict(
             name=self.name,
             passed=self._reached is not None,

@@ -9,13 +9,13 @@ import typer
 
 from eidrive_scenario.cli.error_output import WRONG_INPUT
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, ScenarioError, SettingError
-from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution
+from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution
 
 Play = Callable[[ConcreteRun], int]
 """Plays a run and gives its exit code."""
 
 
-def play_all(path: Path, play: Play, *, seed: int, most: int | None, parameters: Mapping[str, object]) -> int:
+def run_distribution(path: Path, play: Play, *, seed: int, most: int | None, parameters: Mapping[str, object]) -> int:
     """Play the runs of a distribution and tell on stderr what was left out; the highest exit code is that of all.
 
     seed        for a stochastic distribution that names no randomSeed
@@ -57,11 +57,11 @@ def play_all(path: Path, play: Play, *, seed: int, most: int | None, parameters:
     return code
 
 
-def _runs(unfolding: Unfolding, numbers: Sequence[int]) -> Iterator[ConcreteRun]:
+def _runs(unfolding: DistributionExpansion, numbers: Sequence[int]) -> Iterator[ConcreteRun]:
     return (unfolding[number] for number in numbers)
 
 
-def _refuse_varied(unfolding: Unfolding, parameters: Mapping[str, object]) -> None:
+def _refuse_varied(unfolding: DistributionExpansion, parameters: Mapping[str, object]) -> None:
     varied = unfolding.varied.names
     problems = [
         Diagnostic(

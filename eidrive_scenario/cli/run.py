@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.error_output import BROKEN
-from eidrive_scenario.cli.places import check_places
+from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.cli.run_failures import RunFailures
 from eidrive_scenario.cli.streams import has_all_letters
 from eidrive_scenario.cli.supervision import supervise
@@ -89,10 +89,10 @@ def run(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per run, nothing else.")] = False,
 ) -> None:
     """Play a scenario and judge it, or every run of a distribution of parameter values."""
-    from eidrive_scenario.cli.batch import play_all
+    from eidrive_scenario.cli.batch import run_distribution
     from eidrive_scenario.cli.verdicts import show, show_warnings
     from eidrive_scenario.experiments.reproduction import reproduction_lines
-    from eidrive_scenario.experiments.single_run import as_json_text, play
+    from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
     from eidrive_scenario.library import definition, resolve_scenario
     from eidrive_scenario.recording import Explanation
     from eidrive_scenario.simulation import RunSettings
@@ -126,7 +126,7 @@ def run(
             explanations = [Explanation(name) for name in explain or ()]
             failures.begin(each, None if isinstance(source, Path) else source.number)
             try:
-                result = play(
+                result = run_and_save(
                     source,
                     seed=each,
                     settings=settings,
@@ -158,9 +158,9 @@ def run(
         return code
 
     path = resolve_scenario(scenario)
-    check_places({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
+    check_output_paths({"--csv": csv, "--log": None if log == PRINTED else log}, (path, channel, weather))
     if definition(path) == "distribution":
-        raise typer.Exit(play_all(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
+        raise typer.Exit(run_distribution(path, play_seeds, seed=seed, most=max_runs, parameters=parameters))
     if max_runs is not None:
         raise SettingError(
             Diagnostic(f"--max-runs {max_runs} means nothing here", "it is for distributions", str(path))

@@ -92,7 +92,7 @@ class RunFailures:
         told = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
         run = {} if self._run is None else {"run": self._run}
         seed = {} if self._seed is None else {"seed": self._seed}
-        entry = {"scenario": self._scenario, **run, **seed, "passed": False, "end": "error", "error": told}
+        entry = {"scenario": self._scenario, **run, **seed, "passed": False, "end_reason": "error", "error": told}
         if notes := getattr(error, "__notes__", None):
             entry["notes"] = notes
         typer.echo(json.dumps(entry, ensure_ascii=not has_all_letters()))

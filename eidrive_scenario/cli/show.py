@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from eidrive_scenario.cli.places import check_places
+from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 
@@ -89,7 +89,7 @@ def tree(
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
     path = resolve_scenario(scenario)
-    check_places({"--svg": svg}, [path])
+    check_output_paths({"--svg": svg}, [path])
     loaded = load_scenario(path)
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
@@ -111,7 +111,7 @@ def view(
 
     path = recording_in(recording)
     page = out or path.with_suffix(".html")
-    check_places({"--out": page}, [path])
+    check_output_paths({"--out": page}, [path])
     complete = not is_partial(path)
     beside = path.with_name(RESULT)
     replay = make_replay(open_recording(path), page, result_of(path), result_file=beside, complete=complete)

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from eidrive_scenario.experiments.reproduction import reproduction_lines
 from eidrive_scenario.recording import Verdict
-from eidrive_scenario.simulation import BROKEN, FAILED, PASSED, RunResult
+from eidrive_scenario.simulation import ABORTED, FAILED, PASSED, RunResult
 
-_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), BROKEN: ("ran out of time", "bold red")}
+_OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("ran out of time", "bold red")}
 
 
 class _Output(Console):
@@ -52,7 +52,7 @@ def show(result: RunResult, varied: str = "") -> None:
         out.print("no criterion: nothing was judged", style="yellow")
     pace = result.simulated_s / result.wall_s if result.wall_s > 0 else 0.0
     speed = f", {pace:.{0 if pace >= 10 else 1 if pace >= 1 else 2}f} times real time" if pace else ""
-    out.print(Text(f"end: {result.end} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
+    out.print(Text(f"end: {result.end_reason} at {result.simulated_s:.2f} s ({result.wall_s:.2f} s wall{speed})"))
     out.print(Text(f"trace {result.trace_hash}", style="dim"), soft_wrap=True)
     for line in reproduction_lines(result):
         out.print(Text(line), soft_wrap=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.v2x.message import Message, ReceivedMessage
 from eidrive_scenario.world.actor import Control
@@ -16,7 +16,7 @@ from eidrive_scenario.world.actor import Control
 Array = NDArray[np.float64]
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Goal:
     """What the storyboard asks of a driven vehicle; None leaves it to the agent's own settings.
@@ -35,7 +35,7 @@ class Goal:
     lap: Array | None = None
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Plan:
     """A trajectory: points (M, 2) [m] and the speed at each (M,) [m/s], and why it looks as it does."""
@@ -51,7 +51,7 @@ class Plan:
     """The objects that make it look so, as rows of those that the planner was given."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class AgentStep:
     """One tick of one station: what it saw, heard, concluded, planned and did."""

@@ -18,7 +18,7 @@ from pathlib import Path
 from rich.console import Console
 
 from eidrive_scenario.experiments.paper import EGO, HIDDEN, SCENARIOS
-from eidrive_scenario.experiments.repetitions import Job, repeat
+from eidrive_scenario.experiments.repetitions import Job, run_jobs
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.simulation import RunSettings, run_file
@@ -106,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         done = {(row.scenario, f"{row.detector} {row.channel}", row.seed) for row in rows}
         wanted = jobs(options.detectors.split(","), options.channels.split(","), seed)
         left = [job for job in wanted if (job.scenario, job.arm, job.seed) not in done]
-        found = repeat(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
+        found = run_jobs(left, row_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
         with record.open("a", encoding="utf-8") as lines:
             lines.writelines(json.dumps(asdict(row)) + "\n" for row in found)
         rows += found

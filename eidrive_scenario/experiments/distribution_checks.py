@@ -9,8 +9,8 @@ from pathlib import Path
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError
 from eidrive_scenario.experiments.rules import run_rules
 from eidrive_scenario.experiments.scenario_checks import CheckReport, check_scenario
-from eidrive_scenario.openscenario import ConcreteRun, Unfolding, load_distribution, load_scenario
-from eidrive_scenario.openscenario.distributions import Combinations, Listed
+from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution, load_scenario
+from eidrive_scenario.openscenario.distributions import CartesianProduct, ListedValues
 from eidrive_scenario.openscenario.lint import Level
 
 _MOST_LOADED = 1000
@@ -98,10 +98,10 @@ def _place(problem: Diagnostic) -> tuple[str, str, int | None]:
     return problem.rule, problem.source, problem.line
 
 
-def _telling(unfolding: Unfolding) -> Iterator[int]:
+def _telling(unfolding: DistributionExpansion) -> Iterator[int]:
     """Numbers of runs that hold each listed value at least once."""
     varied = unfolding.varied
-    if not isinstance(varied, Combinations):
+    if not isinstance(varied, CartesianProduct):
         yield from range(min(len(unfolding), _FIRST_DRAWS))
         return
     yield 0
@@ -109,4 +109,4 @@ def _telling(unfolding: Unfolding) -> Iterator[int]:
     for choices in varied.choices:
         stride //= choices.count
         ends = (0, min(1, choices.count - 1), choices.count - 1)
-        yield from (index * stride for index in (range(choices.count) if isinstance(choices, Listed) else ends))
+        yield from (index * stride for index in (range(choices.count) if isinstance(choices, ListedValues) else ends))

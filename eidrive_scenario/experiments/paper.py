@@ -28,7 +28,7 @@ SCENARIOS = {"coop/scenario_1": "Scenario 1, roadside unit", "coop/scenario_2": 
 
 
 @dataclass(frozen=True)
-class Arm:
+class ExperimentArm:
     """One row of the table: the channel profile under each rule, `links` and `own`."""
 
     name: str
@@ -51,10 +51,10 @@ class ModelVariant:
 
 
 ARMS = (
-    Arm("none", "no cooperation", "none", "none"),
-    Arm("cooperation", "cooperation", "ideal", "paper_ideal"),
-    Arm("latency", "latency 0.3 s", "latency_300ms", "paper_latency_300ms"),
-    Arm("error", "error 30 %", "error_30pct", "paper_error_30pct"),
+    ExperimentArm("none", "no cooperation", "none", "none"),
+    ExperimentArm("cooperation", "cooperation", "ideal", "paper_ideal"),
+    ExperimentArm("latency", "latency 0.3 s", "latency_300ms", "paper_latency_300ms"),
+    ExperimentArm("error", "error 30 %", "error_30pct", "paper_error_30pct"),
 )
 
 LINKS = ModelVariant("links", "the channel acts on links only", False)
@@ -95,7 +95,7 @@ class Cell:
     """One arm in one place: the minimal distance of every seed [m], and how many runs stayed free of collisions."""
 
     scenario: str
-    arm: Arm
+    arm: ExperimentArm
     seeds: tuple[int, ...]
     centres: tuple[float, ...]
     boxes: tuple[float, ...]

@@ -22,7 +22,7 @@ SIGHTED = 2.0
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class MetricSample:
     """What one station knows at one instant, and what there is.
 
     objects      (M, 7) true boxes
@@ -36,7 +36,7 @@ class Snapshot:
     other_sight: Bools
 
 
-def snapshot(frame: Frame, station: str, *, reach: float) -> Snapshot:
+def snapshot(frame: Frame, station: str, *, reach: float) -> MetricSample:
     """What `station` knows in a frame of all actors around it, up to `reach` [m] from its centre to theirs.
 
     Stations are not asked for, as they tell of themselves, and boxes of them or beyond the reach do not count: the
@@ -53,7 +53,7 @@ def snapshot(frame: Frame, station: str, *, reach: float) -> Snapshot:
     outside = np.linalg.norm(known[:, :2] - centre, axis=1) > reach
     distinct = ~outside & ~_near(known, stations)
     others = [other.detections.boxes for name, other in frame.steps.items() if name != station]
-    return Snapshot(
+    return MetricSample(
         step.fused.subset(np.flatnonzero(distinct).tolist()),
         objects,
         _near(objects, step.detections.boxes),
@@ -61,7 +61,7 @@ def snapshot(frame: Frame, station: str, *, reach: float) -> Snapshot:
     )
 
 
-def precision_bev(snapshots: Iterable[Snapshot], least: float) -> float:
+def precision_bev(snapshots: Iterable[MetricSample], least: float) -> float:
     """Average precision over all snapshots, boxes seen from above that overlap by `least` (intersection over union).
 
     Detections are sorted by score over the whole set, and the area is taken at all points; NaN without any object.
@@ -81,10 +81,10 @@ class Recall:
 
     own: Proportion | None
     others: Proportion | None
-    nobody: Proportion | None
+    neither: Proportion | None
 
 
-def recall_by_sight(snapshots: Iterable[Snapshot], least: float) -> Recall:
+def recall_by_sight(snapshots: Iterable[MetricSample], least: float) -> Recall:
     """Recall at an overlap of `least`, whatever the scores. What nobody sees is known from memory at best."""
     found, total = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     for entry in snapshots:
@@ -97,7 +97,7 @@ def recall_by_sight(snapshots: Iterable[Snapshot], least: float) -> Recall:
     return Recall(own, others, nobody)
 
 
-def position_error(snapshots: Iterable[Snapshot], farthest: float = 4.0) -> float:
+def position_error(snapshots: Iterable[MetricSample], farthest: float = 4.0) -> float:
     """Root mean square distance between the centres of objects and of what is known of them, seen from above [m].
 
     Each object and the box nearest to it are a pair, nearest pairs first, up to `farthest` [m] apart: an overlap would
@@ -118,7 +118,7 @@ def position_error(snapshots: Iterable[Snapshot], farthest: float = 4.0) -> floa
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
-def _matches(entry: Snapshot, least: float) -> Matches:
+def _matches(entry: MetricSample, least: float) -> Matches:
     shares = iou_bev(entry.detections.boxes, entry.objects)
     return match_by_share(shares, entry.detections.scores, np.zeros(len(entry.objects), dtype=bool), least)
 

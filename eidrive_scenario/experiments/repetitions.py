@@ -39,7 +39,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def repeat(
+def run_jobs(
     jobs: Sequence[Job],
     task: Callable[[Job], T],
     *,

@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.recording.atomic_files import partial_path
 from eidrive_scenario.recording.file_lock import FileLock
-from eidrive_scenario.recording.output import partial
 from eidrive_scenario.recording.run_files import PICTURES, RECORDING, RESULT, read_result
 from eidrive_scenario.resolved_settings import ResolvedSettings
 
@@ -40,12 +40,12 @@ class RunFolder:
     @property
     def recording(self) -> Path:
         """Path of the recording while the run goes on."""
-        return partial(self.path / RECORDING)
+        return partial_path(self.path / RECORDING)
 
     @property
     def pictures(self) -> Path:
         """Folder of the camera images while the run goes on."""
-        return partial(self.path / PICTURES)
+        return partial_path(self.path / PICTURES)
 
     def prepare(self) -> None:
         """Remove what an earlier run has left that did not end, with the page that `eidrive view` made of it."""
@@ -67,7 +67,7 @@ class RunFolder:
             self.recording.replace(self.path / RECORDING)
         if self.pictures.exists():
             self.pictures.replace(self.path / PICTURES)
-        unfinished = partial(self.path / RESULT)
+        unfinished = partial_path(self.path / RESULT)
         unfinished.write_bytes(result)
         unfinished.replace(self.path / RESULT)
 

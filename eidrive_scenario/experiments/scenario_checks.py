@@ -13,7 +13,7 @@ from eidrive_scenario.openscenario import Source, load_scenario
 from eidrive_scenario.openscenario.catalog_check import check_catalog
 from eidrive_scenario.openscenario.diagnostics import sort_diagnostics
 from eidrive_scenario.openscenario.lint import Level
-from eidrive_scenario.recording.criteria_text import unbuilt_criteria
+from eidrive_scenario.recording.criteria_parser import unsupported_criteria
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import Simulation
 
@@ -39,7 +39,7 @@ def check_scenario(source: Source, ignored: Collection[str] = ()) -> CheckReport
         scenario = load_scenario(source)
     except InputError as error:
         return CheckReport(error.diagnostics)
-    unbuilt = [problem for problem in unbuilt_criteria(scenario) if problem not in scenario.warnings]
+    unbuilt = [problem for problem in unsupported_criteria(scenario) if problem not in scenario.warnings]
     found: dict[Level, list[Diagnostic]] = {
         Level.ERROR: [],
         Level.WARNING: [*scenario.warnings, *unbuilt],

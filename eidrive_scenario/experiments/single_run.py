@@ -16,8 +16,8 @@ from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.openscenario.parameters import Assignment
-from eidrive_scenario.recording import CameraPictures, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.output import exclusive, whole
+from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, Recorder, RunLog
+from eidrive_scenario.recording.atomic_files import atomic_output, exclusive
 from eidrive_scenario.recording.run_files import (
     PICTURES,
     RECORDING,
@@ -37,14 +37,14 @@ __all__ = [
     "RECORDING",
     "RESULT",
     "as_json_text",
-    "play",
     "read_results",
     "recording_in",
     "result_of",
+    "run_and_save",
 ]
 
 
-def play(
+def run_and_save(
     source: Scenario | Source | ConcreteRun,
     *,
     seed: int = DEFAULT_SEED,
@@ -97,7 +97,7 @@ def play(
                     stack.enter_context(exclusive(Path(log)))
                 simulation.add_observer(RunLog(log))
             if csv is not None:
-                simulation.add_observer(CsvWriter(stack.enter_context(whole(Path(csv)))))
+                simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(Path(csv)))))
             if folder is not None and record:
                 recording = folder.recording
                 if limit is not None:
@@ -136,7 +136,7 @@ def _record(
     command: str,
 ) -> None:
     """Let a recorder and a writer of camera images look on."""
-    pictures = CameraPictures(folder.pictures)
+    pictures = CameraImageWriter(folder.pictures)
     pictures.watch(simulation.stations)
     simulation.add_observer(pictures)
     scenario, resolved = simulation.scenario, simulation.resolved

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.message import StationState
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Report:
     """What one station perceived, and how it reached this one: measured at `detections.time`, arrived at `arrived`.

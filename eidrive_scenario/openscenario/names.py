@@ -22,8 +22,8 @@ from eidrive_scenario.openscenario.model import (
     Trailer,
     VariableDeclaration,
 )
-from eidrive_scenario.openscenario.participants import scenario_objects
 from eidrive_scenario.openscenario.scalars import Version
+from eidrive_scenario.openscenario.scenario_objects import scenario_objects
 from eidrive_scenario.openscenario.schema import rules
 from eidrive_scenario.openscenario.storyboard_names import StoryboardNames
 

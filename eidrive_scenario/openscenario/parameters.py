@@ -44,7 +44,7 @@ class Parameter:
     value: Any
     declared: str
     """The text of its declaration; `text` may be another that was assigned."""
-    sound: bool = True
+    is_valid: bool = True
     """False where its declaration is wrong: what follows from that is not worth a further message."""
 
     @property
@@ -101,7 +101,7 @@ class Scope:
         while scope is not None:
             found = scope.parameters.get(name)
             if found is not None:
-                if not found.sound:
+                if not found.is_valid:
                     raise ExpressionError("")
                 if scope.lent is not None:
                     scope.lent.add(name)
@@ -203,7 +203,7 @@ def declare(
             source=place.source,
             line=place.line,
         )
-        scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, sound=False)
+        scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, is_valid=False)
         return
     scope.parameters[name] = Parameter(name, text, value, declaration.value)
     groups = declaration.constraint_group

@@ -16,7 +16,7 @@ from eidrive_scenario.files import MIB, read_regular_file, reason_of
 from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 
 
-class WrittenInPython(Protocol):
+class SupportsGetElement(Protocol):
     """What scenariogeneration calls a Scenario, and whatever else gives its XML on demand."""
 
     def get_element(self) -> Any:
@@ -25,7 +25,7 @@ class WrittenInPython(Protocol):
 
 Source: TypeAlias = (
     "Path | str | bytes | etree._Element | etree._ElementTree | ElementTree.Element | ElementTree.ElementTree | "
-    "WrittenInPython"
+    "SupportsGetElement"
 )
 
 LIMITS = XmlLimits(max_bytes=64 * MIB, max_nodes=2_000_000)
@@ -98,7 +98,7 @@ def _from_tree(source: Any) -> Document:
     return Document(parse(text, name), name, None, Path(), text, _digest(text))
 
 
-def _element_of(source: WrittenInPython, name: str) -> Any:
+def _element_of(source: SupportsGetElement, name: str) -> Any:
     """Its root element. Raises ScenarioError where the library that made it finds something wrong by now."""
     try:
         return source.get_element()

@@ -232,7 +232,7 @@ class Reader:
             self._declared_twice(declaration, other)
             return replace(declaration, value=other.text)
         if not sound:
-            scope.parameters[name] = Parameter(name, "", "", "", sound=False)
+            scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
             return declaration
         declare(scope, declaration, given, self.findings)
         return replace(declaration, value=given.text) if given else declaration

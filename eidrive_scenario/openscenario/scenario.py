@@ -34,9 +34,9 @@ from eidrive_scenario.openscenario.model import (
 )
 from eidrive_scenario.openscenario.parameters import Assignment, Scope, as_assignments
 from eidrive_scenario.openscenario.parsing import Source, open_document
-from eidrive_scenario.openscenario.participants import scenario_objects
 from eidrive_scenario.openscenario.roadfile import find_road_file
 from eidrive_scenario.openscenario.rules import check_rules
+from eidrive_scenario.openscenario.scenario_objects import scenario_objects
 
 EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
 

@@ -39,7 +39,7 @@ LEVELS: Mapping[type[Element], StoryboardElementType] = {
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedElement:
     """An element of the storyboard and the names from the story down to it."""
 
     element: Element
@@ -57,11 +57,11 @@ class StoryboardNames:
     def __init__(self, storyboard: Storyboard | None, entries: Mapping[CatalogReference, Element]) -> None:
         self._entries = entries
         self.named = [named for story in (storyboard.story if storyboard else ()) for named in self._below(story, ())]
-        self._meant = Meant((named.path, named) for named in self.named)
+        self._meant = ReferenceMatch((named.path, named) for named in self.named)
 
-    def _below(self, element: Element, above: tuple[str, ...]) -> Iterator[Named]:
+    def _below(self, element: Element, above: tuple[str, ...]) -> Iterator[NamedElement]:
         path = (*above, str(getattr(element, "name", "")))
-        yield Named(element, path)
+        yield NamedElement(element, path)
         for child in element.children():
             if isinstance(child, CatalogReference):
                 entry = self._entries.get(child)
@@ -102,7 +102,7 @@ class StoryboardNames:
         findings.error(message, remedy, source=condition.source, line=condition.line)
 
 
-class Meant(Generic[T]):
+class ReferenceMatch(Generic[T]):
     """Elements with their paths, to be asked which of them a reference means."""
 
     def __init__(self, elements: Iterable[tuple[tuple[str, ...], T]]) -> None:

@@ -12,8 +12,8 @@ import pytest
 
 from eidrive_scenario.errors import ExtensionError, InputError, SimulationError, WallLimitError, suggestion
 from eidrive_scenario.library import definition, library_path, resolve_scenario
-from eidrive_scenario.pytest_plugin.options import Arm, arms
-from eidrive_scenario.pytest_plugin.outcome import explain, play_arm, properties
+from eidrive_scenario.pytest_plugin.options import RunVariant, arms
+from eidrive_scenario.pytest_plugin.outcome import explain, properties, run_variant
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import Source
@@ -27,7 +27,7 @@ class Case:
     """What the marker asks the test to run."""
 
     source: Path
-    arm: Arm
+    arm: RunVariant
 
 
 class RunScenario(Protocol):
@@ -117,12 +117,12 @@ def run_scenario(request: pytest.FixtureRequest) -> RunScenario:
         source = case.source if source is None and case is not None else source
         if source is None:
             pytest.fail('name a scenario: run_scenario("coop/scenario_1"), or use the marker scenario', pytrace=False)
-        arm = case.arm if case is not None else Arm(None, 1)
+        arm = case.arm if case is not None else RunVariant(None, 1)
         replaced = arm.replaced if channel is None and seed is None else ()
-        arm = Arm(arm.channel if channel is None else channel, arm.seed if seed is None else seed, replaced)
+        arm = RunVariant(arm.channel if channel is None else channel, arm.seed if seed is None else seed, replaced)
         try:
             source = resolve_scenario(source) if isinstance(source, str | Path) else source
-            result = play_arm(request.node, source, arm, **settings)
+            result = run_variant(request.node, source, arm, **settings)
         except InputError as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         except SimulationError as error:

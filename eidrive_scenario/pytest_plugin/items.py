@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from eidrive_scenario.errors import ConstraintError
-from eidrive_scenario.pytest_plugin.options import Arm
-from eidrive_scenario.pytest_plugin.outcome import ScenarioFailed, failure_text, play_file
+from eidrive_scenario.pytest_plugin.options import RunVariant
+from eidrive_scenario.pytest_plugin.outcome import ScenarioFailed, failure_text, run_file_and_report
 
 if TYPE_CHECKING:
     from eidrive_scenario.openscenario import ConcreteRun
@@ -25,7 +25,7 @@ class ScenarioItem(pytest.Item):
     run  concrete run of a parameter value distribution; one that its scenario's constraints rule out is skipped
     """
 
-    def __init__(self, *, arm: Arm, run: ConcreteRun | None = None, **named: Any) -> None:
+    def __init__(self, *, arm: RunVariant, run: ConcreteRun | None = None, **named: Any) -> None:
         super().__init__(**named)
         self.arm = arm
         self.run = run
@@ -36,7 +36,7 @@ class ScenarioItem(pytest.Item):
         if self.config.getoption("setuponly"):
             return
         try:
-            self._result = play_file(self, self.path, self.arm, self.run)
+            self._result = run_file_and_report(self, self.path, self.arm, self.run)
         except ConstraintError as error:
             if self.run is None:
                 raise pytest.fail.Exception(str(error), pytrace=False) from None

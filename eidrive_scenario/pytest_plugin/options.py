@@ -25,7 +25,7 @@ _WORKER_KEY = "eidrive_given"
 
 
 @dataclass(frozen=True)
-class Arm:
+class RunVariant:
     """One way to run a scenario; the channel None is the one that the file itself names.
 
     replaced  warnings of options that replaced what the marker of the test lists
@@ -112,7 +112,9 @@ def pytest_report_header(config: pytest.Config) -> str | None:
     return f"eidrive: {', '.join(asked)}" if asked else None
 
 
-def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None) -> Iterator[Arm]:
+def arms(
+    config: pytest.Config, channels: Sequence[str] | None = None, seeds: int | None = None
+) -> Iterator[RunVariant]:
     """Every channel with every seed; the command line wins over `channels` and `seeds`, those of the marker."""
     given = config.getoption("eidrive_channel")
     names: Sequence[str | None] = _channels(",".join(given)) if given else []
@@ -125,7 +127,7 @@ def arms(config: pytest.Config, channels: Sequence[str] | None = None, seeds: in
         replaced.append(f"--eidrive-seeds {option} replaces the marker's seeds={seeds}")
     for channel in names or channels or (None,):
         for seed in range(1, (option or seeds or 1) + 1):
-            yield Arm(channel, seed, tuple(replaced))
+            yield RunVariant(channel, seed, tuple(replaced))
 
 
 def wanted(config: pytest.Config, path: Path) -> bool:

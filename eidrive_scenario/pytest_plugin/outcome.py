@@ -12,7 +12,7 @@ import pytest
 
 from eidrive_scenario.errors import Diagnostic, EidriveError, ExtensionError, InputError, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.hung_runs import wall_limit_of
-from eidrive_scenario.pytest_plugin.options import Arm
+from eidrive_scenario.pytest_plugin.options import RunVariant
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
@@ -34,23 +34,23 @@ class ScenarioFailed(Exception):
         self.result = result
 
 
-def play_file(item: pytest.Item, source: Path, arm: Arm, run: ConcreteRun | None = None) -> RunResult:
+def run_file_and_report(item: pytest.Item, source: Path, arm: RunVariant, run: ConcreteRun | None = None) -> RunResult:
     """Run a test's scenario, or that run of its distribution, and record its properties. Raise InputError."""
-    result = _play(item.config, source, run or source, arm, {})
+    result = _run_and_report(item.config, source, run or source, arm, {})
     item.user_properties.extend(properties(result))
     if run is not None:
         item.user_properties.extend((f"parameter.{name}", value) for name, value in run.parameters.items())
     return result
 
 
-def play_arm(item: pytest.Item, source: Source, arm: Arm, **overrides: Any) -> RunResult:
+def run_variant(item: pytest.Item, source: Source, arm: RunVariant, **overrides: Any) -> RunResult:
     """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
 
     What it leaves behind lies where the scenario's file does, or without one where that of the test does.
     Raises InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
-    return _play(item.config, file, source, arm, overrides, command=pytest_command(item))
+    return _run_and_report(item.config, file, source, arm, overrides, command=pytest_command(item))
 
 
 def pytest_command(item: pytest.Item) -> str:
@@ -63,16 +63,16 @@ def pytest_command(item: pytest.Item) -> str:
     return shlex.join(words)
 
 
-def _play(
+def _run_and_report(
     config: pytest.Config,
     file: Path,
     source: Source | ConcreteRun,
-    arm: Arm,
+    arm: RunVariant,
     overrides: Mapping[str, Any],
     command: str = "",
 ) -> RunResult:
     # Imported with the first run: pytest loads this plugin in every project of its environment.
-    from eidrive_scenario.experiments.single_run import play
+    from eidrive_scenario.experiments.single_run import run_and_save
     from eidrive_scenario.simulation import RunSettings
 
     overrides = dict(overrides)
@@ -84,7 +84,7 @@ def _play(
     settings: dict[str, Any] = {"channel": arm.channel, "detector": config.getoption("eidrive_detector"), **overrides}
     folder = config.getoption("eidrive_out")
     below = Path(config.invocation_params.dir, folder, *_place(config, file)) if folder is not None else None
-    return play(
+    return run_and_save(
         source,
         seed=arm.seed,
         settings=RunSettings(**settings),
@@ -104,7 +104,7 @@ def properties(result: RunResult) -> Properties:
 
     Plain numbers only, as pytest-xdist sends nothing else to its controller.
     """
-    noted: Properties = [("channel", result.channel), ("seed", result.seed), ("end", result.end)]
+    noted: Properties = [("channel", result.channel), ("seed", result.seed), ("end_reason", result.end_reason)]
     if result.run is not None:
         noted.append(("run", result.run))
     for verdict in result.criteria:
@@ -134,7 +134,7 @@ def explain(result: RunResult) -> str:
 
     lines = [f"{verdict.name}: {verdict.reason}{_limit(verdict)}" for verdict in result.criteria if not verdict.passed]
     if not lines:
-        lines = [f"ended by its {result.end} after {result.simulated_s:.2f} s"]
+        lines = [f"ended by its {result.end_reason} after {result.simulated_s:.2f} s"]
     run = "" if result.run is None else f"run {result.run} of "
     head = f"{run}{result.scenario} failed with channel {result.channel}, seed {result.seed}"
     return "\n".join([head, *lines, *reproduction_lines(result)])

@@ -1,7 +1,13 @@
 """The frame; what a run leaves behind, and reading it again."""
 
-from eidrive_scenario.recording.camera_pictures import CameraPictures
-from eidrive_scenario.recording.criterion import Criterion, CriterionSettings, Verdict, judge, never_appeared
+from eidrive_scenario.recording.camera_images import CameraImageWriter
+from eidrive_scenario.recording.criterion import (
+    Criterion,
+    CriterionSettings,
+    Verdict,
+    actor_never_present,
+    evaluate_criteria,
+)
 from eidrive_scenario.recording.csv_writer import CsvWriter
 from eidrive_scenario.recording.explanation import Explanation
 from eidrive_scenario.recording.frame import Frame
@@ -11,7 +17,7 @@ from eidrive_scenario.recording.run_log import RunLog
 from eidrive_scenario.recording.trace_hash import TraceHash
 
 __all__ = [
-    "CameraPictures",
+    "CameraImageWriter",
     "Criterion",
     "CriterionSettings",
     "CsvWriter",
@@ -22,7 +28,7 @@ __all__ = [
     "RunLog",
     "TraceHash",
     "Verdict",
-    "judge",
-    "never_appeared",
+    "actor_never_present",
+    "evaluate_criteria",
     "read_recording",
 ]

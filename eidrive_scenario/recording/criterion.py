@@ -45,7 +45,7 @@ class Criterion(ABC):
 
     A class is registered in the entry points `eidrive_scenario.criteria` and built as `cls(settings)`, with `settings`
     an instance of its `settings_type`. An actor that it looks at and that never appeared is a failed verdict with the
-    reason `never_appeared`, never a pass.
+    reason `actor_never_present`, never a pass.
     """
 
     settings_type: ClassVar[type[CriterionSettings]] = CriterionSettings
@@ -74,7 +74,7 @@ class Criterion(ABC):
         return {}
 
 
-def never_appeared(names: Iterable[str]) -> str:
+def actor_never_present(names: Iterable[str]) -> str:
     """The reason of a verdict about actors that were never in the world."""
     names = sorted(names)
     verb = "was" if len(names) == 1 else "were"
@@ -110,7 +110,7 @@ def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
     return metrics
 
 
-def judge(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
+def evaluate_criteria(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
     """The verdicts of `criteria` over `frames`, say of a recording."""
     for frame in frames:
         for criterion in criteria:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
+from eidrive_scenario.recording.atomic_files import create
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.output import create
 
 COLUMNS = ("time", "name", "x", "y", "z", "h", "p", "r", "speed")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.storyboard_names import is_suffix
-from eidrive_scenario.recording.condition_words import told
+from eidrive_scenario.recording.condition_text import describe_history
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.storyboard.elements import ActElement, StoryElement
 from eidrive_scenario.storyboard.events import EventElement
@@ -173,7 +173,7 @@ def _group_lines(group: GroupHistory, title: str) -> Iterator[str]:
         monitor = condition.monitor
         where = monitor.condition.element
         yield f"{indent}{monitor.describe()}  [{monitor.name!r}, {where.source}:{where.line}]"
-        yield from (f"{indent}  {fact}" for fact in told(condition))
+        yield from (f"{indent}  {fact}" for fact in describe_history(condition))
 
 
 def _verdict(group: GroupHistory) -> str:

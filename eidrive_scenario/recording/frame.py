@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.step import AgentStep
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.storyboard.states import StateChange
 from eidrive_scenario.v2x.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
@@ -14,7 +14,7 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Frame:
     """The truth, what each station did, what the storyboard did, and what became of the messages said before.

@@ -32,7 +32,7 @@ class Result(Protocol):
     @property
     def passed(self) -> bool: ...
     @property
-    def end(self) -> str: ...
+    def end_reason(self) -> str: ...
     @property
     def exit_code(self) -> int: ...
     @property
@@ -61,7 +61,7 @@ def result_row(result: Result) -> dict[str, Scalar]:
         "seed": result.seed,
         "channel": result.channel,
         "passed": bool(result.passed),
-        "end": result.end,
+        "end_reason": result.end_reason,
         "exit_code": result.exit_code,
         "simulated_s": float(result.simulated_s),
         "wall_s": float(result.wall_s),
@@ -117,7 +117,7 @@ def result_html(result: Result) -> str:
     mark = escape(result.trace_hash[:12])
     return (
         f'<div><p><b>{title}</b>: <b style="color:{color}">{word}</b></p>{table}'
-        f"<p>{escape(result.end)} at {result.simulated_s:.2f} s, trace <code>{mark}</code></p>"
+        f"<p>{escape(result.end_reason)} at {result.simulated_s:.2f} s, trace <code>{mark}</code></p>"
         + (f"<p>warnings:</p><ul>{warnings}</ul>" if warnings else "")
         + "</div>"
     )

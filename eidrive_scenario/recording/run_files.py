@@ -9,8 +9,8 @@ from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.files import read_regular_file
+from eidrive_scenario.recording.atomic_files import PARTIAL, partial_path
 from eidrive_scenario.recording.bounded_json import load_json
-from eidrive_scenario.recording.output import PARTIAL, partial
 
 RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
 """Names of the files in a run's folder."""
@@ -27,7 +27,7 @@ def recording_in(place: Path) -> Path:
     """
     if not os.path.isdir(place):
         return place
-    for found in ([place / RECORDING, partial(place / RECORDING)], _recordings_below(place)):
+    for found in ([place / RECORDING, partial_path(place / RECORDING)], _recordings_below(place)):
         paths = [path for path in found if path.is_file()]
         if len(paths) == 1 or (paths and paths[0].parent == place):
             return paths[0]
@@ -42,7 +42,7 @@ def recording_in(place: Path) -> Path:
 def _recordings_below(place: Path) -> list[Path]:
     """The recording of each folder; a partial one where there is no other."""
     found: dict[Path, Path] = {}
-    for path in sorted([*place.rglob(partial(Path(RECORDING)).name), *place.rglob(RECORDING)]):
+    for path in sorted([*place.rglob(partial_path(Path(RECORDING)).name), *place.rglob(RECORDING)]):
         if path.name == RECORDING or path.parent not in found:
             found[path.parent] = path
     return list(found.values())
@@ -84,7 +84,7 @@ def result_paths(places: Sequence[Path]) -> Iterator[Path]:
 def unfinished_runs(places: Sequence[Path]) -> Iterator[Path]:
     """The partial recordings in these folders, and in folders below, that have no result beside them."""
     for place in places:
-        for path in sorted(place.rglob(partial(Path(RECORDING)).name)) if os.path.isdir(place) else ():
+        for path in sorted(place.rglob(partial_path(Path(RECORDING)).name)) if os.path.isdir(place) else ():
             if not path.with_name(RESULT).exists():
                 yield path
 

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
+from eidrive_scenario.recording.atomic_files import create
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.link_words import OFF_THE_AIR, link_in_words
-from eidrive_scenario.recording.output import create
+from eidrive_scenario.recording.link_text import OFF_THE_AIR, describe_link
 from eidrive_scenario.storyboard.elements import EMPTY
 from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
@@ -46,10 +46,10 @@ class RunLog:
         started = {change.path for change in frame.changes if change.transition is ElementTransition.START}
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
-                self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {in_words(change)}\n")
+                self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {describe_change(change)}\n")
         for link in frame.links:
             if link.path_loss_db is not None or link.reason in OFF_THE_AIR:
-                self._stream.write(f"{link.sent:9.3f} s  {link_in_words(link)}\n")
+                self._stream.write(f"{link.sent:9.3f} s  {describe_link(link)}\n")
 
     def close(self) -> None:
         """Finish the file."""
@@ -72,7 +72,7 @@ class RunLog:
         return f"{kind} {change.element}{told}"
 
 
-def in_words(change: StateChange) -> str:
+def describe_change(change: StateChange) -> str:
     """What became of an element, and why."""
     verb = _VERBS[change.transition]
     if change.transition is ElementTransition.END and change.after is ElementState.STANDBY:

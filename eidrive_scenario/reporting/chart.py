@@ -14,7 +14,7 @@ INK, GRID, TEXT, PAPER = "var(--axis, #475569)", "var(--line, #e5e7eb)", "var(--
 
 
 @dataclass(frozen=True)
-class Line:
+class ChartSeries:
     """One line of a chart: points (x, y), and a mark at one of them (its index) if wanted."""
 
     name: str
@@ -26,7 +26,7 @@ class Line:
 
 
 def line_chart(
-    lines: Sequence[Line],
+    lines: Sequence[ChartSeries],
     *,
     x_title: str,
     y_title: str,
@@ -104,7 +104,7 @@ def ticks(low: float, high: float, most: int) -> list[float]:
     return [round(index * step, 10) for index in range(first, last + 1)]
 
 
-def _names(ends: Sequence[tuple[tuple[float, float], Line]]) -> list[str]:
+def _names(ends: Sequence[tuple[tuple[float, float], ChartSeries]]) -> list[str]:
     """The lines' names where they end, pushed apart where they would overlap."""
     drawn, last = [], -math.inf
     for (x, y), line in sorted(ends, key=lambda end: end[0][1]):

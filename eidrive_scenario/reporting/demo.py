@@ -32,13 +32,13 @@ from eidrive_scenario.experiments.paper import (
     run_settings,
     tabulate,
 )
-from eidrive_scenario.experiments.repetitions import Job, jobs_of, repeat
+from eidrive_scenario.experiments.repetitions import Job, jobs_of, run_jobs
 from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.recording.output import create
-from eidrive_scenario.reporting.demo_page import CameraPicture, Place, write_demo
+from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, write_demo
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.road_drawing import road_drawing
 from eidrive_scenario.reporting.street_view import driver_view, helper_view, street_picture
@@ -47,10 +47,10 @@ from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, r
 from eidrive_scenario.world.specs import actor_spec
 
 Array = NDArray[np.float64]
-Told = tuple[RunResult, Story | None]
+StoryResult = tuple[RunResult, Story | None]
 
 
-def tell(job: Job, watched: int) -> Told:
+def run_story(job: Job, watched: int) -> StoryResult:
     """Run a job; the runs of the seed `watched` also tell their story."""
     path = resolve_scenario(job.scenario)
     if job.seed != watched:
@@ -70,12 +70,12 @@ def conflict_areas(scenario: Scenario) -> tuple[Array, ...]:
     )
 
 
-def place_of(name: str, seed: int, story: Story) -> Place:
+def place_of(name: str, seed: int, story: Story) -> DemoSite:
     """What the pictures of a scenario share, and camera pictures out of one of its runs."""
     scenario = load_for_seed(resolve_scenario(name), seed, RunSettings().parameters)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     drawing = road_drawing(roads.roads.values() if roads is not None else ())
-    return Place(drawing, conflict_areas(scenario), _views(scenario, roads, story))
+    return DemoSite(drawing, conflict_areas(scenario), _views(scenario, roads, story))
 
 
 def _views(scenario: Scenario, roads: RoadNetwork | None, story: Story) -> tuple[CameraPicture, ...]:
@@ -113,7 +113,7 @@ def demo(out: Path, seeds: Sequence[int], workers: int | None, console: Console)
     settings = run_settings(detector="oracle")
     jobs = [job for scenario in SCENARIOS for job in jobs_of(scenario, settings, seeds)]
     console.print(f"{len(SCENARIOS)} scenarios, {len(settings)} channels, {len(seeds)} seeds: {len(jobs)} runs")
-    answers = repeat(jobs, partial(tell, watched=seeds[0]), workers=workers, console=console, title="demo")
+    answers = run_jobs(jobs, partial(run_story, watched=seeds[0]), workers=workers, console=console, title="demo")
     runs = [(job, result) for job, (result, _) in zip(jobs, answers, strict=True)]
     stories: Mapping[tuple[str, str], Story] = {
         (job.scenario, job.arm): story for job, (_, story) in zip(jobs, answers, strict=True) if story is not None

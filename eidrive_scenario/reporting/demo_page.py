@@ -15,14 +15,14 @@ from eidrive_scenario.experiments.paper import (
     ARMS,
     LINKS,
     SCENARIOS,
-    Arm,
     Cell,
+    ExperimentArm,
     PublishedClaim,
     Table,
     difference,
     evaluate_claims,
 )
-from eidrive_scenario.reporting.chart import Line, line_chart
+from eidrive_scenario.reporting.chart import ChartSeries, line_chart
 from eidrive_scenario.reporting.key_frames import Moment, Story
 from eidrive_scenario.reporting.page import png_address, write_page
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
@@ -45,7 +45,7 @@ class CameraPicture:
 
 
 @dataclass(frozen=True)
-class Place:
+class DemoSite:
     """Where a scenario happens: what the pictures of all its arms share."""
 
     roads: RoadDrawing
@@ -58,7 +58,7 @@ def write_demo(
     links: Table,
     own: Table,
     stories: Mapping[tuple[str, str], Story],
-    places: Mapping[str, Place],
+    places: Mapping[str, DemoSite],
     *,
     watched: int,
     footer: str = "",
@@ -92,7 +92,7 @@ def write_demo(
 
 
 def _place(
-    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: Place, window: Window, watched: int
+    table: Table, scenario: str, stories: Mapping[tuple[str, str], Story], place: DemoSite, window: Window, watched: int
 ) -> dict[str, Any]:
     mine = {arm.name: stories[scenario, arm.channel(table.rule)] for arm in ARMS}
     found: Sequence[PublishedClaim] = [check for check in evaluate_claims(table) if check.scenario == scenario]
@@ -127,7 +127,9 @@ def _speed(speed: float) -> str:
     return f"at {whole} km/h" if whole >= 0 else f"thrown back at {-whole} km/h"
 
 
-def _picture(moment: Moment, story: Story, arm: Arm, place: Place, window: Window, roads_id: str) -> dict[str, Any]:
+def _picture(
+    moment: Moment, story: Story, arm: ExperimentArm, place: DemoSite, window: Window, roads_id: str
+) -> dict[str, Any]:
     snapshot = moment.snapshot
     if snapshot is None:
         return {"title": moment.title, "caption": "", "svg": None}
@@ -161,7 +163,7 @@ def _chart(stories: Mapping[str, Story]) -> str:
         if not story.times:
             continue
         nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centres[row]))
-        lines.append(Line(arm.title, COLOURS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
+        lines.append(ChartSeries(arm.title, COLOURS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
         near = [row for row, gap in enumerate(story.boxes) if gap <= HORIZON]
         if near:
             start, end = min(start, story.times[near[0]]), max(end, story.times[near[-1]])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_distance, points_in_polygon
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
+from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Moment:
     kind: str
     """heard or hidden, entered, braked, closest"""
     title: str
-    snapshot: Snapshot | None
+    snapshot: StationSnapshot | None
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class KeyFrames:
 
     def __init__(self, ego: str, hidden: str, areas: Sequence[Array] = ()) -> None:
         self.ego, self.hidden, self.areas = ego, hidden, tuple(areas)
-        self._knowledge = Knowledge(ego)
+        self._knowledge = SnapshotBuilder(ego)
         self._times: list[float] = []
         self._where: list[tuple[float, float]] = []
         self._centres: list[float] = []
         self._boxes: list[float] = []
         self._speeds: list[float] = []
         self._met: list[float] = []
-        self._found: dict[str, tuple[str, Snapshot]] = {}
+        self._found: dict[str, tuple[str, StationSnapshot]] = {}
         self._least = (math.inf, math.inf)
         self._touched = False
 
@@ -123,7 +123,7 @@ class KeyFrames:
             self._touched,
         )
 
-    def _measure(self, ego: list[float], hidden: list[float], snapshot: Snapshot) -> None:
+    def _measure(self, ego: list[float], hidden: list[float], snapshot: StationSnapshot) -> None:
         centre, box = math.dist(ego[:2], hidden[:2]), box_distance(ego, hidden)
         self._met.append(snapshot.time)
         self._centres.append(centre)
@@ -138,7 +138,7 @@ class KeyFrames:
             title = f"{self.hidden} and {self.ego} collide" if self._touched else f"closest, {box:.2f} m apart"
             self._found["closest"] = (title, snapshot)
 
-    def _notice(self, frame: Frame, snapshot: Snapshot) -> None:
+    def _notice(self, frame: Frame, snapshot: StationSnapshot) -> None:
         step = snapshot.step
         if not self._shows(snapshot.own):
             if "hidden" not in self._found:
@@ -167,7 +167,7 @@ class KeyFrames:
         return any(math.hypot(box[0] - x, box[1] - y) <= NEAR for box in detections.boxes.tolist())
 
 
-def _portable(snapshot: Snapshot) -> Snapshot:
+def _portable(snapshot: StationSnapshot) -> StationSnapshot:
     """The same with a view that holds nothing but its arrays: what a view caches does not travel between processes."""
     return dataclasses.replace(snapshot, view=dataclasses.replace(snapshot.view))
 

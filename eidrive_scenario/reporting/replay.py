@@ -20,7 +20,7 @@ from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.reported_run import reported
 from eidrive_scenario.reporting.road_drawing import recorded_roads
 from eidrive_scenario.reporting.settings_text import run_facts, shortened
-from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
+from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
 from eidrive_scenario.reporting.top_view import (
     AREA,
     GROUND,
@@ -182,7 +182,7 @@ def replay_data(
     With a `report`, a frame that cannot be drawn is reported there and left out.
     """
     data: dict[str, Any] = {"times": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
-    knowledge: dict[str, Knowledge] = {}
+    knowledge: dict[str, SnapshotBuilder] = {}
     budget = _Budget(report)
     for frame in frames:
         try:
@@ -198,7 +198,7 @@ def replay_data(
     return {**data, "roads": _roads(roads or RoadDrawing()), "colours": COLOURS}
 
 
-def _part(frame: Frame, knowledge: dict[str, Knowledge]) -> dict[str, Any]:
+def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder]) -> dict[str, Any]:
     """What a page shows of one frame. The stations' knowledge is carried on."""
     view = frame.view
     boxes, speeds = view.boxes.tolist(), view.speed.tolist()
@@ -208,7 +208,7 @@ def _part(frame: Frame, knowledge: dict[str, Knowledge]) -> dict[str, Any]:
         name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
     }
     for name in frame.steps:
-        knowledge.setdefault(name, Knowledge(name))
+        knowledge.setdefault(name, SnapshotBuilder(name))
     snapshots = {name: known.observe(frame) for name, known in knowledge.items()}
     return {
         "time": round(view.time, 4),
@@ -250,7 +250,7 @@ def _size(part: Mapping[str, Any]) -> int:
     return 40 + poses + changes + stations
 
 
-def _station(snapshot: Snapshot) -> dict[str, Any]:
+def _station(snapshot: StationSnapshot) -> dict[str, Any]:
     plan = snapshot.step.plan if snapshot.step else None
     return {
         "own": _boxes(snapshot.own),

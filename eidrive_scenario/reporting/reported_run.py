@@ -33,7 +33,7 @@ class ReportedRun(BaseModel):
     seed: int
     channel: str = ""
     passed: bool
-    end: str
+    end_reason: str
     criteria: tuple[ReportedCriterion, ...] = ()
     metrics: dict[str, float | None] = {}
     trace_hash: str = ""
@@ -47,7 +47,7 @@ class ReportedRun(BaseModel):
     @property
     def finished(self) -> bool:
         """False where the run was cut off by its time limit."""
-        return self.end != "time limit"
+        return self.end_reason != "time limit"
 
 
 def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:

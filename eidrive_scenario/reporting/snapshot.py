@@ -19,7 +19,7 @@ LINK_LIFETIME = 0.15
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class StationSnapshot:
     """What `station` saw (`own`), holds from others (`heard`) and concluded (`fused`), and the links towards it.
 
     `own` is what the station goes by: where its own detections travel the channel too, those that have come back.
@@ -41,7 +41,7 @@ class Snapshot:
         return self.view.time
 
 
-class Knowledge:
+class SnapshotBuilder:
     """Folds the frames of a run into snapshots of one station."""
 
     def __init__(self, station: str) -> None:
@@ -51,7 +51,7 @@ class Knowledge:
         self._links: dict[str, LinkEvent] = {}
         self._own_travels = False
 
-    def observe(self, frame: Frame) -> Snapshot:
+    def observe(self, frame: Frame) -> StationSnapshot:
         """Take the next frame; the snapshot at its time."""
         now = frame.view.time
         step = frame.steps.get(self.station)
@@ -67,7 +67,7 @@ class Knowledge:
             if now - held.message.detections.time <= _lifetime(held.message) + 1e-9
         }
         self._links = {name: event for name, event in self._links.items() if now - event.sent <= LINK_LIFETIME + 1e-9}
-        return Snapshot(
+        return StationSnapshot(
             station=self.station,
             view=frame.view,
             own=self._own(step, now),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from eidrive_scenario.openscenario.model import StoryboardElementStateCondition
-from eidrive_scenario.openscenario.storyboard_names import Meant
+from eidrive_scenario.openscenario.storyboard_names import ReferenceMatch
 from eidrive_scenario.storyboard.elements import ManeuverElement, ManeuverGroupElement, StoryElement
 from eidrive_scenario.storyboard.events import ActionElement, EventElement
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -26,7 +26,7 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True)
-class Line:
+class BoxLine:
     """One line: a word in front (when, and, or, stop when, …) and its text."""
 
     role: Role
@@ -42,7 +42,7 @@ class Box:
     title: str
     path: Path
     remark: str = ""
-    lines: tuple[Line, ...] = ()
+    lines: tuple[BoxLine, ...] = ()
     children: list[Box] = field(default_factory=list)
     waits_for: tuple[Path, ...] = ()
 
@@ -55,23 +55,25 @@ class Box:
 
 def story_boxes(storyboard: Storyboard) -> list[Box]:
     """The stories of a storyboard with all that they hold. A group with a single maneuver takes that into its box."""
-    elements = Meant((element.record.path, element) for element in _walk(storyboard.root))
+    elements = ReferenceMatch((element.record.path, element) for element in _walk(storyboard.root))
     return [_box(story, elements) for story in storyboard.root.elements]
 
 
 def init_boxes(storyboard: Storyboard) -> list[Box]:
     """What Init does: a box for each entity, one for what concerns all."""
-    lines: dict[str, list[Line]] = {}
+    lines: dict[str, list[BoxLine]] = {}
     for behaviour in storyboard.init.actions:
-        lines.setdefault(behaviour.actor_name or "global actions", []).append(Line(Role.WHAT, "", behaviour.describe()))
+        lines.setdefault(behaviour.actor_name or "global actions", []).append(
+            BoxLine(Role.WHAT, "", behaviour.describe())
+        )
     return [Box("init", name, (name,), lines=tuple(dict.fromkeys(found))) for name, found in lines.items()]
 
 
-def stop_lines(storyboard: Storyboard) -> tuple[Line, ...]:
+def stop_lines(storyboard: Storyboard) -> tuple[BoxLine, ...]:
     """When the run ends, as far as the storyboard says."""
     leaf = storyboard.root.stop_leaf
     if leaf is None:
-        return (Line(Role.STOP, "when", "every story has ended"),)
+        return (BoxLine(Role.STOP, "when", "every story has ended"),)
     return tuple(_trigger(leaf.trigger, Role.STOP, "when"))
 
 
@@ -81,8 +83,8 @@ def _walk(element: StoryElement) -> Iterator[StoryElement]:
         yield from _walk(child)
 
 
-def _box(element: StoryElement, elements: Meant[StoryElement]) -> Box:
-    lines: list[Line] = []
+def _box(element: StoryElement, elements: ReferenceMatch[StoryElement]) -> Box:
+    lines: list[BoxLine] = []
     waits: list[Path] = []
     if element.start_leaf is not None:
         lines += _trigger(element.start_leaf.trigger, Role.START, "when")
@@ -93,7 +95,7 @@ def _box(element: StoryElement, elements: Meant[StoryElement]) -> Box:
     if isinstance(element, ManeuverGroupElement):
         lines += _group_lines(element)
         if len(children) == 1:
-            lines.append(Line(Role.WHAT, "maneuver", children[0].name))
+            lines.append(BoxLine(Role.WHAT, "maneuver", children[0].name))
             children = children[0].elements
     if isinstance(element, ActionElement):
         lines += _action_lines(element)
@@ -115,14 +117,14 @@ def _remark(element: StoryElement) -> str:
     return ", ".join(remarks)
 
 
-def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[Line]:
+def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[BoxLine]:
     for number, group in enumerate(trigger.groups):
         for place, monitor in enumerate(group.monitors):
             first = lead if number == 0 else f"or {lead.removeprefix('stops ')}"
-            yield Line(role, first if place == 0 else "and", monitor.describe())
+            yield BoxLine(role, first if place == 0 else "and", monitor.describe())
 
 
-def _waits(trigger: Trigger, elements: Meant[StoryElement]) -> Iterator[Path]:
+def _waits(trigger: Trigger, elements: ReferenceMatch[StoryElement]) -> Iterator[Path]:
     """The elements whose state a trigger asks for; an action counts as the event that it belongs to."""
     for group in trigger.groups:
         for monitor in group.monitors:
@@ -135,17 +137,17 @@ def _waits(trigger: Trigger, elements: Meant[StoryElement]) -> Iterator[Path]:
                     yield path[:-1] if isinstance(element, ActionElement) else path
 
 
-def _group_lines(group: ManeuverGroupElement) -> list[Line]:
+def _group_lines(group: ManeuverGroupElement) -> list[BoxLine]:
     actions = [one for one in _walk(group) if isinstance(one, ActionElement)]
     actors = dict.fromkeys(name for one in actions for name in one.actors if name is not None)
     if any(one.triggering is not None for one in actions):
         actors["whoever fulfils the act's trigger"] = None
-    return [Line(Role.WHO, "", ", ".join(actors))] if actors else []
+    return [BoxLine(Role.WHO, "", ", ".join(actors))] if actors else []
 
 
-def _action_lines(action: ActionElement) -> list[Line]:
+def _action_lines(action: ActionElement) -> list[BoxLine]:
     made = [behaviour for actor in action.actors for behaviour in action.behaviours(actor)]
-    return [Line(Role.WHAT, "", words) for words in dict.fromkeys(behaviour.describe() for behaviour in made)]
+    return [BoxLine(Role.WHAT, "", words) for words in dict.fromkeys(behaviour.describe() for behaviour in made)]
 
 
 def has_maneuvers(boxes: list[Box]) -> bool:

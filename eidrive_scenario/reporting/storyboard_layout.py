@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from eidrive_scenario.reporting.storyboard_boxes import Box, Line, Path, has_maneuvers
+from eidrive_scenario.reporting.storyboard_boxes import Box, BoxLine, Path, has_maneuvers
 from eidrive_scenario.reporting.text_width import broken, width_of
 
 TITLE, TEXT, LEADING = 13.0, 11.5, 16.0
@@ -20,7 +20,7 @@ INIT_WIDTH = 300.0
 class TextLine:
     """A line as it is drawn: the word in front (on the first line of several), the text and where it begins [px]."""
 
-    source: Line
+    source: BoxLine
     lead: str
     text: str
     indent: float
@@ -66,7 +66,7 @@ class Arrow:
 
 
 @dataclass(frozen=True)
-class Layout:
+class DiagramLayout:
     """All boxes and arrows, and the size of the whole [px]."""
 
     stories: list[Placed]
@@ -76,7 +76,7 @@ class Layout:
     height: float
 
 
-def lay_out(stories: Sequence[Box], x: float, y: float) -> Layout:
+def layout_diagram(stories: Sequence[Box], x: float, y: float) -> DiagramLayout:
     """Place stories below each other, from a corner on."""
     lanes = _lanes(stories)
     columns: dict[str, float] = {}
@@ -94,10 +94,10 @@ def lay_out(stories: Sequence[Box], x: float, y: float) -> Layout:
         placed.append(tree)
         bottom += GAP
     boxes = {one.box.path: one for tree in placed for one in tree.walk()}
-    return Layout(placed, _arrows(boxes, columns), columns, right - GUTTER, bottom)
+    return DiagramLayout(placed, _arrows(boxes, columns), columns, right - GUTTER, bottom)
 
 
-def text_lines(lines: Sequence[Line], width: float) -> list[TextLine]:
+def text_lines(lines: Sequence[BoxLine], width: float) -> list[TextLine]:
     """The lines of a box, broken to a width [px]."""
     shown = []
     for line in lines:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from eidrive_scenario.recording.output import create
-from eidrive_scenario.reporting.storyboard_boxes import Line, Role, init_boxes, stop_lines, story_boxes
+from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.reporting.storyboard_boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
 from eidrive_scenario.reporting.storyboard_layout import (
     GAP,
     INIT_WIDTH,
@@ -16,10 +16,10 @@ from eidrive_scenario.reporting.storyboard_layout import (
     TEXT,
     TITLE,
     Arrow,
-    Layout,
+    DiagramLayout,
     Placed,
     TextLine,
-    lay_out,
+    layout_diagram,
     sized,
     text_lines,
 )
@@ -50,10 +50,10 @@ def write_storyboard_picture(storyboard: Storyboard, out: Path) -> Path:
 def storyboard_picture(storyboard: Storyboard) -> str:
     """The SVG of a storyboard: Init on top, then a column for each level, arrows from what is waited for."""
     stories = story_boxes(storyboard)
-    width = max(lay_out(stories, MARGIN, 0.0).width, MARGIN + 3 * INIT_WIDTH + 2 * GAP)
+    width = max(layout_diagram(stories, MARGIN, 0.0).width, MARGIN + 3 * INIT_WIDTH + 2 * GAP)
     head, y = _head(storyboard, width)
     init, y = _init(storyboard, y, width)
-    layout = lay_out(stories, MARGIN, y + 52.0)
+    layout = layout_diagram(stories, MARGIN, y + 52.0)
     parts = [*head, *init, *_columns(layout, y + 34.0)]
     for story in layout.stories:
         for placed in story.walk():
@@ -88,7 +88,7 @@ def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
     ]
     y = MARGIN + 60
     first, *others = stop_lines(storyboard)
-    shown = [Line(first.role, f"The run stops {first.lead}", first.text), *others]
+    shown = [BoxLine(first.role, f"The run stops {first.lead}", first.text), *others]
     for line in text_lines(shown, width - MARGIN):
         parts.append(_line(MARGIN, y, line))
         y += LEADING
@@ -111,7 +111,7 @@ def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], fl
     return parts, y
 
 
-def _columns(layout: Layout, y: float) -> Iterator[str]:
+def _columns(layout: DiagramLayout, y: float) -> Iterator[str]:
     for kind, x in layout.columns.items():
         yield _text(x, y, KINDS[kind][0], size=TEXT, weight=700, colour=KINDS[kind][1])
 

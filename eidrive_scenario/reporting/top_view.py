@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import footprint
-from eidrive_scenario.reporting.snapshot import Snapshot
+from eidrive_scenario.reporting.snapshot import StationSnapshot
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
 
 
 def top_view(
-    snapshot: Snapshot,
+    snapshot: StationSnapshot,
     window: Window,
     *,
     roads: RoadDrawing | None = None,
@@ -121,7 +121,7 @@ def top_view(
     )
 
 
-def _truth(snapshot: Snapshot) -> list[str]:
+def _truth(snapshot: StationSnapshot) -> list[str]:
     """Every actor as an outline with a bar at its front; the station itself filled; a mast as a dot."""
     view, drawn = snapshot.view, []
     corners = footprint(view.boxes)
@@ -158,7 +158,7 @@ def _boxes(detections: Detections, kind: str, colour: str, stroke: float) -> lis
     ]
 
 
-def _links(snapshot: Snapshot) -> list[str]:
+def _links(snapshot: StationSnapshot) -> list[str]:
     view = snapshot.view
     drawn: list[str] = []
     if snapshot.station not in view:
@@ -177,7 +177,7 @@ def _links(snapshot: Snapshot) -> list[str]:
     return drawn
 
 
-def _labels(snapshot: Snapshot, window: Window, texts: Mapping[str, str]) -> list[str]:
+def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str]) -> list[str]:
     """Each beside its vehicle: to the right, left, above or below, where it first covers neither vehicle nor label."""
     view, size = snapshot.view, _text_size(window)
     bodies = [(*low, *high) for low, high in ((plan.min(0), plan.max(0)) for plan in footprint(view.boxes))]

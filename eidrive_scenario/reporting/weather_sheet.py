@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.library import library_path, names
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.output import create
+from eidrive_scenario.recording.atomic_files import create
 from eidrive_scenario.reporting.street_view import look_at
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor

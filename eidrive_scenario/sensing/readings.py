@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 
 Array = NDArray[np.float64]
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class EgoState:
     """The station's own motion as it knows it: reference point (3,) [m], angles [rad], speed along heading [m/s]."""
@@ -29,7 +29,7 @@ class EgoState:
     """Along the heading [m/s²]."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class TruthReading:
     """Objects in the line of sight of a truth sensor: the input of the oracle detector.
@@ -107,7 +107,7 @@ class SignalReading:
     state: str
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Readings:
     """All sensors of one station; a sensor that was not due this tick is missing."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from eidrive_scenario.openscenario.storyboard_names import Meant
+from eidrive_scenario.openscenario.storyboard_names import ReferenceMatch
 from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
 
 NOT_BEGUN = ElementState.STANDBY
@@ -29,7 +29,7 @@ class ElementStates:
         self.changes: list[StateChange] = []
         self.tick = -1
         self.time = 0.0
-        self._meant: Meant[ElementRecord] | None = None
+        self._meant: ReferenceMatch[ElementRecord] | None = None
 
     def register(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
         """Keep track of one more element."""
@@ -59,7 +59,7 @@ class ElementStates:
     def find(self, kind: str, reference: str) -> list[ElementRecord]:
         """The elements of one kind that a reference means."""
         if self._meant is None:
-            self._meant = Meant((record.path, record) for record in self.records)
+            self._meant = ReferenceMatch((record.path, record) for record in self.records)
         return [record for record in self._meant.by(reference) if record.kind == kind]
 
     def observe_element(self, kind: str, reference: str) -> ElementStateObserver | None:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.v2x.point_cloud import PointCloud
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
 """Between two antennas: nothing, vehicles only, or a building or the ground (3GPP TR 37.885, 6.2.1)."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class StationState:
     """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s] of its own clock.
@@ -34,7 +34,7 @@ class StationState:
     pose_covariance: NDArray[np.float64] | None = None
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Message:
     """What a station says of the objects that it knows at `detections.time` of its own clock, said at `generated` [s].
@@ -59,7 +59,7 @@ class Message:
     """What the sender's LiDARs measured, where it shares that; `size` contains it."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class ReceivedMessage:
     """A message at its receiver, and when it arrived [s]."""
@@ -68,7 +68,7 @@ class ReceivedMessage:
     arrived: float
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class LinkEvent:
     """The fate of one message on one link, told when it is known: it arrives at `arrives` [s], or is lost for a reason.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 
 Vector3 = tuple[float, float, float]
 
@@ -53,7 +53,7 @@ class ActorSpec:
     """Body paint, red green blue in [0, 1]; by the name where None."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Placement:
     """Where a scripted actor stands after the next step: reference point [m], angles [rad], speed [m/s]."""
@@ -72,7 +72,7 @@ class Placement:
     covered in the step says how fast it moves across."""
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Control:
     """Pedals and steering of a driven vehicle for the next step."""

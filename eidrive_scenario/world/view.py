@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class ActorState(NamedTuple):
     speed: float
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class WorldView:
     """All actors at time `time` [s]; one row per actor, in the order in which they entered the world.

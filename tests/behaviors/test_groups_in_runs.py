@@ -179,7 +179,7 @@ def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any)
     with pytest.raises(InputError, match="names the selection 'slow' of 2 entities"):
         group(1, ("Ego", follow.format("slow")))
     alone = '<EntitySelection name="one"><Members><EntityRef entityRef="Second"/></Members></EntitySelection>'
-    assert group(8, ("Ego", follow.format("one")), more=alone).result.end == "stop trigger"
+    assert group(8, ("Ego", follow.format("one")), more=alone).result.end_reason == "stop trigger"
 
 
 def test_a_group_in_a_circle_is_an_error(group: Any) -> None:

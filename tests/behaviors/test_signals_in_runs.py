@@ -66,4 +66,4 @@ def test_an_unknown_phase_is_an_error_before_the_run(run: Any, phase: str, expec
             with pytest.raises(InputError, match=expected):
                 run(0.2, *steps, signals=LIGHTS)
         else:
-            assert run(0.2, *steps, signals=LIGHTS).result.end == "stop trigger"
+            assert run(0.2, *steps, signals=LIGHTS).result.end_reason == "stop trigger"

@@ -66,8 +66,8 @@ def test_a_scenario_loads_and_plays_to_an_end(name: str, record_property: pytest
     scenario, watch = load_scenario(Path(CORPORA) / name), Watch()
     settings = RunSettings(dt=0.05, time_limit=60.0)
     result = Simulation(scenario, settings=settings, observers=[watch]).run()
-    record_property(END, f"{name}: {result.end} at {result.simulated_s:.2f} s")
-    assert result.end in ENDS
+    record_property(END, f"{name}: {result.end_reason} at {result.simulated_s:.2f} s")
+    assert result.end_reason in ENDS
     assert watch.frames > 1
     placed = {private.entity_ref for private in scenario.storyboard.init.actions.private if _placed(private)}
     assert placed & set(scenario.entities) <= watch.seen

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.collision import Collision, CollisionSettings
 
-from eidrive_scenario.api import Contact, judge
+from eidrive_scenario.api import Contact, evaluate_criteria
 
 
 def criterion(**settings: Any) -> Collision:
@@ -17,7 +17,7 @@ def test_the_first_touch_is_the_verdict(frame: Any, car: Any) -> None:
     touch = Contact("Incoming", "Ego", (29.84, 7.06, 0.5), 11.24)
     frames = [frame(0.0, cars), frame(6.35, cars, [touch]), frame(6.4, cars, [Contact("Ego", "Wall", (0, 0, 0), 1.0)])]
     collision = criterion()
-    (verdict,) = judge(frames, [collision])
+    (verdict,) = evaluate_criteria(frames, [collision])
     assert not verdict.passed
     assert (verdict.value, verdict.limit, verdict.first_violation) == (2.0, 0.0, 6.35)
     assert verdict.reason == (
@@ -29,33 +29,35 @@ def test_the_first_touch_is_the_verdict(frame: Any, car: Any) -> None:
 @pytest.mark.parametrize(("others", "passed"), [(None, False), ("Bus", False), ("Van", True), (["Van", "Bus"], False)])
 def test_with_restricts_it(frame: Any, car: Any, others: Any, passed: bool) -> None:
     cars = {"Ego": car(0), "Bus": car(5), "Van": car(9)}
-    (verdict,) = judge([frame(1.0, cars, [Contact("Ego", "Bus", (0, 0, 0), 1.0)])], [criterion(**{"with": others})])
+    (verdict,) = evaluate_criteria(
+        [frame(1.0, cars, [Contact("Ego", "Bus", (0, 0, 0), 1.0)])], [criterion(**{"with": others})]
+    )
     assert verdict.passed is passed
 
 
 def test_contacts_of_others_do_not_matter(frame: Any, car: Any) -> None:
     cars = {"Ego": car(0), "Bus": car(5), "Van": car(9)}
-    (verdict,) = judge([frame(1.0, cars, [Contact("Van", "Bus", (0, 0, 0), 1.0)])], [criterion()])
+    (verdict,) = evaluate_criteria([frame(1.0, cars, [Contact("Van", "Bus", (0, 0, 0), 1.0)])], [criterion()])
     assert verdict.passed
     assert verdict.reason == "Ego touched nothing"
 
 
 @pytest.mark.parametrize("settings", [{"of": "Eg0"}, {"with": "Incoming"}, {"with": ["Bus", "Incoming"]}])
 def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any, settings: dict[str, Any]) -> None:
-    (verdict,) = judge([frame(0.0, {"Ego": car(0), "Bus": car(9)})], [criterion(**settings)])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0), "Bus": car(9)})], [criterion(**settings)])
     assert not verdict.passed
     assert "never in the world" in verdict.reason
 
 
 def test_only_a_touch_is_fatal(frame: Any, car: Any) -> None:
     judged = criterion(**{"with": "Incoming", "fatal": True})
-    (waiting,) = judge([frame(0.0, {"Ego": car(0)})], [judged])
+    (waiting,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [judged])
     cars = {"Ego": car(0), "Incoming": car(9)}
-    (hit,) = judge([frame(1.0, cars, [Contact("Ego", "Incoming", (0, 0, 0), 1.0)])], [judged])
+    (hit,) = evaluate_criteria([frame(1.0, cars, [Contact("Ego", "Incoming", (0, 0, 0), 1.0)])], [judged])
     assert (waiting.passed, waiting.fatal, hit.passed, hit.fatal) == (False, False, False, True)
 
 
 def test_one_that_comes_later_counts(frame: Any, car: Any) -> None:
     frames = [frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(0), "Incoming": car(9)}), frame(2.0, {"Ego": car(0)})]
-    (verdict,) = judge(frames, [criterion(**{"with": "Incoming"})])
+    (verdict,) = evaluate_criteria(frames, [criterion(**{"with": "Incoming"})])
     assert verdict.passed

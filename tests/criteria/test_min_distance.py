@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
 
-from eidrive_scenario.api import Verdict, judge
+from eidrive_scenario.api import Verdict, evaluate_criteria
 
 
 def criterion(**settings: Any) -> MinDistance:
@@ -21,7 +21,7 @@ def passing(frame: Any, car: Any) -> list[Any]:
 
 def test_centre_and_box(frame: Any, car: Any) -> None:
     distance = criterion(measure="centre")
-    (verdict,) = judge(passing(frame, car), [distance])
+    (verdict,) = evaluate_criteria(passing(frame, car), [distance])
     # Square on at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
     assert verdict == Verdict(
         "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (centre to centre) at 2.00 s"
@@ -38,14 +38,14 @@ def test_centre_and_box(frame: Any, car: Any) -> None:
     [("centre", 5.0, None), ("centre", 5.01, 2.0), ("centre", 9.0, 1.0), ("box", 1.99, None), ("box", 2.01, 2.0)],
 )
 def test_limit(frame: Any, car: Any, measure: str, at_least: float, violated: float | None) -> None:
-    (verdict,) = judge(passing(frame, car), [criterion(measure=measure, at_least=at_least)])
+    (verdict,) = evaluate_criteria(passing(frame, car), [criterion(measure=measure, at_least=at_least)])
     assert verdict.passed is (violated is None)
     assert verdict.first_violation == violated
     assert verdict.limit == at_least
 
 
 def test_min_distance_by_default_measures_between_bodies(frame: Any, car: Any) -> None:
-    (verdict,) = judge(passing(frame, car), [criterion(at_least=2.5)])
+    (verdict,) = evaluate_criteria(passing(frame, car), [criterion(at_least=2.5)])
     assert (verdict.passed, verdict.first_violation) == (False, 2.0)
     assert verdict.value == pytest.approx(2.0)
     assert verdict.reason == "Ego and Incoming came within 2.00 m (box to box) at 2.00 s"
@@ -54,25 +54,29 @@ def test_min_distance_by_default_measures_between_bodies(frame: Any, car: Any) -
 def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: Any) -> None:
     """Square on the middle of the other's side: the centers stay 3 m apart."""
     crash = [frame(0.0, {"Ego": car(0), "Incoming": car(3, 0, math.pi / 2)})]
-    assert [verdict.passed for verdict in judge(crash, [criterion(at_least=0.01)])] == [False]
-    assert [verdict.passed for verdict in judge(crash, [criterion(at_least=2.9, measure="centre")])] == [True]
+    assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=0.01)])] == [False]
+    assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=2.9, measure="centre")])] == [
+        True
+    ]
 
 
 def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
-    (verdict,) = judge([frame(0.0, {"Ego": car(0), "Incoming": car(3, 1)})], [criterion(measure="box", at_least=0.1)])
+    (verdict,) = evaluate_criteria(
+        [frame(0.0, {"Ego": car(0), "Incoming": car(3, 1)})], [criterion(measure="box", at_least=0.1)]
+    )
     assert not verdict.passed
     assert verdict.value == 0.0
 
 
 def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
-    (verdict,) = judge([frame(0.0, {"Ego": car(0)})], [criterion(at_least=1.0)])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=1.0)])
     assert (verdict.passed, verdict.value) == (False, None)
     assert verdict.reason == "Incoming was never in the world, so nothing was measured"
 
 
 def test_two_that_never_meet_in_the_world_fail_it(frame: Any, car: Any) -> None:
     distance = criterion()
-    (verdict,) = judge([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Incoming": car(0)})], [distance])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Incoming": car(0)})], [distance])
     assert not verdict.passed
     assert verdict.reason == "Ego and Incoming were never there together"
     assert distance.metrics() == {}

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.monitor import Monitor, MonitorSettings
 
-from eidrive_scenario.api import Verdict, judge
+from eidrive_scenario.api import Verdict, evaluate_criteria
 
 
 def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:
@@ -17,7 +17,7 @@ def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:
         replace(frame(float(time), {}), monitors={} if value is None else {"Seen": value})
         for time, value in enumerate(values)
     ]
-    (found,) = judge(frames, [Monitor(MonitorSettings(of="Seen", **settings))])
+    (found,) = evaluate_criteria(frames, [Monitor(MonitorSettings(of="Seen", **settings))])
     return found
 
 

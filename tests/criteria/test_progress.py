@@ -7,7 +7,7 @@ from eidrive_criteria.driven_distance import DrivenDistance, DrivenDistanceSetti
 from eidrive_criteria.max_speed import MaxSpeed, MaxSpeedSettings
 from eidrive_criteria.reach_position import ReachPosition, ReachPositionSettings
 
-from eidrive_scenario.api import Criterion, judge
+from eidrive_scenario.api import Criterion, evaluate_criteria
 
 
 def reach(**settings: Any) -> ReachPosition:
@@ -25,7 +25,7 @@ def driving(frame: Any, car: Any) -> list[Any]:
 )
 def test_reach_position(frame: Any, car: Any, settings: dict[str, Any], passed: bool, nearest: float) -> None:
     judged = reach(**settings)
-    (verdict,) = judge(driving(frame, car), [judged])
+    (verdict,) = evaluate_criteria(driving(frame, car), [judged])
     assert (verdict.passed, verdict.value) == (passed, pytest.approx(nearest))
     assert judged.metrics() == ({"reach_position.time": 2.0} if passed else {})
 
@@ -33,19 +33,19 @@ def test_reach_position(frame: Any, car: Any, settings: dict[str, Any], passed: 
 def test_reaching_is_fatal_only_when_it_is_too_late(frame: Any, car: Any) -> None:
     judged = reach(within=1, by=2.5, fatal=True)
     frames = driving(frame, car)
-    assert [judge([each], [judged])[0].fatal for each in frames] == [False, False, False, True, True]
+    assert [evaluate_criteria([each], [judged])[0].fatal for each in frames] == [False, False, False, True, True]
 
 
 def test_driven_distance(frame: Any, car: Any) -> None:
     far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=metres)) for metres in (20.0, 20.1))
-    verdicts = judge(driving(frame, car), [far, farther])
+    verdicts = evaluate_criteria(driving(frame, car), [far, farther])
     assert [verdict.passed for verdict in verdicts] == [True, False]
     assert verdicts[0].value == pytest.approx(20.0)
 
 
 def test_a_jump_is_no_way_driven(frame: Any, car: Any) -> None:
     judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=50))
-    (verdict,) = judge([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [judged])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [judged])
     assert (verdict.passed, verdict.value) == (False, 0.0)
 
 
@@ -54,16 +54,16 @@ def test_what_is_away_drives_no_way(frame: Any, car: Any) -> None:
     judged = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=20))
     times, away = [0.0, 1.0, 2.0, 9.0, 10.0, 12.0], {"Other": car(0)}
     frames = [frame(time, away if 1.0 < time < 10.0 else {"Ego": car(0, speed=5.0)}) for time in times]
-    (verdict,) = judge(frames, [judged])
+    (verdict,) = evaluate_criteria(frames, [judged])
     assert (verdict.passed, verdict.value) == (False, pytest.approx(15.0))
-    (verdict,) = judge([frame(13.0, away)], [judged])
+    (verdict,) = evaluate_criteria([frame(13.0, away)], [judged])
     assert verdict.value == pytest.approx(15.0)
 
 
 def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
     judged = MaxSpeed(MaxSpeedSettings(of="Ego", at_most=6))
     frames = [*driving(frame, car), frame(5.0, {"Ego": car(0, speed=-7.0)})]
-    (verdict,) = judge(frames, [judged])
+    (verdict,) = evaluate_criteria(frames, [judged])
     assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 7.0, 5.0)
 
 
@@ -77,7 +77,7 @@ def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
     ids=lambda criterion: criterion.name,
 )
 def test_an_actor_that_never_appears_fails_them(frame: Any, car: Any, criterion: Criterion) -> None:
-    (verdict,) = judge([frame(0.0, {"Bus": car(0)})], [criterion])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Bus": car(0)})], [criterion])
     assert (verdict.passed, verdict.value) == (False, None)
     assert verdict.reason == "Ego was never in the world, so nothing was measured"
     assert criterion.metrics() == {}

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings, time_to_contact
 
-from eidrive_scenario.api import judge
+from eidrive_scenario.api import evaluate_criteria
 
 
 def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[float]:
@@ -43,17 +43,17 @@ def test_the_smallest_one_is_judged(frame: Any, car: Any) -> None:
         frame(2.0, {"Ego": car(20, speed=4), "Lead": car(29, speed=5)}),  # opens
     ]
     judged = criterion(at_least=2.5)
-    (verdict,) = judge(frames, [judged])
+    (verdict,) = evaluate_criteria(frames, [judged])
     assert (verdict.passed, verdict.value, verdict.first_violation) == (False, pytest.approx(2.0), 1.0)
     assert judged.metrics() == {"time_to_collision.Ego.Lead": pytest.approx(2.0)}
 
 
 def test_no_collision_course_is_no_violation(frame: Any, car: Any) -> None:
-    (verdict,) = judge([frame(0.0, {"Ego": car(0), "Lead": car(9)})], [criterion(at_least=2)])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0), "Lead": car(9)})], [criterion(at_least=2)])
     assert (verdict.passed, verdict.value) == (True, None)
 
 
 def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
-    (verdict,) = judge([frame(0.0, {"Ego": car(0)})], [criterion(at_least=2)])
+    (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=2)])
     assert not verdict.passed
     assert verdict.reason.startswith("Lead was never in the world")

@@ -8,10 +8,10 @@ from dataclasses import FrozenInstanceError, asdict, dataclass, field, replace
 
 import pytest
 
-from eidrive_scenario.records import made_often
+from eidrive_scenario.records import fast_frozen
 
 
-@made_often
+@fast_frozen
 @dataclass(frozen=True)
 class Record:
     number: int
@@ -73,4 +73,4 @@ def test_a_class_with_fields_that_are_no_parameters_is_refused() -> None:
         twice: int = field(init=False, default=0)
 
     with pytest.raises(TypeError, match="no parameters"):
-        made_often(Derived)
+        fast_frozen(Derived)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 ONE = "coop/scenario_1"
@@ -19,9 +19,9 @@ ONE = "coop/scenario_1"
 def test_seed_of_an_array_is_the_same_seed(tmp_path: Path) -> None:
     """`numpy.arange` is the usual way to many seeds; folder, settings and trace are those of the plain integer."""
     settings = RunSettings(time_limit=0.2)
-    plain = play(ONE, seed=3, settings=settings, out=tmp_path)
+    plain = run_and_save(ONE, seed=3, settings=settings, out=tmp_path)
     (seed,) = np.arange(3, 4)
-    again = play(ONE, seed=seed, settings=settings, out=tmp_path)
+    again = run_and_save(ONE, seed=seed, settings=settings, out=tmp_path)
     assert again.trace_hash == plain.trace_hash
     assert (again.settings, again.command) == (plain.settings, plain.command)
     assert type(again.seed) is int
@@ -29,7 +29,7 @@ def test_seed_of_an_array_is_the_same_seed(tmp_path: Path) -> None:
 
 def test_places_to_write_may_be_texts(tmp_path: Path) -> None:
     settings = RunSettings(time_limit=0.2)
-    result = play(ONE, settings=settings, below=str(tmp_path), csv=f"{tmp_path}/motion.csv")
+    result = run_and_save(ONE, settings=settings, below=str(tmp_path), csv=f"{tmp_path}/motion.csv")
     assert result.recording is not None
     assert result.recording.is_relative_to(tmp_path)
     assert (tmp_path / "motion.csv").read_text().startswith("time,name,")
@@ -37,7 +37,7 @@ def test_places_to_write_may_be_texts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
 def test_seed_that_is_no_integer_is_refused(tmp_path: Path, seed: Any) -> None:
-    for run in (Simulation, run_file, play):
+    for run in (Simulation, run_file, run_and_save):
         with pytest.raises(SettingError, match=r"the seed is .*; give an integer"):
             run(ONE, seed=seed)
 

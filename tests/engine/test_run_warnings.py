@@ -97,13 +97,13 @@ def test_run_cut_short_by_a_failure_does_not_report_later_events(make: Make) -> 
     stop = '<UserDefinedAction><CustomCommandAction type="exitFailure"/></UserDefinedAction>'
     path = make((BEFORE, f"{maneuver('Never', 90)}{maneuver('Fail', 1.0, action=stop)}{BEFORE}"))
     result = run_file(path)
-    assert result.end == "command: exitFailure"
+    assert result.end_reason == "command: exitFailure"
     assert ours(result.warnings) == []
     fatal = make(
         (BEFORE, f"{maneuver('Never', 90)}{BEFORE}"), ("collision: {of: Ego}", "collision: {of: Ego, fatal: true}")
     )
     result = run_file(fatal, settings=RunSettings(channel="none"))
-    assert result.end == "criterion: collision"
+    assert result.end_reason == "criterion: collision"
     assert ours(result.warnings) == []
 
 

@@ -12,7 +12,7 @@ from scenariogeneration import xodr, xosc
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.experiments.scenario_checks import check_scenario
-from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
@@ -161,7 +161,7 @@ def test_attributes_that_are_none_are_not_there(cut_in: Build) -> None:
         "ahead", 0, xosc.ConditionEdge.none, angle, "Ego", triggeringpoint="stop"
     )
     run = run_file(scenario)
-    assert (run.end, run.simulated_s) == ("stop trigger", 0.0)
+    assert (run.end_reason, run.simulated_s) == ("stop trigger", 0.0)
 
 
 def test_what_the_library_refuses_to_write_is_no_traceback(cut_in: Build) -> None:
@@ -213,7 +213,7 @@ def test_a_distribution_over_it(cut_in: Build) -> None:
 
 
 def test_a_record_of_it_has_its_text(cut_in: Build, tmp_path: Path) -> None:
-    result = play(cut_in(), out=tmp_path / "out")
+    result = run_and_save(cut_in(), out=tmp_path / "out")
     recording = read_recording(tmp_path / "out" / "recording.mcap")
     text = recording.attachments["scenario.xosc"]
     assert run_file(text).trace_hash == result.trace_hash

@@ -76,7 +76,7 @@ def test_the_hidden_car_is_hit_without_cooperation_and_missed_with_it(name: str)
     assert (alone.passed, alone.exit_code) == (False, 1)
     collision = next(verdict for verdict in alone.criteria if verdict.name == "collision")
     assert "Ego and Incoming hit each other at" in collision.reason
-    assert (helped.passed, helped.exit_code, helped.end) == (True, 0, "stop trigger")
+    assert (helped.passed, helped.exit_code, helped.end_reason) == (True, 0, "stop trigger")
     centre = "min_distance.Ego.Incoming.centre"
     assert helped.metrics[centre] > alone.metrics[centre]
     assert alone.metrics["min_distance.Ego.Incoming.box"] == 0.0
@@ -189,7 +189,7 @@ def test_an_unknown_detector_and_sender_are_told_with_their_option() -> None:
 
 def test_a_run_that_does_not_end_by_itself_runs_out_of_its_time_limit() -> None:
     result = play(channel="ideal", time_limit=2.0)
-    assert (result.end, result.exit_code, result.passed) == ("time limit", 3, False)
+    assert (result.end_reason, result.exit_code, result.passed) == ("time limit", 3, False)
     assert result.simulated_s == pytest.approx(2.0)
 
 

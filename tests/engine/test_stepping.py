@@ -73,4 +73,4 @@ def test_tick_after_the_end_is_an_error() -> None:
             pass
         with pytest.raises(SimulationError, match="the run has ended; a second run needs a second Simulation"):
             simulation.tick()
-        assert simulation.result().end == "time limit"
+        assert simulation.result().end_reason == "time limit"

@@ -200,7 +200,7 @@ def test_the_run_turns_with_the_world(
     usual, before = play(changed(tmp_path / "usual", name, fusion), channel, seed)
     other, after = play(changed(tmp_path / "other", name, fusion, roads, scenario), channel, seed)
     assert len(other.places) == len(usual.places) > 100
-    assert (after.passed, after.end) == (before.passed, before.end)
+    assert (after.passed, after.end_reason) == (before.passed, before.end_reason)
     assert other.links == usual.links
     for tick, (there, here) in enumerate(zip(other.places, usual.places, strict=True)):
         assert off(there, poses(here)) < ROUNDING, tick

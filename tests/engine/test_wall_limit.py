@@ -11,7 +11,7 @@ import pytest
 from faulty_extensions import line_of, write_scenario
 
 from eidrive_scenario.errors import InputError, WallLimitError
-from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.wall_limit import current_limit, limit_wall_time
@@ -66,7 +66,7 @@ def test_hung_run_leaves_a_readable_partial_recording(package: Path, tmp_path: P
     """0.5 s of frames at 0.05 s, and the hung tick is not among them."""
     scenario = write_scenario(tmp_path / "s.xosc", detector="hangs")
     with pytest.raises(WallLimitError) as caught:
-        play(scenario, out=tmp_path / "run", wall_limit=5.0)
+        run_and_save(scenario, out=tmp_path / "run", wall_limit=5.0)
     (note,) = [note for note in caught.value.__notes__ if note.startswith("recording: ")]
     recording = read_recording(Path(note.removeprefix("recording: ")))
     assert [round(frame.view.time, 3) for frame in recording.frames()] == [round(0.05 * tick, 3) for tick in range(10)]

@@ -27,7 +27,7 @@ from eidrive_scenario.openscenario.parameters import Assignment, written
 Assignments = Mapping[str, Assignment]
 
 
-class Choices(Protocol):
+class ValueSource(Protocol):
     """One distribution of a file: what it may assign."""
 
     @property
@@ -43,10 +43,10 @@ class Choices(Protocol):
 
 
 @dataclass(frozen=True)
-class Combinations:
+class CartesianProduct:
     """All combinations of choices, the last one changing from one to the next."""
 
-    choices: tuple[Choices, ...]
+    choices: tuple[ValueSource, ...]
 
     @property
     def count(self) -> int:
@@ -68,7 +68,7 @@ class Combinations:
 
 
 @dataclass(frozen=True)
-class Listed:
+class ListedValues:
     """Choices that the file spells out."""
 
     choices: tuple[Assignments, ...]
@@ -89,7 +89,7 @@ class Listed:
 
 
 @dataclass(frozen=True)
-class Steps:
+class SteppedRange:
     """Values `lower`, `lower + step`, … of one parameter.
 
     The numbers are taken as the decimals that they are written as: three steps of 0.1 from 0 on make 0.3, and the
@@ -115,13 +115,13 @@ class Steps:
 _NOWHERE = Diagnostic("")
 
 
-def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector) -> Combinations:
+def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector) -> CartesianProduct:
     """The distributions in the order of the file; what is wrong with them becomes a finding."""
     both: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
         *deterministic.deterministic_multi_parameter_distribution,
         *deterministic.deterministic_single_parameter_distribution,
     ]
-    found: list[Choices] = []
+    found: list[ValueSource] = []
     for distribution in sorted(both, key=lambda one: one.line):
         if isinstance(distribution, DeterministicMultiParameterDistribution):
             found.append(_value_sets(distribution, findings))
@@ -136,8 +136,8 @@ def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector)
         message = f"the distribution unfolds into {count} runs"
         remedy = "take wider steps in its ranges"
         findings.error(message, remedy, source=deterministic.source, line=deterministic.line)
-        return Combinations(())
-    return Combinations(tuple(found))
+        return CartesianProduct(())
+    return CartesianProduct(tuple(found))
 
 
 def varied_once(names: Iterable[tuple[str, Diagnostic]], findings: DiagnosticCollector) -> None:
@@ -150,7 +150,7 @@ def varied_once(names: Iterable[tuple[str, Diagnostic]], findings: DiagnosticCol
         seen.setdefault(name, origin)
 
 
-def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: DiagnosticCollector) -> Listed:
+def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: DiagnosticCollector) -> ListedValues:
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
@@ -161,23 +161,25 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, findings:
                 )
             choice[one.parameter_ref] = Assignment(one.value, place(one))
         choices.append(choice)
-    return Listed(tuple(choices))
+    return ListedValues(tuple(choices))
 
 
-def _single(distribution: DeterministicSingleParameterDistribution, findings: DiagnosticCollector) -> Choices | None:
+def _single(
+    distribution: DeterministicSingleParameterDistribution, findings: DiagnosticCollector
+) -> ValueSource | None:
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
         elements = distribution.distribution_set.element
-        return Listed(tuple({name: Assignment(one.value, place(one))} for one in elements))
+        return ListedValues(tuple({name: Assignment(one.value, place(one))} for one in elements))
     if distribution.distribution_range is not None:
         return _steps(name, distribution.distribution_range, findings)
     refuse_user_defined(distribution, name, "DistributionSet or DistributionRange", findings)
     return None
 
 
-def _steps(name: str, given: DistributionRange, findings: DiagnosticCollector) -> Steps | None:
+def _steps(name: str, given: DistributionRange, findings: DiagnosticCollector) -> SteppedRange | None:
     """From the lower limit on, a step at a time, as long as the value is not above the upper limit."""
-    if not sound_range(given.range, findings, finite=True):
+    if not valid_range(given.range, findings, finite=True):
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
         findings.error(
@@ -190,14 +192,14 @@ def _steps(name: str, given: DistributionRange, findings: DiagnosticCollector) -
     lower, upper, step = (
         _exact(value) for value in (given.range.lower_limit, given.range.upper_limit, given.step_width)
     )
-    return Steps(name, lower, step, (upper - lower) // step + 1, place(given))
+    return SteppedRange(name, lower, step, (upper - lower) // step + 1, place(given))
 
 
 def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def sound_range(given: Range, findings: DiagnosticCollector, *, finite: bool = False) -> bool:
+def valid_range(given: Range, findings: DiagnosticCollector, *, finite: bool = False) -> bool:
     """Whether the limits are numbers in order; if they are not, that is a finding."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:

@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.distributions.deterministic import (
     Assignments,
     place,
     refuse_user_defined,
-    sound_range,
+    valid_range,
     varied_once,
 )
 from eidrive_scenario.openscenario.model import (
@@ -71,7 +71,7 @@ def quantile_of(distribution: StochasticDistribution, findings: DiagnosticCollec
 
 
 @dataclass(frozen=True)
-class Draws:
+class StochasticSampler:
     """A value for each parameter in each run; it depends on seed, parameter and run, on nothing drawn before.
 
     quantiles   by parameter
@@ -93,7 +93,7 @@ class Draws:
         return value if isinstance(value, str) else written(value)
 
 
-def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector) -> Draws:
+def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector) -> StochasticSampler:
     """The distributions of the parameters; what is wrong with them becomes a finding.
 
     seed    for a file that names no randomSeed
@@ -104,7 +104,7 @@ def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector)
     distributions = stochastic.stochastic_distribution
     varied_once(((one.parameter_name, place(one)) for one in distributions), findings)
     found = {one.parameter_name: quantile_of(one, findings) for one in distributions}
-    return Draws(
+    return StochasticSampler(
         stochastic.number_of_test_runs,
         float(seed if stochastic.random_seed is None else stochastic.random_seed),
         {name: quantile for name, quantile in found.items() if quantile is not None},
@@ -113,7 +113,7 @@ def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector)
 
 
 def _uniform(given: UniformDistribution, findings: DiagnosticCollector) -> Quantile:
-    sound_range(given.range, findings, finite=True)
+    valid_range(given.range, findings, finite=True)
     return partial(_from_range, given.range.lower_limit, given.range.upper_limit)
 
 
@@ -215,7 +215,7 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
 
 
 def _histogram(given: Histogram, findings: DiagnosticCollector) -> Quantile:
-    if all([sound_range(one.range, findings, finite=True) for one in given.bin]):
+    if all([valid_range(one.range, findings, finite=True) for one in given.bin]):
         _check_overlap(given.bin, findings)
     limits = tuple((one.range.lower_limit, one.range.upper_limit) for one in given.bin)
     return partial(_from_histogram, limits, _accumulated(given, given.bin, findings))
@@ -268,7 +268,7 @@ def _weighed(accumulated: tuple[float, ...], share: float) -> tuple[int, float]:
 def _limits(given: Range | None, findings: DiagnosticCollector) -> tuple[float, float]:
     if given is None:
         return -math.inf, math.inf
-    sound_range(given, findings)
+    valid_range(given, findings)
     return given.lower_limit, given.upper_limit
 
 

@@ -20,7 +20,7 @@ from eidrive_scenario.openscenario.model import (
     SynchronizeAction,
     Vehicle,
 )
-from eidrive_scenario.openscenario.participants import scenario_objects
+from eidrive_scenario.openscenario.scenario_objects import scenario_objects
 
 _WORD = re.compile(r"\w+")
 

@@ -33,7 +33,7 @@ from eidrive_scenario.openscenario.model import (
 from eidrive_scenario.openscenario.parsing import open_document
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.schema import rules
-from eidrive_scenario.openscenario.storyboard_names import LEVELS, Meant
+from eidrive_scenario.openscenario.storyboard_names import LEVELS, ReferenceMatch
 
 _OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": MiscObject}
 
@@ -95,7 +95,7 @@ class Outline:
         self.root = Node(scenario.storyboard, None, ("storyboard",), None)
         self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
         self.nodes = tuple(self.root.walk())
-        self._meant = Meant((node.path, node) for node in self.nodes)
+        self._meant = ReferenceMatch((node.path, node) for node in self.nodes)
 
     def _node(self, element: Element, parent: Node, above: tuple[str, ...]) -> Node:
         path = (*above, str(getattr(element, "name", "")))

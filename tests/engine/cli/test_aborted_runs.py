@@ -60,7 +60,7 @@ def test_sys_exit_of_detector_ends_the_run_with_3_and_others_go_on(folder: Path)
     code, out, err = run(folder, "s.xosc", "--detector", "exits", "--repeat", "2", "--json", "--out", "runs")
     assert code == 3
     entries = [json.loads(line) for line in out.splitlines()]
-    assert [(entry["seed"], entry["passed"], entry["end"]) for entry in entries] == [
+    assert [(entry["seed"], entry["passed"], entry["end_reason"]) for entry in entries] == [
         (1, False, "error"),
         (2, False, "error"),
     ]
@@ -99,7 +99,7 @@ def test_runs_of_a_distribution_go_on_after_one_that_is_aborted(folder: Path) ->
     code, out, err = run(folder, "d.xosc", "--json")
     assert code == 3
     entries = [json.loads(line) for line in out.splitlines()]
-    assert [(entry["run"], entry["end"]) for entry in entries] == [(0, "error"), (1, "stop trigger")]
+    assert [(entry["run"], entry["end_reason"]) for entry in entries] == [(0, "error"), (1, "stop trigger")]
     assert "2 runs in d.xosc: 1 passed, 1 not passed" in err
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
-from eidrive_scenario.cli.places import check_places
+from eidrive_scenario.cli.output_paths import check_output_paths
 from eidrive_scenario.errors import SettingError
 
 Eidrive = Callable[..., Result]
@@ -46,6 +46,6 @@ def test_a_recording_is_not_overwritten_by_its_page(eidrive: Eidrive, own: Path,
 
 
 def test_devices_take_all(tmp_path: Path) -> None:
-    check_places({"--csv": "/dev/null", "--log": "/dev/null"}, ["none"])
+    check_output_paths({"--csv": "/dev/null", "--log": "/dev/null"}, ["none"])
     with pytest.raises(SettingError):
-        check_places({"--csv": tmp_path / "a", "--log": tmp_path / "a"}, [])
+        check_output_paths({"--csv": tmp_path / "a", "--log": tmp_path / "a"}, [])

@@ -38,11 +38,21 @@ def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_b
     lines = [json.loads(line) for line in result.stdout.splitlines()]
     assert [line["seed"] for line in lines] == [5, 6]
     first = lines[0]
-    expected = {"scenario", "seed", "passed", "end", "criteria", "metrics", "trace_hash", "simulated_s", "wall_s"}
+    expected = {
+        "scenario",
+        "seed",
+        "passed",
+        "end_reason",
+        "criteria",
+        "metrics",
+        "trace_hash",
+        "simulated_s",
+        "wall_s",
+    }
     assert expected <= set(first)
     assert set(first["criteria"][0]) == {"name", "passed", "value", "limit", "unit", "reason"}
     assert first["passed"] is True
-    assert first["end"] == "stop trigger"
+    assert first["end_reason"] == "stop trigger"
     assert first["metrics"]["min_distance.Ego.Parked.centre"] == pytest.approx(5.0)
     assert first["metrics"]["min_distance.Ego.Parked.box"] == pytest.approx(3.0)
 

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import Result
 
 from eidrive_scenario.recording import read_recording
+from eidrive_scenario.recording.atomic_files import exclusive
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.output import exclusive
 from eidrive_scenario.simulation import Simulation
 
 Eidrive = Callable[..., Result]

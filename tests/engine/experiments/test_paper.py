@@ -33,7 +33,7 @@ def result(scenario: str, seed: int, centre: float, box: float) -> RunResult:
         seed=seed,
         channel="ideal",
         passed=box > 0,
-        end="stop trigger",
+        end_reason="stop trigger",
         exit_code=0 if box > 0 else 1,
         criteria=(),
         metrics={

@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.perception_metrics import (
-    Snapshot,
+    MetricSample,
     position_error,
     precision_bev,
     recall_by_sight,
@@ -44,9 +44,9 @@ def known(*found: tuple[float, float, float]) -> Detections:
 
 def entry(
     detections: Detections, objects: np.ndarray, own: list[bool] | None = None, other: list[bool] | None = None
-) -> Snapshot:
+) -> MetricSample:
     none = np.zeros(len(objects), dtype=bool)
-    return Snapshot(
+    return MetricSample(
         detections,
         objects,
         np.array(own, dtype=bool) if own is not None else none,
@@ -81,10 +81,10 @@ def test_recall_by_who_can_see() -> None:
     recall = recall_by_sight([told], 0.5)
     assert recall.own is not None
     assert recall.others is not None
-    assert recall.nobody is not None
+    assert recall.neither is not None
     assert (recall.own.successes, recall.own.trials) == (1, 2)
     assert (recall.others.successes, recall.others.trials) == (1, 2)
-    assert (recall.nobody.successes, recall.nobody.trials) == (1, 1)
+    assert (recall.neither.successes, recall.neither.trials) == (1, 1)
     assert recall_by_sight([entry(known(), boxes((0, 0)), own=[True])], 0.5).others is None
 
 

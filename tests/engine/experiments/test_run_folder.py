@@ -19,7 +19,7 @@ from lxml import html
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.run_folder import folder_name, run_folder
-from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.recording.file_lock import FileLock
@@ -32,7 +32,7 @@ MAIN = [sys.executable, "-m", "eidrive_scenario"]
 
 
 def run(below: Path, source: Any = PASSING_BY, seed: int = 1, **settings: Any) -> RunResult:
-    return play(source, seed=seed, settings=RunSettings(**{**SHORT, **settings}), below=below)
+    return run_and_save(source, seed=seed, settings=RunSettings(**{**SHORT, **settings}), below=below)
 
 
 def trace_of(recording: Path) -> str:
@@ -116,10 +116,10 @@ def test_a_folder_with_another_result_is_never_overwritten(tmp_path: Path) -> No
 
 
 def test_an_explicit_folder_with_other_settings_is_refused(tmp_path: Path) -> None:
-    play(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
-    play(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
+    run_and_save(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
+    run_and_save(PASSING_BY, settings=RunSettings(**SHORT), out=tmp_path)
     with pytest.raises(SettingError, match="holds the result of a run with other settings"):
-        play(PASSING_BY, seed=2, settings=RunSettings(**SHORT), out=tmp_path)
+        run_and_save(PASSING_BY, seed=2, settings=RunSettings(**SHORT), out=tmp_path)
 
 
 def test_a_locked_folder_gets_a_neighbour_with_a_number(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_the_lock_of_a_killed_process_does_not_block(tmp_path: Path) -> None:
 def test_a_run_without_recording_leaves_none_of_an_earlier_one(tmp_path: Path) -> None:
     folder = run(tmp_path).folder
     assert folder is not None
-    play(PASSING_BY, settings=RunSettings(**SHORT), below=tmp_path, record=False)
+    run_and_save(PASSING_BY, settings=RunSettings(**SHORT), below=tmp_path, record=False)
     assert sorted(path.name for path in folder.iterdir()) == ["result.json"]
 
 
@@ -283,11 +283,11 @@ def test_a_page_of_a_replaced_recording_is_removed(tmp_path: Path) -> None:
 
 
 def test_page_of_an_unfinished_recording_is_removed_by_the_next_run(tmp_path: Path) -> None:
-    folder = play(PASSING_BY, below=tmp_path).folder
+    folder = run_and_save(PASSING_BY, below=tmp_path).folder
     assert folder is not None
     for name in ("recording.partial.mcap", "recording.partial.html"):
         (folder / name).touch()
-    play(PASSING_BY, below=tmp_path)
+    run_and_save(PASSING_BY, below=tmp_path)
     assert sorted(path.name for path in folder.iterdir()) == ["recording.mcap", "result.json"]
 
 

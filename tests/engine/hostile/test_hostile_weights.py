@@ -217,7 +217,7 @@ def test_run_with_permission_loads_torchscript(write: Write, tmp_path: Path, mon
     assert CliRunner().invoke(app, [*command, "--allow-torchscript"]).exit_code == 3
     assert CliRunner().invoke(app, command, env={"EIDRIVE_ALLOW_TORCHSCRIPT": "1"}).exit_code == 3
     settings = RunSettings(time_limit=0.2, allow_torchscript=True)
-    assert Simulation(load_scenario(scenario), settings=settings).run().end == "time limit"
+    assert Simulation(load_scenario(scenario), settings=settings).run().end_reason == "time limit"
 
 
 def test_library_scenarios_are_checked_without_torch(tmp_path: Path) -> None:

@@ -324,7 +324,7 @@ def test_in_a_scenario_the_light_holds_who_obeys_until_it_turns(tmp_path: Path, 
     path = tmp_path / "light.xosc"
     path.write_text(SCENARIO.replace("{obeys}", str(obeys).lower()))
     track = Track()
-    assert run_file(path, seed=0, observers=[track]).end == "stop trigger"
+    assert run_file(path, seed=0, observers=[track]).end_reason == "stop trigger"
     if obeys:
         assert 78.0 < track.fronts[17.95] < 80.0
         assert track.fronts[26.0] > 95.0

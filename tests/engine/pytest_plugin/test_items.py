@@ -64,7 +64,7 @@ def test_junit_of_all_seeds_over_two_workers(project: pytest.Pytester) -> None:
     assert float(properties["min_distance.value"] or "") == pytest.approx(5.0)
     assert properties["min_distance.limit"] == "3.0"
     assert float(properties["min_distance.Ego.Parked.box"] or "") == pytest.approx(3.0)
-    assert (properties["seed"], properties["end"]) == ("2", "stop trigger")
+    assert (properties["seed"], properties["end_reason"]) == ("2", "stop trigger")
     assert len(properties["trace_hash"] or "") == 64
     failure = cases["xosc.near.xosc::near[none-seed1]"].find("failure")
     assert failure is not None

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.experiments.single_run import PICTURES, play
+from eidrive_scenario.experiments.single_run import PICTURES, run_and_save
 from eidrive_scenario.perception.learned.image_network import ImageDetections
-from eidrive_scenario.recording.camera_pictures import drawn, drawn_in_space
+from eidrive_scenario.recording.camera_images import drawn, drawn_in_space
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.simulation import RunSettings
 
@@ -64,8 +64,8 @@ def test_a_run_leaves_the_pictures_of_all_stations(tmp_path: Path) -> None:
     """At 10 Hz every second tick; the same run without pictures is the same run."""
     pytest.importorskip("torch", reason="needs the extra 'learned'")
     settings = RunSettings(detector="yolov5", time_limit=0.3)
-    kept = play("coop/scenario_1", settings=settings, out=tmp_path / "kept")
-    bare = play("coop/scenario_1", settings=settings, out=tmp_path / "bare", record=False)
+    kept = run_and_save("coop/scenario_1", settings=settings, out=tmp_path / "kept")
+    bare = run_and_save("coop/scenario_1", settings=settings, out=tmp_path / "bare", record=False)
     assert kept.trace_hash == bare.trace_hash
     assert not (tmp_path / "bare" / PICTURES).exists()
     for station in ("Ego", "RSU"):

@@ -8,11 +8,11 @@ import pytest
 
 from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.recording.criteria_text import (
+from eidrive_scenario.recording.criteria_parser import (
     exit_verdict,
     parse_criteria,
     stop_trigger_criteria,
-    unbuilt_criteria,
+    unsupported_criteria,
 )
 from eidrive_scenario.recording.criterion import Criterion, Verdict
 from eidrive_scenario.recording.frame import Frame
@@ -182,7 +182,7 @@ def test_conditions_of_scenario_runner() -> None:
     assert [criterion.name for criterion in criteria] == ["collision", "driven_distance", "max_speed"]
     assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5]
     assert {criterion.subjects for criterion in criteria} == {("Ego",)}
-    (warning,) = unbuilt_criteria(scenario)
+    (warning,) = unsupported_criteria(scenario)
     assert warning.message == "criterion 'KeepLaneTest' is not judged"
     assert warning.line is not None
 
@@ -190,7 +190,7 @@ def test_conditions_of_scenario_runner() -> None:
 def test_the_other_conditions_of_the_trigger_are_no_criteria() -> None:
     scenario = load_scenario(PASSING_BY)
     assert stop_trigger_criteria(scenario) == []
-    assert unbuilt_criteria(scenario) == []
+    assert unsupported_criteria(scenario) == []
 
 
 def test_a_value_that_is_no_number() -> None:

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.single_run import play
+from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.recording import read_recording
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
@@ -46,7 +46,7 @@ def originals(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Recordings of several runs of the library, undamaged."""
     found = []
     for source, settings in RUNS[: max(2, min(len(RUNS), COUNT // 10))]:
-        result = play(source, settings=RunSettings(**settings), below=tmp_path_factory.mktemp("runs"))
+        result = run_and_save(source, settings=RunSettings(**settings), below=tmp_path_factory.mktemp("runs"))
         assert result.recording is not None
         found.append(result.recording)
     return found

@@ -18,7 +18,7 @@ RESULT = RunResult(
     seed=3,
     channel="custom",
     passed=False,
-    end="stop trigger",
+    end_reason="stop trigger",
     exit_code=FAILED,
     criteria=(
         Verdict("collision", False, 1.0, 0.0, "", 2.5, "A & B hit each other <hard>", True),
@@ -38,7 +38,7 @@ def test_str_of_result_is_one_short_line() -> None:
     assert str(RESULT) == "street, seed 3, channel custom: failed by collision (stop trigger at 2.50 s, 1 warning)"
     passed = replace(RESULT, passed=True, criteria=(), warnings=(), run=4)
     assert str(passed) == "street, run 4, seed 3, channel custom: passed (stop trigger at 2.50 s)"
-    assert "not passed (time limit" in str(replace(passed, passed=False, end="time limit"))
+    assert "not passed (time limit" in str(replace(passed, passed=False, end_reason="time limit"))
 
 
 def test_row_of_result_is_flat_and_scalar() -> None:
@@ -117,7 +117,7 @@ class _Tags(HTMLParser):
 
 def test_html_of_result_escapes_every_text() -> None:
     parser = _Tags()
-    hostile = replace(RESULT, scenario="<img src=x>", channel="<b>", end="<i>")
+    hostile = replace(RESULT, scenario="<img src=x>", channel="<b>", end_reason="<i>")
     parser.feed(hostile._repr_html_())
     assert parser.tags <= {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td", "code", "ul", "li"}
     for text in (

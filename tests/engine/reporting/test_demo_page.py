@@ -12,7 +12,7 @@ from lxml import html
 from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULES, SCENARIOS, Cell, ModelVariant, Table
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.demo_page import CameraPicture, Place, _speed, write_demo
+from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, _speed, write_demo
 from eidrive_scenario.reporting.key_frames import KeyFrames, Story
 from eidrive_scenario.reporting.top_view import RoadDrawing
 
@@ -47,7 +47,7 @@ def page(street: Callable[..., list[Frame]], tmp_path_factory: pytest.TempPathFa
         for arm in ARMS
     }
     view = CameraPicture("What Ego sees", "a <truck>", b"\x89PNG")
-    place = Place(RoadDrawing(lanes=(("driving", AREA),)), (AREA,), (view,))
+    place = DemoSite(RoadDrawing(lanes=(("driving", AREA),)), (AREA,), (view,))
     out = tmp_path_factory.mktemp("demo") / "reports" / "demo.html"
     write_demo(out, table(LINKS), table(OWN), stories, dict.fromkeys(SCENARIOS, place), watched=1, footer="version 1")
     return out.read_text(encoding="utf-8")

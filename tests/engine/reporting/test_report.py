@@ -27,7 +27,7 @@ def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, A
         "seed": seed,
         "channel": channel,
         "passed": passed,
-        "end": "stop trigger",
+        "end_reason": "stop trigger",
         "criteria": [verdict],
         "metrics": {"min_distance.Ego.Incoming.box": 1.0 + seed},
         "trace_hash": "00",
@@ -63,7 +63,9 @@ def test_each_run_shows_its_verdict_and_reason(tmp_path: Path) -> None:
 
 
 def test_a_run_cut_off_by_its_time_limit_did_not_finish(tmp_path: Path) -> None:
-    page = write_report([result(1, "none", False, end="time limit", criteria=[]), result(2, "none", True)], tmp_path)
+    page = write_report(
+        [result(1, "none", False, end_reason="time limit", criteria=[]), result(2, "none", True)], tmp_path
+    )
     text = html.fromstring(page.read_text(encoding="utf-8")).findtext(".//p/span[@class='broken']")
     assert text == "1 did not finish"
 

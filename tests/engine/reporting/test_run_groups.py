@@ -9,7 +9,7 @@ import pytest
 from lxml import html
 
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.experiments.single_run import as_json_text, play
+from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.run_files import read_results
 from eidrive_scenario.reporting.report import write_report
@@ -21,7 +21,7 @@ PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 
 def run(seed: int = 1, **settings: Any) -> dict[str, Any]:
-    result = play(PASSING_BY, seed=seed, settings=RunSettings(time_limit=0.1, **settings))
+    result = run_and_save(PASSING_BY, seed=seed, settings=RunSettings(time_limit=0.1, **settings))
     found: dict[str, Any] = load_json(as_json_text(result).encode())
     return found
 
@@ -91,7 +91,7 @@ def test_the_page_holds_channel_content_settings_and_command_of_each_run(tmp_pat
 def test_names_do_not_become_markup(tmp_path: Path) -> None:
     attack = "<img src=x onerror=alert(1)>"
     one = run()
-    one |= {"scenario": attack, "channel": attack, "command": attack, "end": attack}
+    one |= {"scenario": attack, "channel": attack, "command": attack, "end_reason": attack}
     one["settings"]["channel_profile"] = {attack: attack}
     one["metrics"] = {attack: 1.0, "inf": float("inf")}
     one["criteria"][0]["reason"] = attack

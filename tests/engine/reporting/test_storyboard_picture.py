@@ -8,7 +8,7 @@ from lxml import etree
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.reporting.storyboard_boxes import Role, init_boxes, stop_lines, story_boxes
-from eidrive_scenario.reporting.storyboard_layout import Layout, lay_out
+from eidrive_scenario.reporting.storyboard_layout import DiagramLayout, layout_diagram
 from eidrive_scenario.reporting.storyboard_picture import storyboard_picture, write_storyboard_picture
 from eidrive_scenario.reporting.text_width import broken, width_of
 from eidrive_scenario.storyboard.storyboard import Storyboard
@@ -66,9 +66,9 @@ CHAIN = act(
 
 
 @pytest.fixture
-def layout() -> Layout:
+def layout() -> DiagramLayout:
     """Two acts; in the first, events that wait for each other."""
-    return lay_out(story_boxes(storyboard(CHAIN, act("two", event("x"), event("y", count=3)))), 10.0, 20.0)
+    return layout_diagram(story_boxes(storyboard(CHAIN, act("two", event("x"), event("y", count=3)))), 10.0, 20.0)
 
 
 def test_what_stands_in_the_boxes() -> None:
@@ -96,7 +96,7 @@ def test_remarks() -> None:
     assert [box.remark for box in story.walk() if box.kind == "event"] == ["parallel, up to 3 times"]
 
 
-def test_no_box_covers_another(layout: Layout) -> None:
+def test_no_box_covers_another(layout: DiagramLayout) -> None:
     boxes = [box for story in layout.stories for box in story.walk()]
     assert len(boxes) == 1 + 2 + 2 + 2 + 6 + 6
     for one, other in combinations(boxes, 2):
@@ -106,14 +106,14 @@ def test_no_box_covers_another(layout: Layout) -> None:
     assert max(box.y + box.height for box in boxes) < layout.height
 
 
-def test_children_stand_right_of_their_parents_and_begin_at_their_height(layout: Layout) -> None:
+def test_children_stand_right_of_their_parents_and_begin_at_their_height(layout: DiagramLayout) -> None:
     for story in layout.stories:
         for box in story.walk():
             assert all(child.x > box.x + box.width for child in box.children)
             assert not box.children or box.children[0].y == box.y
 
 
-def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: Layout) -> None:
+def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: DiagramLayout) -> None:
     ways = [(arrow.source.box.title, arrow.target.box.title) for arrow in layout.arrows]
     assert sorted(ways) == [("a", "b"), ("a", "c"), ("b", "c"), ("c", "d")]
     for one, other in combinations(layout.arrows, 2):
@@ -125,7 +125,7 @@ def test_arrows_that_run_side_by_side_have_lanes_of_their_own(layout: Layout) ->
     assert all(group < arrow.lane < events for arrow in layout.arrows)
 
 
-def test_the_text_of_a_line_fits_into_its_box(layout: Layout) -> None:
+def test_the_text_of_a_line_fits_into_its_box(layout: DiagramLayout) -> None:
     for story in layout.stories:
         for box in story.walk():
             for line in box.lines:

@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.snapshot import Knowledge, Snapshot
+from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
 from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
 from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
 
@@ -20,8 +20,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 WINDOW = Window(left=-5.0, right=50.0, bottom=-12.0, top=45.0)
 
 
-def snapshot_at(frames: list[Frame], tick: int) -> Snapshot:
-    knowledge = Knowledge("Ego")
+def snapshot_at(frames: list[Frame], tick: int) -> StationSnapshot:
+    knowledge = SnapshotBuilder("Ego")
     return [knowledge.observe(frame) for frame in frames[: tick + 1]][-1]
 
 
@@ -112,7 +112,7 @@ def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(st
 
 def heard_by_ego(frames: list[Frame], *messages: Message) -> tuple[ReceivedMessage, ...]:
     """What Ego holds in the end where it hears these, one after the other, from the first frame on."""
-    knowledge = Knowledge("Ego")
+    knowledge = SnapshotBuilder("Ego")
     for frame, message in zip(frames, messages, strict=False):
         step = dataclasses.replace(frame.steps["Ego"], inbox=(ReceivedMessage(message, frame.view.time),))
         snapshot = knowledge.observe(Frame(frame.view, {"Ego": step}))

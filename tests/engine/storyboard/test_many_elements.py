@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.openscenario.lint.outline import Outline
 from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
-from eidrive_scenario.openscenario.storyboard_names import Meant, is_suffix
+from eidrive_scenario.openscenario.storyboard_names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
 from eidrive_scenario.storyboard.elements import StoryElement
 from eidrive_scenario.storyboard.events import EventElement
@@ -87,7 +87,7 @@ def test_references_may_leave_levels_out_and_be_written_with_slashes(reference: 
 def test_what_a_reference_means_is_found_as_by_trying_all() -> None:
     names = ["a", "b", "a/b", "b::a", "a::", ""]
     paths = [tuple(path) for length in (1, 2, 3) for path in product(names, repeat=length)]
-    meant = Meant((path, path) for path in paths)
+    meant = ReferenceMatch((path, path) for path in paths)
     references = [
         *names,
         *(mark.join(pair) for pair in product(names, repeat=2) for mark in ("/", "::")),

@@ -10,7 +10,7 @@ from eidrive_scenario.storyboard.trigger_history import ConditionHistory, TrueIn
 _CHANGES = {"rising": "became true", "falling": "became false", "risingOrFalling": "changed"}
 
 
-def told(history: ConditionHistory) -> Iterator[str]:
+def describe_history(history: ConditionHistory) -> Iterator[str]:
     """When it was true, how near it came, and what its edge and delay made of that."""
     if not history.asked:
         yield "never asked"

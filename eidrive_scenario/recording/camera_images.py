@@ -14,8 +14,8 @@ from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.geometry import box_corners
 from eidrive_scenario.perception.learned.image_network import ImageDetections
 from eidrive_scenario.perception.projection import pixels
+from eidrive_scenario.recording.atomic_files import create
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.output import create
 from eidrive_scenario.sensing.readings import CameraReading
 
 Image = NDArray[np.uint8]
@@ -37,7 +37,7 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 """Of a box, between the corners as `box_corners` gives them."""
 
 
-class CameraPictures:
+class CameraImageWriter:
     """Writes each picture that a station takes to FOLDER/STATION/CAMERA-TICK.jpg.
 
     What the station's detector found in the picture is drawn in as it found it, with class and score; of a detector

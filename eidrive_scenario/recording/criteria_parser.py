@@ -166,7 +166,7 @@ def exit_verdict(command: Command, time: float | None = None) -> Verdict:
 def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> list[Criterion]:
     """The criteria that a file written for ScenarioRunner asks for, about its ego vehicle.
 
-    Those that this engine does not have are left out and named by `unbuilt_criteria`. Raises SettingError where the
+    Those that this engine does not have are left out and named by `unsupported_criteria`. Raises SettingError where the
     condition's value is wrong or no entity is the ego vehicle.
     """
     criteria: list[Criterion] = []
@@ -182,7 +182,7 @@ def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> li
     return criteria
 
 
-def unbuilt_criteria(scenario: Scenario) -> list[Diagnostic]:
+def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
     """ScenarioRunner's criteria in this file that this engine does not judge: warnings, as the run goes on."""
     return [
         Diagnostic(

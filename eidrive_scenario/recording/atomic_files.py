@@ -25,13 +25,13 @@ def create(path: str | Path) -> BinaryIO:
         raise SettingError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
 
 
-def partial(path: Path) -> Path:
+def partial_path(path: Path) -> Path:
     """Where a file lies whose run has not ended: `out.partial.csv` for `out.csv`."""
     return path.with_stem(path.stem + PARTIAL)
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def atomic_output(path: Path) -> Iterator[Path]:
     """Where to write a file that shall have its own name only once all of it is there.
 
     What was written before an error or an interruption is kept under the other name, so that nobody takes it for a
@@ -43,7 +43,7 @@ def whole(path: Path) -> Iterator[Path]:
     if os.path.islink(path) or (os.path.exists(path) and not os.path.isfile(path)):
         yield path
         return
-    unfinished = partial(path)
+    unfinished = partial_path(path)
     with exclusive(path):
         try:
             yield unfinished

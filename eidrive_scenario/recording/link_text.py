@@ -10,7 +10,7 @@ OFF_THE_AIR = frozenset({"queue", "absent"})
 _SIGHT = {"los": "nothing in between", "nlosv": "behind", "nlos": "behind a building or the ground"}
 
 
-def link_in_words(link: LinkEvent) -> str:
+def describe_link(link: LinkEvent) -> str:
     """Who said what to whom, whether it arrived, and what the radio did: `RSU to Ego, message 7: lost: busy; …`.
 
     Path loss with shadowing and bodies in between [dB], ratio of signal to noise [dB].

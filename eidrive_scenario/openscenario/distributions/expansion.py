@@ -13,8 +13,8 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestio
 from eidrive_scenario.files import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.distributions.deterministic import Combinations, combinations_of
-from eidrive_scenario.openscenario.distributions.stochastic import Draws, draws_of
+from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
+from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
 from eidrive_scenario.openscenario.document import read_root
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
 from eidrive_scenario.openscenario.parameters import Assignment
@@ -45,7 +45,7 @@ class ConcreteRun:
         return ",".join(f"{name}={PurePosixPath(text).name or text}" for name, text in self.parameters.items())
 
 
-class Unfolding(Sequence[ConcreteRun]):
+class DistributionExpansion(Sequence[ConcreteRun]):
     """All runs of a distribution file, counted and numbered, but made only when one is asked for.
 
     source      what messages call the file
@@ -56,7 +56,11 @@ class Unfolding(Sequence[ConcreteRun]):
     """
 
     def __init__(
-        self, source: str, scenario: Path, varied: Combinations | Draws, warnings: tuple[Diagnostic, ...] = ()
+        self,
+        source: str,
+        scenario: Path,
+        varied: CartesianProduct | StochasticSampler,
+        warnings: tuple[Diagnostic, ...] = (),
     ) -> None:
         self.source = source
         self.scenario = scenario
@@ -84,7 +88,7 @@ class Unfolding(Sequence[ConcreteRun]):
         evenly through those that vary slowly. A greater count adds runs to those of a smaller one. Of draws, which are
         alike, it is the first.
         """
-        if count >= len(self) or isinstance(self.varied, Draws):
+        if count >= len(self) or isinstance(self.varied, StochasticSampler):
             return range(min(count, len(self)))
         # Steps of the golden ratio are the most even ones for any count (Weyl); without a common divisor they meet
         # every run before one comes again, and in the digits of a mixed radix every value.
@@ -92,7 +96,7 @@ class Unfolding(Sequence[ConcreteRun]):
         return sorted(index * step % len(self) for index in range(count))
 
 
-def load_distribution(source: Source, *, seed: float = 1) -> Unfolding:
+def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansion:
     """Reads a parameter value distribution.
 
     seed    of the draws where a stochastic distribution names no randomSeed itself
@@ -112,12 +116,12 @@ def load_distribution(source: Source, *, seed: float = 1) -> Unfolding:
     varied = _varied(distribution, seed, findings)
     report = findings.error if document.path is not None else findings.warning
     scenario = _scenario_file(distribution.scenario_file, document.folder, report)
-    return Unfolding(document.name, scenario, varied, findings.raise_on_error())
+    return DistributionExpansion(document.name, scenario, varied, findings.raise_on_error())
 
 
 def _varied(
     distribution: ParameterValueDistribution, seed: float, findings: DiagnosticCollector
-) -> Combinations | Draws:
+) -> CartesianProduct | StochasticSampler:
     if distribution.stochastic is not None:
         return draws_of(distribution.stochastic, seed, findings)
     assert distribution.deterministic is not None

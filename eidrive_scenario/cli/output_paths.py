@@ -9,7 +9,7 @@ from pathlib import Path
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 
-def check_places(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
+def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[str | Path | None]) -> None:
     """Refuse to write over a file that is read, or two things into one file.
 
     written  files by the option that names them; None where the option is not given
