@@ -185,9 +185,10 @@ class InvalidResult(Exception):
 
 
 class ErrorCollector:
-    """Runs several checks to tell all that they find at once.
+    """Collect diagnostics of several independent checks.
 
-    Within `with together:` an InputError ends the block and is kept; `settle` raises one with all problems, if any.
+    An InputError raised inside `with collector:` ends that block and is stored. `raise_if_any` raises one InputError
+    with all stored diagnostics, without duplicates.
     """
 
     def __init__(self) -> None:
@@ -203,7 +204,7 @@ class ErrorCollector:
         return True
 
     def raise_if_any(self) -> None:
-        """Raise InputError with every problem found, each once."""
+        """Raise InputError if diagnostics are stored, each once."""
         if self._problems:
             raise InputError(list(dict.fromkeys(self._problems)))
 

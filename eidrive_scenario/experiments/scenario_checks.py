@@ -76,5 +76,5 @@ def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
         roads = RoadNetwork.load(path)
     except InputError as error:
         return CheckReport(error.diagnostics)
-    doubts = [problem for problem in roads.map_warnings if problem.rule not in ignored]
-    return CheckReport((), tuple(capped(sorted(doubts, key=lambda problem: problem.line or 0))))
+    found = [problem for problem in roads.map_warnings if problem.rule not in ignored]
+    return CheckReport((), tuple(capped(sorted(found, key=lambda problem: problem.line or 0))))

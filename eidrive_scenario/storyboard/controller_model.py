@@ -67,7 +67,7 @@ def build_controller_models(
             if controller.name in kinds:
                 made = construct(kinds[controller.name], controller, context, actor)
                 if not isinstance(made, ControllerModel):
-                    raise RegistryError(f"controllers {wanted[controller.name]!r} is no StandIn")
+                    raise RegistryError(f"controllers {wanted[controller.name]!r} is not a subclass of ControllerModel")
                 found.append(made)
     return found
 

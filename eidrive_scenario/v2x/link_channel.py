@@ -67,6 +67,6 @@ class LinkChannel(Channel):
         """Decide at once whatever is undecided: another channel takes over."""
 
     def drain_events(self) -> Sequence[LinkEvent]:
-        """Fates that are known, and that nobody was told yet; each is told once."""
-        untold, self._remaining = self._remaining, []
-        return untold
+        """Return events of all messages whose outcome has become known since the last call."""
+        events, self._remaining = self._remaining, []
+        return events

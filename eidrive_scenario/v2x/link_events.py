@@ -35,7 +35,7 @@ class OutcomeColumns(NamedTuple):
 
 
 class OutcomeBlock(ABC):
-    """Fates that are kept in columns; whoever wants events iterates over it."""
+    """Outcomes of transmissions in columns. Iteration yields them as events."""
 
     @abstractmethod
     def __len__(self) -> int: ...

@@ -37,7 +37,7 @@ class LinkCounterTable:
         self._causes[row, receivers, QUEUE] += 1
 
     def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
-        """Fates of messages, one entry per message and receiver."""
+        """Count outcomes of messages, one entry per message and receiver."""
         link = senders * len(self.names) + receivers  # flat places: numpy counts at those ten times as fast
         np.add.at(self._causes.reshape(-1), link * len(CAUSES) + causes, 1)
         place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)

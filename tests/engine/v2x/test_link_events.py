@@ -1,4 +1,4 @@
-"""Fates in columns: whoever looks sees the same events as in a plain list, and their hash is the same."""
+"""Outcomes in columns: iteration yields the same events as a plain list, with the same hash."""
 
 from __future__ import annotations
 
