@@ -7,9 +7,9 @@ message by message (common random numbers).
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 from scipy.special import gammaincinv, ndtr, ndtri
 
 from eidrive_scenario.settings import Settings
@@ -120,7 +120,13 @@ class LognormalDelay(_RandomDelay):
         return self.minimum + math.exp(exponent)
 
 
+def _with_default_kind(value: Any) -> Any:
+    """Return the settings with `kind: constant` if they consist of `seconds` alone."""
+    return {"kind": "constant", **value} if isinstance(value, dict) and value.keys() == {"seconds"} else value
+
+
 Delay = Annotated[
     ConstantDelay | UniformDelay | TruncatedNormalDelay | ShiftedGammaDelay | LognormalDelay | TraceDelay,
     Field(discriminator="kind"),
+    BeforeValidator(_with_default_kind),
 ]

@@ -65,6 +65,11 @@ def test_parameter_sets_the_delay_of_every_message(make: Make, latency: str) -> 
     assert result.parameters["Latency"] == latency
 
 
+def test_delay_with_seconds_alone_is_constant(make: Make) -> None:
+    result = delays(make("{delay: {seconds: $Latency}}"), Latency="0.2")
+    assert result.links[LINK].mean_delay == pytest.approx(0.2)
+
+
 def test_expression_sets_the_loss(make: Make) -> None:
     path = make(DELAY)
     assert delays(path, Loss="100").links[LINK].received == 0

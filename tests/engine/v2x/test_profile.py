@@ -131,7 +131,7 @@ congestion: {kind: reactive,
              limits: [0.3, 0.6, 1.4],
              intervals: [0.1, 0.2, 0.5]}
 delay:
-  seconds: 0.1
+  minimum: 0.1
 loss: 0.3
 background:
   kind: 80211q
