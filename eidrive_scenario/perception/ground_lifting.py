@@ -80,12 +80,6 @@ class ByGround(NamedTuple):
     headings: Array
     costs: Array
 
-    @property
-    def misfit(self) -> Array:
-        """(N,) squared error of the best fit: how little an object of this class can look like the box."""
-        found: Array = self.costs.min(axis=1, initial=np.inf) if len(self.costs) else np.empty(0)
-        return found
-
 
 def lift_by_ground(
     boxes: Array, classes: Sequence[str], camera: CameraReading, *, ground: float, surroundings: MapContext

@@ -29,14 +29,17 @@ class RunVariant:
     """One way to run a scenario; the channel None is the one that the file itself names.
 
     replaced  warnings of options that replaced what the marker of the test lists
+    label     channel in the name of the test, where its own short name is that of another channel too
     """
 
     channel: str | None
     seed: int
     replaced: tuple[str, ...] = ()
+    label: str = ""
 
     def __str__(self) -> str:
-        return "-".join([*([] if self.channel is None else [_short(self.channel)]), f"seed{self.seed}"])
+        channel = [] if self.channel is None else [self.label or _short(self.channel)]
+        return "-".join([*channel, f"seed{self.seed}"])
 
 
 def _short(channel: str) -> str:
@@ -125,9 +128,23 @@ def arms(
         replaced.append(f"--eidrive-channel {','.join(map(str, names))} replaces the marker's channel=[{listed}]")
     if option and seeds is not None and option != seeds:
         replaced.append(f"--eidrive-seeds {option} replaces the marker's seeds={seeds}")
-    for channel in names or channels or (None,):
+    chosen = names or channels or (None,)
+    for channel, label in zip(chosen, _labels(chosen), strict=True):
         for seed in range(1, (option or seeds or 1) + 1):
-            yield RunVariant(channel, seed, tuple(replaced))
+            yield RunVariant(channel, seed, tuple(replaced), label)
+
+
+def _labels(channels: Sequence[str | None]) -> list[str]:
+    """A name of its own for each channel: profiles of two folders may have one name, and long ones one beginning."""
+    labels: list[str] = []
+    for channel in channels:
+        name = label = "" if channel is None else _short(channel)
+        number = 1
+        while label in labels:
+            number += 1
+            label = f"{name}_{number}"
+        labels.append(label)
+    return labels
 
 
 def wanted(config: pytest.Config, path: Path) -> bool:

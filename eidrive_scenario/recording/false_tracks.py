@@ -22,7 +22,6 @@ SAME = 4.0
 class _Station:
     """Counts of one station so far."""
 
-    least: float
     false: list[Point] = field(default_factory=list)
     """Places of the false tracks in the last tick."""
     tracks: int = 0
@@ -61,7 +60,7 @@ class FalseTracks:
                 continue
             station = self._stations.get(name)
             if station is None:
-                station = self._stations[name] = _Station(limit)
+                station = self._stations[name] = _Station()
             boxes = step.fused.boxes.tolist()
             rows = _unmatched(boxes, view, view.rows.get(name, -1)) if boxes else ()
             if rows:

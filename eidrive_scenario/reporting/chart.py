@@ -32,9 +32,8 @@ def line_chart(
     y_title: str,
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
-    threshold: tuple[float, str] | None = None,
 ) -> str:
-    """The lines in one frame with axes from nice numbers; `threshold` is a level with a name, drawn across."""
+    """The lines in one frame with axes from nice numbers."""
     x_low, x_high = x_range or _extent([value for line in lines for value in line.x])
     y_low, y_high = y_range or (0.0, _extent([value for line in lines for value in line.y])[1])
 
@@ -57,12 +56,6 @@ def line_chart(
     parts.append(_text((LEFT + right) / 2, HEIGHT - 5, x_title, "middle"))
     middle = (TOP + floor) / 2
     parts.append(f'<g transform="translate(13 {middle:.1f}) rotate(-90)">{_text(0.0, 0.0, y_title, "middle")}</g>')
-    if threshold is not None:
-        _, y = at(x_low, threshold[0])
-        parts.append(
-            f'<line x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" style="stroke:{INK}" stroke-dasharray="2 4"/>'
-            + _text(LEFT + 6, y - 5, threshold[1], "start")
-        )
     ends = []
     for line in sorted(lines, key=lambda line: bool(line.dashes)):  # a broken line shows the one that it lies upon
         path, last, before = "", None, False

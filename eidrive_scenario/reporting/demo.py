@@ -142,6 +142,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--seeds and --workers need at least 1")
     if given.out.is_dir() or any(above.exists() and not above.is_dir() for above in given.out.parents):
         parser.error(f"--out {given.out} is no place for a page; name a file, such as reports/demo.html")
+    if given.out.suffix == ".json":
+        parser.error(f"--out: the page would be overwritten by its numbers (got {given.out}; expected a .html file)")
     try:
         demo(given.out, range(1, given.seeds + 1), given.workers, Console())
     except EidriveError as error:

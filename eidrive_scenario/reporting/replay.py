@@ -38,6 +38,8 @@ from eidrive_scenario.reporting.top_view import (
 
 _LARGEST_PAGE = 64 * 2**20
 """Maximum size of the frames in a page, about [bytes]."""
+_ABSENT = len("null, ")
+"""Size of the entry of a station for a frame before its first one [bytes]."""
 COLOURS = {
     "own": OWN,
     "received": RECEIVED,
@@ -192,7 +194,8 @@ def replay_data(
                 raise
             report.add("frames cannot be drawn", f"tick {frame.view.tick}: {_described(error)}")
             continue
-        if not budget.take(_size(part), frame.view.time):
+        added = len(part["stations"].keys() - data["stations"].keys())
+        if not budget.take(_size(part) + _ABSENT * added * len(data["times"]), frame.view.time):
             break
         _append(data, part)
     return {**data, "roads": _roads(roads or RoadDrawing()), "colours": COLOURS}
@@ -244,7 +247,10 @@ def _size(part: Mapping[str, Any]) -> int:
     stations = sum(
         60
         if station is None
-        else 120 + 40 * (len(station["own"]) + len(station["heard"]) + len(station["links"])) + len(station["plan"])
+        else 120
+        + 40 * (len(station["own"]) + len(station["heard"]) + len(station["links"]))
+        + sum(len(sender) for sender, _ in station["links"])
+        + len(station["plan"])
         for station in part["stations"].values()
     )
     return 40 + poses + changes + stations

@@ -44,15 +44,16 @@ def write_report(
     if not runs:
         raise InputError(Diagnostic("there is no result to report", "give at least one run", str(out)))
     groups = group_runs(runs)
+    counted = [run for group in groups for run in group.distinct]
     metrics = _common_metrics(runs)
     return write_page(
         page,
         "report.html.jinja",
         title="Scenario report",
-        total=len(runs),
-        passed=sum(run.passed for run in runs),
-        failed=sum(not run.passed and run.finished for run in runs),
-        broken=sum(not run.passed and not run.finished for run in runs),
+        total=len(counted),
+        passed=sum(run.passed for run in counted),
+        failed=sum(not run.passed and run.finished for run in counted),
+        broken=sum(not run.passed and not run.finished for run in counted),
         metrics=[_title(name, runs) for name in metrics],
         groups=[
             {

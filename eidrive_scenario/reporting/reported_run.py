@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.run_outcome import TIME_LIMIT
 
 
 class ReportedCriterion(BaseModel):
@@ -47,7 +48,7 @@ class ReportedRun(BaseModel):
     @property
     def finished(self) -> bool:
         """False where the run was cut off by its time limit."""
-        return self.end_reason != "time limit"
+        return self.end_reason != TIME_LIMIT
 
 
 def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:

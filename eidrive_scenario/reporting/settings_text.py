@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 _DEEPEST = 12
+_FRACTION = re.compile(r"[+-]?(0|[1-9]\d*)?\.\d+([eE][+-]?\d+)?", re.ASCII)
 _LONGEST = 2000
 """Characters of a value that are shown."""
 
@@ -87,9 +89,11 @@ def _entries(value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def short_number(text: str) -> str:
-    """A number with six digits at most, as those that a seed draws have sixteen; other texts as they are."""
-    try:
-        short = f"{float(text):.6g}"
-    except ValueError:
+    """A decimal fraction with six digits at most, as those that a seed draws have sixteen; other texts as they are.
+
+    A text such as `007` or `1_0` may be a name, and a whole number may identify something.
+    """
+    if not _FRACTION.fullmatch(text):
         return text
+    short = f"{float(text):.6g}"
     return short if len(text) > len(short) and "n" not in short else text

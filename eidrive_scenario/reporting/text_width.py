@@ -31,17 +31,26 @@ def broken(text: str, width: float, size: float) -> list[str]:
             continue
         lines.append(line)
         rest = word
-        while width_of(rest, size) > width:
-            part = _part(rest, width, size)
+        while (most := _fitting(rest, width, size)) < len(rest):
+            part = _part(rest, most)
             lines.append(part)
             rest = rest[len(part) :]
         line = rest
     return [entry for entry in (*lines, line) if entry]
 
 
-def _part(word: str, width: float, size: float) -> str:
-    """The beginning of a word that fits: up to a capital or behind an underscore, else as much as there is room."""
-    most = next(count for count in range(len(word), 0, -1) if count == 1 or width_of(word[:count], size) <= width)
+def _fitting(word: str, width: float, size: float) -> int:
+    """The number of letters at the beginning of a word that fit, at least 1; the time does not grow with the rest."""
+    total = 0.0
+    for count, letter in enumerate(word):
+        total += _share(letter)
+        if size * total > width:
+            return max(count, 1)
+    return len(word)
+
+
+def _part(word: str, most: int) -> str:
+    """At most so many letters of a word: up to a capital or behind an underscore, else all of them."""
     seams = (
         n
         for n in range(most, most // 2, -1)

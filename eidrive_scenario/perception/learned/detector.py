@@ -20,6 +20,9 @@ from eidrive_scenario.perception.learned.external_network import ExternalNetwork
 from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.weight_files import (
+    DEFAULT_CONFIDENCE,
+    MAX_CLASSES,
+    MAX_SIDE,
     TORCHSCRIPT_SUFFIX,
     check_weights_exist,
     refused_torchscript,
@@ -38,12 +41,11 @@ Array = NDArray[np.float64]
 SHIPPED = Path(__file__).parents[1] / "weights"
 OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)
 
-USUAL_CONFIDENCE = 0.35
 SAME_PLACE = 0.1
 """Lifted boxes that overlap this much in plan view are one object; the surer one counts."""
 
 
-Side = Annotated[int, Field(ge=1, le=8192)]
+Side = Annotated[int, Field(ge=1, le=MAX_SIDE)]
 """Width or height of a network's input [px]."""
 
 
@@ -60,7 +62,7 @@ class LearnedSettings(Settings):
     """
 
     weights: str | None = None
-    classes: Annotated[tuple[str, ...], Field(max_length=10_000)] | None = None
+    classes: Annotated[tuple[str, ...], Field(max_length=MAX_CLASSES)] | None = None
     input_size: tuple[Side, Side] | None = None
     layout: Layout | None = None
     letterbox: bool = False
@@ -202,7 +204,7 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
         message = f"detector {name!r} needs torch, which is not installed"
         raise SettingError(Diagnostic(message, "run: pip install eidrive-scenario[learned]"))
     if path.suffix in FOREIGN_SUFFIXES and settings.classes is not None and settings.input_size is not None:
-        confidence = settings.confidence or USUAL_CONFIDENCE
+        confidence = settings.confidence or DEFAULT_CONFIDENCE
         return ExternalNetwork(
             path,
             settings.classes,

@@ -15,10 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights, refused_torchscript
 
+_ROUNDING = 1e-5
+"""Excess of a probability over 1 that single precision explains."""
 _LAYER = re.compile(r"Node \[([\w.]{1,60})@")
 _LOG = logging.getLogger(__name__)
 
@@ -119,9 +121,9 @@ class ExternalNetwork(ImageNetwork):
             table = outputs[0].reshape(-1, _sides(outputs[0], -1, 6))
             table = table[table[:, 4] >= self.confidence]  # others may be mere padding
             boxes, shares = table[:, :4], np.zeros((len(table), count), dtype=np.float32)
-            numbers = table[:, 5].astype(np.int64)
-            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < count:
+            if not ((table[:, 5] >= 0.0) & (table[:, 5] < count)).all():
                 raise ValueError("a class number is beyond the classes")
+            numbers = table[:, 5].astype(np.int64)
             shares[np.arange(len(table)), numbers] = table[:, 4]
         elif self._layout == "yolov5":
             table = outputs[0].reshape(-1, _sides(outputs[0], -1, 5 + count))
@@ -134,6 +136,9 @@ class ExternalNetwork(ImageNetwork):
         numbers = shares.argmax(axis=1)
         scores = shares[np.arange(len(shares)), numbers]
         sure = scores >= self.confidence
+        highest = float(scores[sure].max(initial=0.0))
+        if highest > 1.0 + _ROUNDING:
+            raise ValueError(f"a score is {highest:g} (expected a probability, such as behind a sigmoid)")
         return Candidates(boxes[sure].astype(float), scores[sure].astype(float), numbers[sure].astype(np.int64))
 
 
@@ -145,7 +150,8 @@ def _sides(output: Floats, axis: int, expected: int) -> int:
 
 def _corners(boxes: Floats) -> Floats:
     centre, half = boxes[:, :2], boxes[:, 2:] / 2.0
-    return np.concatenate([centre - half, centre + half], axis=1)
+    with np.errstate(invalid="ignore"):  # boxes that are not finite are left out later
+        return np.concatenate([centre - half, centre + half], axis=1)
 
 
 def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
@@ -194,8 +200,10 @@ def _torchscript(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:
             given = network(torch.from_numpy(pixels))
         outputs = given if isinstance(given, (list, tuple)) else [given]
         if not all(isinstance(output, torch.Tensor) for output in outputs):
-            raise RuntimeError("it gives something else than tensors")
-        return [output.float().numpy() for output in outputs]
+            kinds = ", ".join(dict.fromkeys(type(output).__name__ for output in outputs))
+            message = f"weights {quoted(str(path))} return {shortened(kinds, 100)} (expected tensors)"
+            raise SettingError(Diagnostic(message, f"export the model with one of the layouts: {LAYOUTS}"))
+        return [np.atleast_1d(output.float().numpy()) for output in outputs]
 
     return compute
 

@@ -61,14 +61,14 @@ class ImageNetwork(ABC):
         self._groups = suppression_groups(self.classes)
 
     def find(self, picture: NDArray[np.uint8]) -> ImageDetections:
-        """The objects in a picture (H, W, 3), red green blue."""
+        """The objects in a picture (H, W, 3), red green blue. Boxes without an area in the picture are left out."""
         height, width = picture.shape[:2]
         if self.letterbox:
             own, scale, corner = letterboxed(picture, self.input_size)
         else:
             own, corner = resized(picture, self.input_size), np.zeros(2)
             scale = np.array([self.input_size[0] / width, self.input_size[1] / height])
-        candidates = self.candidates(own)
+        candidates = _finite(self.candidates(own))
         if len(candidates.scores) > MOST_CANDIDATES:
             best = np.argsort(-candidates.scores, kind="stable")[:MOST_CANDIDATES]
             candidates = Candidates(candidates.boxes[best], candidates.scores[best], candidates.classes[best])
@@ -77,12 +77,22 @@ class ImageNetwork(ABC):
         boxes = (candidates.boxes[kept] - np.tile(corner, 2)) / np.tile(scale, 2)
         boxes[:, 0::2] = boxes[:, 0::2].clip(0.0, width)
         boxes[:, 1::2] = boxes[:, 1::2].clip(0.0, height)
+        shown = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)
+        boxes, kept = boxes[shown], kept[shown]
         names = tuple(self.classes[number] for number in candidates.classes[kept].tolist())
         return ImageDetections(boxes, candidates.scores[kept], names)
 
     @abstractmethod
     def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
         """All boxes of at least the least confidence in a picture of the network's own size."""
+
+
+def _finite(candidates: Candidates) -> Candidates:
+    """The candidates whose boxes have finite edges."""
+    finite = np.isfinite(candidates.boxes).all(axis=1)
+    if finite.all():
+        return candidates
+    return Candidates(candidates.boxes[finite], candidates.scores[finite], candidates.classes[finite])
 
 
 def resized(picture: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

@@ -18,6 +18,12 @@ from eidrive_scenario.files import MIB, is_regular_file, read_regular_file, reas
 
 MAX_BYTES = 512 * MIB
 """Size of a file of weights, and of all arrays in a .npz together."""
+MAX_SIDE = 8192
+"""Maximum width and height of a network's input [px]."""
+MAX_CLASSES = 10_000
+"""Maximum number of classes of a network."""
+DEFAULT_CONFIDENCE = 0.35
+"""Minimum score of a detection if neither the settings nor the weights state one."""
 ALLOW_TORCHSCRIPT = "EIDRIVE_ALLOW_TORCHSCRIPT"
 """Environment variable: 1 lets runs load TorchScript weights, as the option --allow-torchscript does."""
 TORCHSCRIPT_SUFFIX = ".pt"

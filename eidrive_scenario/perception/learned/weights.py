@@ -15,14 +15,16 @@ from torch import nn
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.ssd import Ssd
-from eidrive_scenario.perception.learned.weight_files import read_arrays, read_weights
-from eidrive_scenario.perception.learned.yolov5 import Anchors, YoloV5
+from eidrive_scenario.perception.learned.weight_files import (
+    DEFAULT_CONFIDENCE,
+    MAX_CLASSES,
+    MAX_SIDE,
+    read_arrays,
+    read_weights,
+)
+from eidrive_scenario.perception.learned.yolov5 import STRIDES, Anchors, YoloV5
 
-SHIPPED = Path(__file__).parents[1] / "weights"
 _DESCRIPTION = "description"
-MAX_SIDE = 8192
-"""Largest width and height of a network's input [px]."""
-MAX_CLASSES = 10_000
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Description:
     classes: tuple[str, ...]
     input_size: tuple[int, int]
     anchors: Anchors | None = None
-    confidence: float = 0.35
+    confidence: float = DEFAULT_CONFIDENCE
 
     def build(self) -> YoloV5 | Ssd:
         """The network, untrained. Raises ValueError if the description fits none."""
@@ -106,10 +108,16 @@ def _described(data: dict[str, Any]) -> Description:
     classes = tuple(str(name) for name in data["classes"])
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE and 1 <= len(classes) <= MAX_CLASSES):
         raise ValueError("its description has no usable input size or classes")
+    network, coarsest = str(data["network"]), STRIDES[-1]
+    if network == "yolov5" and (width % coarsest or height % coarsest):
+        raise ValueError(f"its input size is {width} x {height}, which are not multiples of {coarsest}")
+    confidence = float(data.get("confidence", Description.confidence))
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"its confidence is {confidence:g} (expected a number between 0 and 1)")
     return Description(
-        network=str(data["network"]),
+        network=network,
         classes=classes,
         input_size=(width, height),
-        confidence=float(data.get("confidence", Description.confidence)),
+        confidence=confidence,
         anchors=None if anchors is None else tuple(tuple((w, h) for w, h in scale) for scale in anchors),
     )

@@ -5,6 +5,7 @@ red_boxes.onnx is the network below, exported with torch.onnx.export(network, (p
 
 from __future__ import annotations
 
+import math
 import warnings
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
-from eidrive_scenario.perception.learned.image_network import MARGIN_GREY, letterboxed
+from eidrive_scenario.perception.learned.image_network import MARGIN_GREY, Candidates, ImageNetwork, letterboxed
 
 ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
 CLASSES = ("truck", "car")
@@ -162,3 +163,69 @@ def test_rows_that_pad_a_list_of_detections_are_no_boxes() -> None:
 def test_a_layout_that_the_shape_leaves_open_must_be_said() -> None:
     with pytest.raises(SettingError, match="could be yolov5 or detections; say which with 'layout'"):
         Fixed([np.zeros((1, 10, 6), dtype=np.float32)], ("car",))
+
+
+def test_external_network_scores_above_one_are_refused() -> None:
+    """A model that is exported without its sigmoid returns logits."""
+    network = Fixed([np.array([[8.0, 17.0, 12.0, 23.0, 3.5, 1.0]], dtype=np.float32)], ("car", "truck", "bus"))
+    with pytest.raises(SettingError, match=r"own\.onnx' give \(1, 6\), .*: a score is 3\.5 \(expected a probability"):
+        network.found()
+
+
+def test_external_network_class_number_nan_is_refused() -> None:
+    network = Fixed([np.array([[8.0, 17.0, 12.0, 23.0, 0.8, math.nan]], dtype=np.float32)], ("car", "truck", "bus"))
+    with pytest.raises(SettingError, match="a class number is beyond the classes"):
+        network.found()
+
+
+class Constant(ImageNetwork):
+    """A network of 100 x 100 pixels that returns the same boxes for every picture."""
+
+    def __init__(self, boxes: list[list[float]]) -> None:
+        super().__init__(("car",), (100, 100), 0.3)
+        self.boxes = np.array(boxes)
+
+    def candidates(self, picture: NDArray[np.uint8]) -> Candidates:
+        return Candidates(self.boxes, np.full(len(self.boxes), 0.9), np.zeros(len(self.boxes), dtype=np.int64))
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        [math.nan, 10.0, 20.0, 20.0],
+        [-math.inf, 10.0, math.inf, 20.0],
+        [30.0, 30.0, 20.0, 20.0],
+        [110.0, 10.0, 120.0, 20.0],
+        [10.0, -9.0, 20.0, -1.0],
+        [10.0, 10.0, 10.0, 20.0],
+    ],
+    ids=["not a number", "infinite", "corners swapped", "right of the picture", "above the picture", "no width"],
+)
+def test_find_box_without_area_in_picture_is_left_out(box: list[float]) -> None:
+    """The picture is twice as wide as the network's input, so the other box has twice its width."""
+    found = Constant([box, [40.0, 40.0, 60.0, 70.0]]).find(np.zeros((100, 200, 3), dtype=np.uint8))
+    assert found.boxes.tolist() == [[80.0, 40.0, 120.0, 70.0]]
+    assert len(found.scores) == len(found.classes) == 1
+
+
+@pytest.mark.parametrize(
+    ("named", "message"),
+    [
+        (False, r"give \(1,\), which fits no layout for 2 classes; check 'classes'"),
+        (True, r"return dict \(expected tensors\); export the model with one of the layouts"),
+    ],
+)
+def test_torchscript_output_without_layout_is_refused(named: bool, message: str, tmp_path: Path) -> None:
+    """A single number; and a dictionary, as detectors of torchvision return it."""
+    torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
+
+    class Mean(torch.nn.Module):  # type: ignore[misc, name-defined]
+        def forward(self, pictures):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
+            return {"mean": pictures.mean()} if named else pictures.mean()
+
+    path = tmp_path / "own.pt"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        torch.jit.trace(Mean(), torch.zeros(1, 3, SIZE[1], SIZE[0]), strict=False).save(str(path))
+    with pytest.raises(SettingError, match=message):
+        ExternalNetwork(path, CLASSES, SIZE, 0.5, allow_torchscript=True)

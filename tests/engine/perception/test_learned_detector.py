@@ -208,3 +208,26 @@ def test_without_torch_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(SettingError, match=r"needs torch.*run: pip install eidrive-scenario\[learned\]"):
         build_network("ssd", LearnedSettings())
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"confidence": 0.0}, "its confidence is 0 (expected a number between 0 and 1)"),
+        ({"confidence": 1.0}, "its confidence is 1 (expected a number between 0 and 1)"),
+        ({"confidence": math.nan}, "its confidence is nan (expected a number between 0 and 1)"),
+        ({"input_size": [500, 300]}, "its input size is 500 x 300, which are not multiples of 32"),
+    ],
+)
+def test_weights_with_unusable_description_are_refused(
+    changes: dict[str, object], problem: str, tmp_path: Path
+) -> None:
+    pytest.importorskip("torch", reason="needs the extra 'learned'")
+    with np.load(SHIPPED / "yolov5.npz") as stored:
+        arrays = dict(stored)
+    arrays["description"] = np.array(json.dumps({**json.loads(str(arrays["description"])), **changes}))
+    path = tmp_path / "own.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(SettingError) as error:
+        build_network("yolov5", LearnedSettings(weights=str(path)))
+    assert f"do not fit: {problem}" in str(error.value)

@@ -98,3 +98,13 @@ def test_channels_may_be_asked_for_one_by_one(project: pytest.Pytester) -> None:
 def test_bare_pytest_under_xdist_is_left_alone_too(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess("-n", "1", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1)
+
+
+def test_item_names_of_channels_with_equal_names_differ(project: pytest.Pytester) -> None:
+    """Two folders hold a profile `bad`, and the written-out channels are equal in their first 80 characters."""
+    written = "{delay: {kind: uniform, low: 0.000000000000, high: 0.100000000000}, loss: {kind: none}, reordering: "
+    channels = f"one/bad.yaml,two/bad.yaml,{written}true}},{written}false}}"
+    items = collected(project, "data/first.xosc", "--eidrive-channel", channels)
+    names = [item.split("::")[1] for item in items]
+    assert names[:2] == ["first[bad-seed1]", "first[bad_2-seed1]"]
+    assert len(set(names)) == 4

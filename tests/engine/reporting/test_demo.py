@@ -48,7 +48,7 @@ def test_the_page_has_camera_pictures_of_ego_and_helper(done: tuple[Path, str, t
     assert "What Spectator sees" in page
 
 
-@pytest.mark.parametrize("arguments", [["--seeds", "0"], ["--workers", "0"], ["--sedes", "3"]])
+@pytest.mark.parametrize("arguments", [["--seeds", "0"], ["--workers", "0"], ["--sedes", "3"], ["--out", "demo.json"]])
 def test_wrong_arguments_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(arguments)

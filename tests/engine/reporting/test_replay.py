@@ -14,6 +14,7 @@ from lxml import html
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.recording import Recorder, read_recording
+from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay import replay_data, write_replay
 from eidrive_scenario.reporting.settings_text import short_number
@@ -100,6 +101,10 @@ def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
         ("14.4444", "14.4444"),
         ("36.50", "36.5"),
         ("1e400", "1e400"),
+        ("007", "007"),
+        ("1_0", "1_0"),
+        ("12345678901234", "12345678901234"),
+        ("-0.00123456789", "-0.00123457"),
         ("red", "red"),
     ],
 )
@@ -113,3 +118,15 @@ def test_where_nobody_is_a_station_nothing_speaks_of_stations(street: Play, tmp_
     for frames, expected in ((street(1), False), (alone, True)):
         page = write_replay(read_recording(recorded(frames, tmp_path)), tmp_path / "page.html")
         assert (hidden in page.read_text(encoding="utf-8")) is expected
+
+
+def test_page_size_counts_frames_before_a_station(street: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    """500 stations in the last of 100 frames have an entry for each frame: 50 000 in all."""
+    frames = street(1)
+    crowd = {f"S{number}": frames[-1].steps["RSU"] for number in range(500)}
+    frames[-1] = replace(frames[-1], steps=crowd)
+    report = DamageReport()
+    monkeypatch.setattr("eidrive_scenario.reporting.replay._LARGEST_PAGE", 2**18)
+    data = replay_data(frames, report=report)
+    assert len(json.dumps(data)) < 2**18
+    assert any("too large for one page" in line for line in report.lines())

@@ -77,6 +77,7 @@ def test_a_result_in_two_folders_counts_once_and_is_listed_twice(tmp_path: Path)
     assert tree.xpath("string((//tbody)[1]/tr/td[3])") == "0/2"
     assert page.count(f"<summary>{one['settings_sha256'][:10]}</summary>") == 2
     assert "1 of these results is a copy of another" in page
+    assert tree.findtext(".//p[@class='lead']").startswith("2 runs: ")
 
 
 def test_the_page_holds_channel_content_settings_and_command_of_each_run(tmp_path: Path) -> None:

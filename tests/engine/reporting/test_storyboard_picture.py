@@ -164,3 +164,10 @@ def test_broken_lines_keep_all_letters_and_the_width(width: float) -> None:
 
 def test_long_words_are_cut_where_their_parts_begin() -> None:
     assert broken("CutInAndBrakeStory", 100, 13) == ["CutInAndBrake", "Story"]
+
+
+def test_broken_long_word_is_cut_in_short_time() -> None:
+    """A name of 100 000 letters; with lower-case letters only, all lines but the last have the same length."""
+    lines = broken("x" * 100_000, 300.0, 12.0)
+    assert "".join(lines) == "x" * 100_000
+    assert {len(line) for line in lines[:-1]} == {int(300.0 / width_of("x", 12.0))}
