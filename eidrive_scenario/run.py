@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+import os
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field
+from numbers import Number, Real
 from operator import index
 from pathlib import Path
 from typing import Any, Protocol, SupportsIndex
 
-from eidrive_scenario.errors import Diagnostic, SettingError
+import numpy as np
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.openscenario.parameters import Assignment
 from eidrive_scenario.recording.criterion import Verdict
 from eidrive_scenario.recording.frame import Frame
@@ -52,15 +56,73 @@ class RunSettings:
     allow_torchscript: bool = False
 
     def __post_init__(self) -> None:
-        """Raise SettingError for stations that are given as one text, and for a time limit that ends no run."""
-        senders: Any = self.cooperate
-        if isinstance(senders, str):
-            raise SettingError(Diagnostic(f"cooperate is the text {senders!r}", "give a tuple of station names"))
-        if senders is not None and not isinstance(senders, tuple):
-            names = sorted(senders) if isinstance(senders, Set) else senders
-            object.__setattr__(self, "cooperate", tuple(names))
+        """Bring values of parameters and user-defined values to texts, as a command line has them.
+
+        Raises SettingError for values of a wrong type, and for a time limit that ends no run.
+        """
+        for name, types, expected in _TYPES:
+            value = getattr(self, name)
+            # A bool is a number to Python, but True is no number of seconds.
+            if not isinstance(value, types) or (isinstance(value, bool) and bool not in types):
+                raise SettingError(Diagnostic(f"{name} is {quoted(value)}", f"give {expected}"))
+        object.__setattr__(self, "cooperate", _senders(self.cooperate))
+        for name in ("parameters", "user_values", "controllers"):
+            object.__setattr__(self, name, _texts(name, getattr(self, name)))
         if not self.time_limit > 0.0:
             raise SettingError(Diagnostic(f"time_limit is {self.time_limit}", "give a positive number of seconds"))
+
+
+_PLACE: tuple[type, ...] = (str, os.PathLike, type(None))
+_TYPES: tuple[tuple[str, tuple[type, ...], str], ...] = (
+    ("channel", (*_PLACE, Mapping), "the name, the file or the mapping of a channel profile"),
+    ("weather", _PLACE, "the name or the file of a weather preset"),
+    ("detector", (str, type(None)), "the name of a detector"),
+    ("parameters", (Mapping,), "a mapping of names to values"),
+    ("user_values", (Mapping,), "a mapping of names to values"),
+    ("controllers", (Mapping,), "a mapping of controllers to who stands in for them"),
+    ("dt", (Real,), "a number of seconds"),
+    ("time_limit", (Real,), "a number of seconds"),
+    # A text such as "no" would be true.
+    ("allow_torchscript", (bool,), "True or False"),
+)
+"""Types of the settings of a run, and what a message states of them."""
+
+
+def _senders(given: Any) -> tuple[str, ...] | None:
+    """Names of stations as a tuple, those of a set in order."""
+    if given is None:
+        return None
+    if isinstance(given, str):
+        raise SettingError(Diagnostic(f"cooperate is the text {given!r}", "give a tuple of station names"))
+    names = sorted(given, key=str) if isinstance(given, Set) else given
+    found = tuple(names) if isinstance(names, Iterable) else (names,)
+    if not all(isinstance(name, str) for name in found):
+        raise SettingError(Diagnostic(f"cooperate is {quoted(given)}", "give a tuple of station names"))
+    return found
+
+
+def _texts(setting: str, values: Mapping[Any, Any]) -> dict[str, str | Assignment]:
+    """Names with values as texts; an Assignment stays what it is."""
+    texts: dict[str, str | Assignment] = {}
+    for name, value in values.items():
+        if not isinstance(name, str):
+            raise SettingError(Diagnostic(f"{setting} has the name {quoted(name)}", "give a text"))
+        texts[name] = value if isinstance(value, Assignment) else as_setting_text(f"{setting}[{name!r}]", value)
+    return texts
+
+
+def as_setting_text(what: str, value: object) -> str:
+    """Return the value of a parameter, or a user-defined value, as a file or a command line writes it.
+
+    Raises SettingError for what is neither a text nor a number, truth value or path.
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, Number | Path):
+        return str(value)
+    raise SettingError(Diagnostic(f"{what} is {quoted(value)}", "give a text, a number or a truth value"))
 
 
 def checked_seed(seed: SupportsIndex) -> int:

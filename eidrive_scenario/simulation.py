@@ -31,6 +31,7 @@ from eidrive_scenario.run import (
     Observer,
     RunResult,
     RunSettings,
+    as_setting_text,
     checked_observer,
     checked_seed,
 )
@@ -140,8 +141,11 @@ class Simulation:
         self._is_closed = True
 
     def set_user_value(self, name: str, value: str) -> None:
-        """Give a value to the UserDefinedValueConditions of this name, from the next tick on."""
-        self._user_values[name] = value
+        """Give a value to the UserDefinedValueConditions of this name, from the next tick on.
+
+        Raises SettingError if the value is neither a text nor a number or truth value.
+        """
+        self._user_values[name] = as_setting_text(f"the user-defined value {name!r}", value)
 
     def set_pose(self, name: str, pose: Pose, speed: float = 0.0) -> None:
         """Say where an entity is in the next view, and its speed [m/s].

@@ -169,7 +169,9 @@ def run(
 
 
 def _marked(path: Path, mark: list[str]) -> Path:
-    """The file of one run among several."""
+    """The file of one run among several. A device takes them all, and `atomic_output` refuses a folder."""
+    if not mark or (path.exists() and not path.is_file()):
+        return path
     return path.with_stem("-".join([path.stem, *mark]))
 
 

@@ -61,3 +61,52 @@ def test_time_limit_that_ends_no_run_is_refused(limit: float) -> None:
     """A run up to a time that is not a number would never end."""
     with pytest.raises(SettingError, match=r"time_limit is .*; give a positive number of seconds"):
         RunSettings(time_limit=limit)
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("channel", 5),
+        ("channel", b"ideal"),
+        ("weather", {"cloud_cover": 0.5}),
+        ("detector", 5),
+        ("cooperate", 5),
+        ("cooperate", [5]),
+        ("cooperate", b"RSU"),
+        ("dt", "0.05"),
+        ("dt", True),
+        ("time_limit", "60"),
+        ("time_limit", None),
+        ("parameters", ["EgoSpeed"]),
+        ("parameters", {5: "9"}),
+        ("parameters", {"EgoSpeed": None}),
+        ("user_values", "alarm"),
+        ("user_values", {"alarm": [1]}),
+        ("controllers", {"EgoStack": 5.0j, 1: "external"}),
+        ("controllers", "external"),
+        ("allow_torchscript", "no"),
+        ("allow_torchscript", 1),
+    ],
+)
+def test_settings_of_a_wrong_type_are_refused_by_name(setting: str, value: Any) -> None:
+    """`allow_torchscript="no"` is a true value to Python, and would allow weights to execute any code."""
+    with pytest.raises(SettingError, match=setting):
+        RunSettings(**{setting: value})
+
+
+@pytest.mark.parametrize(("value", "text"), [(True, "true"), (np.False_, "false"), (1.5, "1.5"), (np.int64(3), "3")])
+def test_values_of_python_are_the_texts_of_the_command_line(tmp_path: Path, value: Any, text: str) -> None:
+    """Settings and the command that repeats the run are those of `--user-value flag=TEXT`."""
+    typed = RunSettings(user_values={"flag": value}, parameters={"flag": value})
+    assert typed == RunSettings(user_values={"flag": text}, parameters={"flag": text})
+    result = run_and_save(ONE, settings=RunSettings(user_values={"flag": value}, time_limit=0.2), below=tmp_path)
+    assert result.settings.user_values == {"flag": text}
+    assert f"--user-value flag={text} " in result.command
+
+
+def test_user_value_set_during_a_run_is_a_text() -> None:
+    with Simulation(ONE) as simulation:
+        simulation.set_user_value("flag", True)  # type: ignore[arg-type]
+        assert simulation.storyboard.context.user_values("flag") == "true"
+        with pytest.raises(SettingError, match="the user-defined value 'flag' is None"):
+            simulation.set_user_value("flag", None)  # type: ignore[arg-type]

@@ -38,6 +38,27 @@ def test_an_input_is_not_overwritten(eidrive: Eidrive, own: Path, arguments: lis
     assert list(own.parent.iterdir()) == [own]
 
 
+@pytest.mark.parametrize("option", ["--csv", "--log"])
+@pytest.mark.parametrize("place", ["/", ".", "..", ""])
+@pytest.mark.parametrize("runs", [1, 2])
+def test_folder_as_file_is_refused(eidrive: Eidrive, own: Path, option: str, place: str, runs: int) -> None:
+    """`/`, `.` and an empty text have no last part to which the number of a run could be added."""
+    result = eidrive("run", own, option, place, "--repeat", runs)
+    assert result.exit_code == 2, result.output
+    assert f"{place or '.'}: cannot write: Is a directory" in result.stderr
+    assert "internal error" not in result.output
+
+
+def test_device_takes_the_tables_of_all_runs(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
+    """Two runs through a link to /dev/null leave no file beside it."""
+    sink = tmp_path / "sink"
+    sink.symlink_to("/dev/null")
+    before = sorted(tmp_path.iterdir())
+    result = eidrive("run", own, "--csv", sink, "--repeat", 2, "--time-limit", 0.2)
+    assert result.exit_code == 3, result.output
+    assert sorted(tmp_path.iterdir()) == before
+
+
 def test_a_recording_is_not_overwritten_by_its_page(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
     eidrive("run", own, "--out", tmp_path / "run")
     (recording,) = (tmp_path / "run").rglob("recording.mcap")
