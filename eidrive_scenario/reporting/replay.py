@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.damage import DamageReport
@@ -20,7 +24,7 @@ from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.reported_run import reported
 from eidrive_scenario.reporting.road_drawing import recorded_roads
 from eidrive_scenario.reporting.settings_text import run_facts, shortened
-from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
+from eidrive_scenario.reporting.snapshot import USUAL, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.reporting.top_view import (
     AREA,
     GROUND,
@@ -83,14 +87,15 @@ def make_replay(
     for line in recording.damage:
         report.add(line)
     trace = TraceHash()
-    data = replay_data(_drawable(recording, report, trace), _recorded_roads(recording, report), report)
+    settings = _settings(recording, report)
+    frames, roads = _drawable(recording, report, trace), _recorded_roads(recording, report)
+    data = replay_data(frames, roads, report, _station_settings(settings))
     if not data["times"]:
         reason = "; ".join(report.lines()) or "record the run again"
         raise InputError(Diagnostic("the recording holds no frame that can be read", reason, str(recording.path)))
     if result is not None and result.get("trace_hash") != trace.hexdigest():
         report.add("the result beside the recording has another trace hash: its verdicts may be those of another run")
     name = shortened(recording.scenario or recording.path.stem, 200)
-    settings = _settings(recording, report)
     page = write_page(
         out,
         "replay.html.jinja",
@@ -138,6 +143,18 @@ def _settings(recording: Recording, report: DamageReport) -> dict[str, Any]:
     return settings or {}
 
 
+def _station_settings(settings: Mapping[str, Any]) -> dict[str, AgentSettings]:
+    """The settings that decide how long the stations use a report, of stations that have another than the default."""
+    found: dict[str, AgentSettings] = {}
+    stations = settings.get("stations")
+    for name, station in stations.items() if isinstance(stations, Mapping) else ():
+        timeout = station.get("report_timeout") if isinstance(station, Mapping) else None
+        if timeout not in (None, USUAL.report_timeout):
+            with suppress(ValidationError):  # of a damaged recording
+                found[name] = AgentSettings(report_timeout=timeout)
+    return found
+
+
 def _object(text: str) -> dict[str, Any] | None:
     """A JSON object from the metadata, or None if the text is not one."""
     try:
@@ -172,7 +189,10 @@ class _Budget:
 
 
 def replay_data(
-    frames: Iterable[Frame], roads: RoadDrawing | None = None, report: DamageReport | None = None
+    frames: Iterable[Frame],
+    roads: RoadDrawing | None = None,
+    report: DamageReport | None = None,
+    settings: Mapping[str, AgentSettings] | None = None,
 ) -> dict[str, Any]:
     """What the page's script draws, as plain lists; lengths in metres to a centimetre, angles to a milliradian.
 
@@ -181,14 +201,15 @@ def replay_data(
              probability of existence as sixth; links [sender, delivered], plan's reason
     changes  [time, path, after, why] of the storyboard's transitions
 
-    With a `report`, a frame that cannot be drawn is reported there and left out.
+    With a `report`, a frame that cannot be drawn is reported there and left out. `settings` of stations, by name, state
+    how long these use a report.
     """
     data: dict[str, Any] = {"times": [], "actors": {}, "poses": [], "stations": {}, "changes": []}
     knowledge: dict[str, SnapshotBuilder] = {}
     budget = _Budget(report)
     for frame in frames:
         try:
-            part = _part(frame, knowledge)
+            part = _part(frame, knowledge, settings or {})
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if report is None:
                 raise
@@ -201,7 +222,7 @@ def replay_data(
     return {**data, "roads": _roads(roads or RoadDrawing()), "colours": COLOURS}
 
 
-def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder]) -> dict[str, Any]:
+def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder], settings: Mapping[str, AgentSettings]) -> dict[str, Any]:
     """What a page shows of one frame. The stations' knowledge is carried on."""
     view = frame.view
     boxes, speeds = view.boxes.tolist(), view.speed.tolist()
@@ -211,7 +232,8 @@ def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder]) -> dict[str, Any]
         name: [round(box[0], 2), round(box[1], 2), round(box[6], 3), round(speed, 2)] for name, _, box, speed in shown
     }
     for name in frame.steps:
-        knowledge.setdefault(name, SnapshotBuilder(name))
+        if name not in knowledge:
+            knowledge[name] = SnapshotBuilder(name, settings.get(name, USUAL))
     snapshots = {name: known.observe(frame) for name, known in knowledge.items()}
     return {
         "time": round(view.time, 4),

@@ -13,7 +13,7 @@ from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
 USUAL = AgentSettings()
-"""A station's, which say how long it goes by an old report."""
+"""Settings of a station of which no other settings are known: how long it uses an old report."""
 LINK_LIFETIME = 0.15
 """How long the last message on a link stays in the picture [s]; links of 10 Hz then do not flicker."""
 
@@ -42,10 +42,11 @@ class StationSnapshot:
 
 
 class SnapshotBuilder:
-    """Folds the frames of a run into snapshots of one station."""
+    """Folds the frames of a run into snapshots of one station, which uses reports as long as its settings state."""
 
-    def __init__(self, station: str) -> None:
+    def __init__(self, station: str, settings: AgentSettings = USUAL) -> None:
         self.station = station
+        self._settings = settings
         self._heard: dict[tuple[str, str], ReceivedMessage] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
         self._links: dict[str, LinkEvent] = {}
@@ -64,7 +65,7 @@ class SnapshotBuilder:
         self._heard = {
             key: held
             for key, held in self._heard.items()
-            if now - held.message.detections.time <= _lifetime(held.message) + 1e-9
+            if now - held.message.detections.time <= self._lifetime(held.message) + 1e-9
         }
         self._links = {name: event for name, event in self._links.items() if now - event.sent <= LINK_LIFETIME + 1e-9}
         return StationSnapshot(
@@ -80,8 +81,8 @@ class SnapshotBuilder:
     def _hear(self, received: ReceivedMessage) -> None:
         message = received.message
         if message.objects is not None:
-            usual = USUAL.lifetime(complete=False)
-            said = self._partial.setdefault(message.sender, PartialReportAssembler(usual)).update(message)
+            lifetime = self._settings.lifetime(complete=False)
+            said = self._partial.setdefault(message.sender, PartialReportAssembler(lifetime)).update(message)
             received = replace(received, message=replace(message, detections=said))
         key = message.sender, message.kind
         held = self._heard.get(key)
@@ -96,7 +97,6 @@ class SnapshotBuilder:
         held = self._heard.get((self.station, "cpm"))
         return held.message.detections if held is not None else Detections(now)
 
-
-def _lifetime(message: Message) -> float:
-    """How long a station goes by a message [s]."""
-    return USUAL.lifetime(complete=message.objects is None and message.kind == "cpm")
+    def _lifetime(self, message: Message) -> float:
+        """How long the station uses a message [s]."""
+        return self._settings.lifetime(complete=message.objects is None and message.kind == "cpm")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -130,15 +131,11 @@ class LearnedDetector(Detector):
         """The road users in the pictures of all cameras that were read."""
         self.load_weights()
         assert self._network is not None
-        name, sweep = next(iter(readings.lidars.items()), ("", None))
         self.image_detections = {
             camera: self._network.find(reading.rgb) for camera, reading in readings.cameras.items()
         }
         self._signals = self._lights.read(self.image_detections, readings.cameras)
-        parts = [
-            self._lifted(found, readings, camera, sweep, self._patterns.get(name))
-            for camera, found in self.image_detections.items()
-        ]
+        parts = [self._lifted(found, readings, camera) for camera, found in self.image_detections.items()]
         return merge_duplicates(parts, readings.time)
 
     def in_view(self, boxes: Array, readings: Readings, found: Detections) -> Array:
@@ -150,13 +147,13 @@ class LearnedDetector(Detector):
         """The traffic lights and stop signs of the map that were seen in the last pictures."""
         return self._signals
 
-    def _lifted(
-        self,
-        found: ImageDetections,
-        readings: Readings,
-        camera: str,
-        sweep: LidarReading | None,
-        pattern: Pattern | None,
+    def _lifted(self, found: ImageDetections, readings: Readings, camera: str) -> Detections:
+        """The objects of one picture; of several LiDARs the one that locates an object best."""
+        sweeps: Mapping[str, LidarReading | None] = readings.lidars or {"": None}
+        return most_certain([self._lifted_by(found, readings, camera, *sweep) for sweep in sweeps.items()])
+
+    def _lifted_by(
+        self, found: ImageDetections, readings: Readings, camera: str, lidar: str, sweep: LidarReading | None
     ) -> Detections:
         categories = [object_category(name) for name in found.classes]
         rows = [row for row, category in enumerate(categories) if category is not None]
@@ -169,7 +166,7 @@ class LearnedDetector(Detector):
             time=readings.time,
             ground=float(readings.ego.position[2]),
             surroundings=self._surroundings,
-            pattern=pattern,
+            pattern=self._patterns.get(lidar),
         )
 
 
@@ -222,6 +219,19 @@ def build_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
         message = f"weights {quoted(str(path))} do not fit: they are of {network.name!r}, not of {name!r}"
         raise SettingError(Diagnostic(message, f"take the detector {network.name!r}"))
     return network
+
+
+def most_certain(estimates: Sequence[Detections]) -> Detections:
+    """Of several estimates of the same objects, row by row, those with the least variance of the position."""
+    if len(estimates) == 1:
+        return estimates[0]
+    variances = [np.trace(estimate.covariance, axis1=1, axis2=2) for estimate in estimates]
+    best, rows = np.argmin(variances, axis=0), np.arange(len(estimates[0]))
+    return replace(
+        estimates[0],
+        boxes=np.stack([estimate.boxes for estimate in estimates])[best, rows],
+        covariance=np.stack([estimate.covariance for estimate in estimates])[best, rows],
+    )
 
 
 def merge_duplicates(parts: list[Detections], time: float) -> Detections:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,19 @@ def test_without_a_lidar_the_ground_tells_the_distance(kind: type[LearnedDetecto
     found = built(kind).detect(Readings(readings.time, readings.ego, cameras=readings.cameras))
     away = np.hypot(found.boxes[:, 0] - 15.24, found.boxes[:, 1] - 2.03)
     assert away.min() < 3.0
+
+
+@KINDS
+def test_detect_second_lidar_that_sees_the_car_locates_it(kind: type[LearnedDetector], readings: Readings) -> None:
+    """The first LiDAR has points behind the station only. With its points alone, the ground tells the distance."""
+    front = readings.lidars["lidar"]
+    behind = front.points[:, 0] < 0.0
+    rear = replace(front, points=front.points[behind], intensity=front.intensity[behind])
+    expected = built(kind).detect(readings)
+    found = built(kind).detect(replace(readings, lidars={"rear": rear, "lidar": front}))
+    np.testing.assert_array_equal(found.boxes, expected.boxes)
+    np.testing.assert_array_equal(found.covariance, expected.covariance)
+    assert found.classes == expected.classes
 
 
 @KINDS

@@ -130,3 +130,22 @@ def test_page_size_counts_frames_before_a_station(street: Play, monkeypatch: pyt
     data = replay_data(frames, report=report)
     assert len(json.dumps(data)) < 2**18
     assert any("too large for one page" in line for line in report.lines())
+
+
+@pytest.mark.parametrize(("timeout", "last"), [(0.2, 33), (1.0, 49), (2.0, 69), ("soon", 49), (-1.0, 49)])
+def test_replay_report_timeout_of_station_ends_received_boxes(
+    street: Play, tmp_path: Path, timeout: object, last: int
+) -> None:
+    """Messages are 1 tick late, and all from tick 30 on are lost: the last report was measured at tick 29.
+
+    A timeout of 0.2 s is 4 ticks, so the report is used up to tick 33.
+    """
+    settings = {"stations": {"Ego": {"report_timeout": timeout}}}
+    recorder = Recorder(tmp_path / "run.mcap", metadata={"seed": "1", "settings": json.dumps(settings)})
+    for frame in street(1, frozenset(range(30, 100))):
+        recorder.observe(frame)
+    recorder.close()
+    page = write_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").read_text(encoding="utf-8")
+    data = json.loads(html.fromstring(page).findtext(".//script[@id='data']"))
+    heard = [tick for tick, ego in enumerate(data["stations"]["Ego"]) if ego["heard"]]
+    assert heard[-1] == last
