@@ -271,10 +271,12 @@ class Reader:
 
 
 def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
-    """Keeps the visible parameters for references inside a text; a value that begins with one is resolved already."""
-    content = values.get("content")
-    text = content if isinstance(content, str) else (node.get("value") or "")
-    if "$" in text and (content is not None or not text.startswith("$")):
+    """Keep the visible parameters for references inside a text, or inside the file that a command names.
+
+    A property whose value begins with a reference is resolved already.
+    """
+    text = node.get("value") or ""
+    if "content" in values or ("$" in text and not text.startswith("$")):
         values["scope"] = scope
 
 

@@ -45,10 +45,10 @@ def load_profile(
     """A checked profile: by name, by path, from YAML text, or from a mapping. None stands for no cooperation.
 
     A text that is a mapping in YAML (`{delay: {kind: constant, seconds: 0.3}}`) is read as such; any other is the name
-    of a `.yaml` file in one of `folders` (first match), or a path, relative to them or to the working directory.
-    `origin` and `line` say where the source itself was written; `scope` holds the parameters to which settings refer as
-    `$name` or `${expression}`, or the text itself, which then is a name or a path. Raises SettingError with file, line
-    and key.
+    of a `.yaml` file in one of `folders` (first match), or a path: relative to the folder of the file `origin`, to the
+    working directory or to `folders` (first match). `origin` and `line` say where the source itself was written;
+    `scope` holds the parameters to which settings refer as `$name` or `${expression}`, or the text itself, which then
+    is a name or a path. Raises SettingError with file, line and key.
     """
     if isinstance(source, Mapping):
         return _parse(source, "custom", origin or "channel", line, {}, scope)
@@ -67,7 +67,7 @@ def load_profile(
         if not text:
             raise SettingError(Diagnostic("the channel has no name", "write `ideal`, or `none`", origin, line))
         source = Path(text)
-    path = _find(source, folders)
+    path = _find(source, Path(origin).parent, folders)
     if path is None:
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
@@ -102,9 +102,9 @@ def _profiles(folder: Path) -> list[Path]:
     return [path for suffix in SUFFIXES for path in folder.glob(f"*{suffix}")]
 
 
-def _find(source: Path, folders: Sequence[Path]) -> Path | None:
+def _find(source: Path, beside: Path, folders: Sequence[Path]) -> Path | None:
     if source.suffix in SUFFIXES:
-        candidates = [source, *(folder / source for folder in folders)]
+        candidates = [beside / source, source, *(folder / source for folder in folders)]
     else:
         candidates = [folder / f"{source}{suffix}" for folder in folders for suffix in SUFFIXES]
     return next((path for path in candidates if is_regular_file(path)), None)

@@ -158,6 +158,28 @@ def test_channel_file_refers_to_parameters_of_the_scenario(make: Make, tmp_path:
         run_file(make("ideal"), settings=settings)
 
 
+def test_channel_file_that_the_scenario_names_refers_to_its_parameters(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file is beside the scenario, the run starts elsewhere, where a file of that name is another one."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "mine.yaml").write_text("model: composed\n")
+    monkeypatch.chdir(elsewhere)
+    profile = tmp_path / "mine.yaml"
+    profile.write_text("model: composed\ndelay:\n  kind: constant\n  seconds: ${$Latency + 0.05}\n")
+    path = make("mine.yaml")
+    assert delays(path).links[LINK].mean_delay == pytest.approx(0.15)
+    varied = delays(path, Latency="0.25")
+    assert varied.links[LINK].mean_delay == pytest.approx(0.3)
+    assert varied.settings.channel_profile is not None
+    assert varied.settings.channel_profile["delay"]["seconds"] == pytest.approx(0.3)
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
+    profile.write_text("model: composed\ndelay:\n  kind: constant\n  seconds: $Latncy\n")
+    with pytest.raises(InputError, match=r"mine.yaml:4: setting 'delay.seconds': unknown parameter \$Latncy; did you"):
+        delays(path)
+
+
 def test_text_parameter_cannot_add_settings(make: Make) -> None:
     path = make("{delay: {kind: constant, seconds: $Profile}}")
     forged = "0.1}, loss: {kind: bernoulli, probability: 1.0"

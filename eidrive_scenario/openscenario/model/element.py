@@ -92,7 +92,7 @@ def text() -> Any:
 def visible_parameters() -> Any:
     """A field for the parameters (a Scope) that are visible to the references inside a text of the element.
 
-    None where the text has no reference, or was one as a whole, which is resolved when the file is read.
+    None where a property has no reference, or is one as a whole, which is resolved when the file is read.
     """
     return field(default=None, compare=False, repr=False)
 
