@@ -54,6 +54,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {message}", pytrace=False)
         return
     try:
+        if sum(own.name == marker.name for own in metafunc.definition.own_markers) > 1:
+            raise ValueError('it has several markers scenario; give one all patterns: scenario("a.xosc", "b.xosc")')
         channels, seeds = _read_marker(marker)
         paths = [path for pattern in marker.args for path in _matches(pattern, metafunc)]
     except ValueError as error:

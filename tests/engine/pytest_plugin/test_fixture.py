@@ -147,3 +147,16 @@ def test_a_marked_test_that_plays_nothing_is_told(project: pytest.Pytester) -> N
     result.stdout.fnmatch_lines(["*::test_alone: it has the marker scenario, and does not take the fixture *"])
     whole = "pytestmark = pytest.mark.scenario('drives/first.xosc')\ndef test_beside_others(): pass"
     run(project, whole).assert_outcomes(passed=1)
+
+
+def test_second_marker_on_a_test_is_refused(project: pytest.Pytester) -> None:
+    """pytest's closest marker would count, and the scenarios of the other one would be left out without a word."""
+    text = """
+@pytest.mark.scenario("drives/first.xosc")
+@pytest.mark.scenario("drives/second.xosc")
+def test_both(run_scenario):
+    run_scenario()
+"""
+    result = run(project, text)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*it has several markers scenario*"])
