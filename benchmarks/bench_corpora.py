@@ -28,9 +28,9 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.csv_writer import neutralized
+from eidrive_scenario.recording.text.csv_writer import neutralized
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model import Road
+from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.simulation import RunSettings, Simulation
 
 ESMINI_STEP = 0.01

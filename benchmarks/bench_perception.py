@@ -24,9 +24,9 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.perception.lidar_detector import LidarDetector
-from eidrive_scenario.perception.tracker_settings import TrackerSettings
-from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.perception.lidar.detector import LidarDetector
+from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed

@@ -28,7 +28,7 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.trace_hash import TraceHash
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
-from eidrive_scenario.v2x.message import Message, StationState
+from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, LineOfSightStates, RadioEnvironment

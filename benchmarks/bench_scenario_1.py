@@ -34,8 +34,8 @@ import numpy as np
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed
-from eidrive_scenario.world.bodies import quaternion
-from eidrive_scenario.world.bullet import bullet
+from eidrive_scenario.world.physics.bodies import quaternion
+from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.view import ActorState
 
 SCENARIO = "coop/scenario_1"

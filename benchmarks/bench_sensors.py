@@ -16,7 +16,7 @@ import cv2
 
 from eidrive_scenario.library import names
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.reporting.street_view import look_at
+from eidrive_scenario.reporting.drawing.street_view import look_at
 from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.lidar import Lidar

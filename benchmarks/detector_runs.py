@@ -16,7 +16,7 @@ import torch
 from eidrive_scenario.library import library_path, resolve_scenario
 from eidrive_scenario.perception.learned.detector import LearnedDetector
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
-from eidrive_scenario.perception.lidar_detector import LidarDetector
+from eidrive_scenario.perception.lidar.detector import LidarDetector
 from eidrive_scenario.sensing.camera import Camera
 from eidrive_scenario.sensing.lidar import Lidar
 from eidrive_scenario.simulation import RunSettings, Simulation, load_for_seed

@@ -2,11 +2,10 @@
 
 from eidrive_scenario import traffic
 from eidrive_scenario.detections import CLASSES, Detections
-from eidrive_scenario.driving.overrides import Override
-from eidrive_scenario.driving.planner import Planner
-from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.step import AgentStep, Goal, Plan
+from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.errors import (
     Diagnostic,
     EidriveError,
@@ -18,29 +17,28 @@ from eidrive_scenario.errors import (
     WallLimitError,
     suggestion,
 )
-from eidrive_scenario.fusion.method import FusionMethod, Report
-from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
-from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.openscenario.trajectory_times import has_times
-from eidrive_scenario.perception.detector import Detector, DetectorContext
-from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.map_context import MapContext
-from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.criterion import (
+from eidrive_scenario.evaluation.criterion import (
     Criterion,
     CriterionSettings,
     Verdict,
     actor_never_present,
     evaluate_criteria,
 )
+from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
+from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.trajectory_times import has_times
+from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.geometry.map_context import MapContext
+from eidrive_scenario.perception.lifting.lifting import lift
+from eidrive_scenario.randomness import generator
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.requests import Goal, Override
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, LidarReading, Readings, SignalReading
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
-from eidrive_scenario.storyboard.actor import Actor, is_agent_controller
-from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.commands import Commands, CustomCommand
-from eidrive_scenario.storyboard.condition import (
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.context.condition import (
     Condition,
     EntityCondition,
     Measure,
@@ -49,8 +47,15 @@ from eidrive_scenario.storyboard.condition import (
     relation,
     satisfies_rule,
 )
-from eidrive_scenario.storyboard.controller_model import ControllerModel
-from eidrive_scenario.storyboard.distances import (
+from eidrive_scenario.storyboard.context.controller_model import ControllerModel
+from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_controller
+from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
+from eidrive_scenario.storyboard.kinematics.route import build_route
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress, sample_trajectory
+from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
+from eidrive_scenario.storyboard.positions.distances import (
     closing_speed,
     distance,
     entity_box,
@@ -58,27 +63,22 @@ from eidrive_scenario.storyboard.distances import (
     resolve_distance_type,
     same_way,
 )
-from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.element_states import ElementStateObserver, ElementStates
-from eidrive_scenario.storyboard.environments import merge_environment
-from eidrive_scenario.storyboard.motion import STEEPEST, LateralStep, Motion, ResolvedPosition
-from eidrive_scenario.storyboard.positions import referenced_entities, resolve_position, trajectory_of
-from eidrive_scenario.storyboard.random_routes import random_route, uniform_branch_selector
-from eidrive_scenario.storyboard.road_positions import count_lanes, facing
-from eidrive_scenario.storyboard.route import build_route
-from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
-from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.storyboard.trajectory import TrajectoryCurve, TrajectoryProgress, sample_trajectory
-from eidrive_scenario.storyboard.transition_profile import TransitionProfile
+from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position, trajectory_of
+from eidrive_scenario.storyboard.positions.road_positions import count_lanes, facing
+from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
+from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
+from eidrive_scenario.storyboard.state.environments import merge_environment
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock, OutcomeColumns
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock, OutcomeColumns
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.environment import Environment
-from eidrive_scenario.world.multi_axle import turning_wheelbase
+from eidrive_scenario.world.physics.multi_axle import turning_wheelbase
 from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [

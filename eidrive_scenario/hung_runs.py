@@ -14,10 +14,10 @@ from functools import cache
 from pathlib import Path
 from types import FrameType
 
-from eidrive_scenario.attribution import wall_limit_error
 from eidrive_scenario.errors import ExtensionPlace, WallLimitError
 from eidrive_scenario.registry import GROUPS, registry, singular
 from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.simulation.attribution import wall_limit_error
 from eidrive_scenario.wall_limit import Limit
 
 _MODULES = ("simulation.py", "inspection.py")

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
-from eidrive_scenario.files import MIB, absolute, is_folder, is_regular_file, read_regular_file
-from eidrive_scenario.untrusted_xml import first_elements
+from eidrive_scenario.files.bounded import MIB, absolute, is_folder, is_regular_file, read_regular_file
+from eidrive_scenario.files.untrusted_xml import first_elements
 
 Kind = Literal["channels", "weather"]
 Definition = Literal["scenario", "catalog", "distribution", "roads", "unreadable", "other"]

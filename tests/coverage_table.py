@@ -238,6 +238,7 @@ def _elements() -> Iterator[type[Element]]:
             yield value
 
 
+MODEL = ROOT / "eidrive_scenario" / "openscenario" / "model"
 PRINTED = ("library_catalogs.py",)
 """Modules that print attributes and give them no effect."""
 
@@ -249,9 +250,7 @@ def unread() -> set[str]:
     what `eidrive list` prints.
     """
     code = (path for room in ("eidrive_scenario", "behaviors", "criteria") for path in (ROOT / room).rglob("*.py"))
-    texts = (
-        path.read_text(encoding="utf-8") for path in code if path.parent.name != "model" and path.name not in PRINTED
-    )
+    texts = (path.read_text(encoding="utf-8") for path in code if path.parent != MODEL and path.name not in PRINTED)
     words = {word for text in texts for word in re.findall(r"\w+", text)} | {"line", "source"}
     elements = {element.__name__ for element in _elements()}
     places = Counter(

@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import affine_grid, avg_pool2d, grid_sample
 
-from eidrive_scenario.perception.learned.boxes import centred
-from eidrive_scenario.perception.learned.targets import IGNORED, PADDING, Targets
+from eidrive_scenario.perception.learned.networks.boxes import centred
+from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets
 
 SMALLEST_SIDE = 3.0
 """Boxes that come out smaller are ignored [px]."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.perception.learned.average_precision import match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
-from eidrive_scenario.perception.learned.suppression import overlap
+from eidrive_scenario.perception.learned.networks.suppression import overlap
 from training.dataset import Dataset
 from training.scoring import VEHICLES, Judged
 from training.tables import Table, number

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from eidrive_scenario.roads import RoadNetwork, curves
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model import curves
 from eidrive_scenario.world import World
 from xosc.roads import make_roads
 from xosc.roads.make_roads import Crossing, LaneSpec, Street, add, add_lane, add_mark, add_road

@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 from torch import nn
 
 from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, best_confidence, match
-from eidrive_scenario.perception.learned.boxes import centred
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
-from eidrive_scenario.perception.learned.ssd import default_boxes
-from eidrive_scenario.perception.learned.ssd_loss import SsdLoss
-from eidrive_scenario.perception.learned.suppression import suppress
-from eidrive_scenario.perception.learned.targets import IGNORED, PADDING, Targets
+from eidrive_scenario.perception.learned.networks.boxes import centred
+from eidrive_scenario.perception.learned.networks.ssd import default_boxes
+from eidrive_scenario.perception.learned.networks.ssd_loss import SsdLoss
+from eidrive_scenario.perception.learned.networks.suppression import suppress
+from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets
+from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCALE, STRIDES, Anchors, YoloV5
+from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss
 from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates
 from eidrive_scenario.perception.learned.weights import Description, save
-from eidrive_scenario.perception.learned.yolov5 import ANCHORS_PER_SCALE, STRIDES, Anchors, YoloV5
-from eidrive_scenario.perception.learned.yolov5_loss import YoloLoss
 from training.augment import moved, recoloured
 from training.dataset import Dataset
 

@@ -18,7 +18,7 @@ from eidrive_scenario.library import definition, resolve_scenario
 from eidrive_scenario.wall_limit import LimitReached, check_wall_limit, limit_wall_time
 
 if TYPE_CHECKING:
-    from eidrive_scenario.experiments.scenario_checks import CheckReport
+    from eidrive_scenario.checks.scenario_checks import CheckReport
 
 _SUFFIX = ".xosc"
 _ROADS = ".xodr"
@@ -40,7 +40,7 @@ def check(
 
     Findings end with the rule that made them: `eidrive list checks` names all rules.
     """
-    from eidrive_scenario.experiments.distribution_checks import DistributionCheckReport
+    from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
 
     hung = HungCheck()
     if wall_limit is not None:
@@ -80,9 +80,9 @@ def check(
 
 def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
     """What is wrong with a file of any kind. Raises WallLimitError if that takes longer than the limit [s]."""
-    from eidrive_scenario.attribution import report_extension
-    from eidrive_scenario.experiments.distribution_checks import check_distribution
-    from eidrive_scenario.experiments.scenario_checks import check_road_file, check_scenario, inspect_catalog
+    from eidrive_scenario.checks.distribution_checks import check_distribution
+    from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario, inspect_catalog
+    from eidrive_scenario.simulation.attribution import report_extension
 
     with limit_wall_time(wall_limit):
         try:

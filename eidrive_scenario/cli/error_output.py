@@ -79,7 +79,7 @@ def _attributed(error: BaseException) -> BaseException:
     """The error, or that of the extension which raised it."""
     if isinstance(error, EidriveError):
         return error
-    from eidrive_scenario.attribution import report_extension
+    from eidrive_scenario.simulation.attribution import report_extension
 
     try:
         report_extension(error)

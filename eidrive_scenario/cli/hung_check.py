@@ -22,7 +22,7 @@ class HungCheck:
 
     def end(self, limit: Limit, frame: FrameType | None) -> None:
         """Report a check that executes this frame, and end the process."""
-        from eidrive_scenario.attribution import wall_limit_error
+        from eidrive_scenario.simulation.attribution import wall_limit_error
 
         try:
             print_error(wall_limit_error(frame, limit.seconds), self.file)

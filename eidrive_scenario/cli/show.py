@@ -43,7 +43,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
     elif what is Names.catalogs:
         lines = _catalog_lines()
     elif what is Names.checks:
-        from eidrive_scenario.experiments.rules import ALL_RULES
+        from eidrive_scenario.checks.registry import ALL_RULES
 
         width = max(len(rule.name) for rule in ALL_RULES)
         lines = [f"{rule.name:<{width}}  {rule.level.value:<7}  {rule.summary}" for rule in ALL_RULES]
@@ -84,7 +84,7 @@ def tree(
     from eidrive_scenario.cli.verdicts import console
     from eidrive_scenario.library import resolve_scenario
     from eidrive_scenario.openscenario import load_scenario
-    from eidrive_scenario.reporting.storyboard_picture import write_storyboard_picture
+    from eidrive_scenario.reporting.storyboard_diagram.picture import write_storyboard_picture
     from eidrive_scenario.roads import RoadNetwork
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
@@ -133,7 +133,7 @@ def report(
 ) -> None:
     """Write one page over many runs."""
     from eidrive_scenario.recording.run_files import read_result, result_paths, unfinished_runs
-    from eidrive_scenario.reporting.report import write_report
+    from eidrive_scenario.reporting.run_report.report import write_report
 
     files = list(result_paths(runs))
     results = [read_result(path) for path in files]

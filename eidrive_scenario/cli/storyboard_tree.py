@@ -5,10 +5,10 @@ from __future__ import annotations
 from rich.text import Text
 from rich.tree import Tree
 
-from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.elements import ManeuverGroupElement, StoryElement
-from eidrive_scenario.storyboard.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.storyboard.tree.elements import ManeuverGroupElement, StoryElement
+from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
 
 _KINDS = {"maneuverGroup": "maneuver group"}
 

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import typer
 
 from eidrive_scenario.cli.error_output import BROKEN
-from eidrive_scenario.files import file_in_memory
+from eidrive_scenario.files.bounded import file_in_memory
 from eidrive_scenario.wall_limit import LastResort, Limit, set_last_resort
 
 _FORWARDED = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.experiments.reproduction import reproduction_lines
-from eidrive_scenario.recording import Verdict
 from eidrive_scenario.simulation import ABORTED, FAILED, PASSED, RunResult
 
 _OUTCOMES = {PASSED: ("passed", "bold green"), FAILED: ("failed", "bold red"), ABORTED: ("ran out of time", "bold red")}

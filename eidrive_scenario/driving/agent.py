@@ -11,21 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import VehicleController
-from eidrive_scenario.driving.message_generator import MessageGenerator
-from eidrive_scenario.driving.partial_reports import PartialReportAssembler
-from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.communication.message_generator import MessageGenerator
+from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
+from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.result_checks import check_followed, check_plan
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.shared_points import PointCloudSharing
-from eidrive_scenario.driving.step import AgentStep, Goal, Plan
+from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
 from eidrive_scenario.registry import is_built_in
+from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, Readings
-from eidrive_scenario.v2x.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
 
 Array = NDArray[np.float64]

@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.control import VehicleController
-from eidrive_scenario.driving.message_generator import MessageGenerator
-from eidrive_scenario.driving.planner import Planner
+from eidrive_scenario.driving.communication.message_generator import MessageGenerator
+from eidrive_scenario.driving.communication.shared_points import PointCloudSharing
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.settings import NO_PLANNER, AgentSettings
-from eidrive_scenario.driving.shared_points import PointCloudSharing
 from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.localization import Localizer, motion_noise
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.tracker_settings import TrackerSettings
-from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.settings import Settings, parse_settings
-from eidrive_scenario.v2x.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 
 _SEEING = frozenset({"truth", "camera", "lidar"})

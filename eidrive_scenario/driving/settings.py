@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, mo
 
 from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
 from eidrive_scenario.openscenario.model.controllers import Controller
-from eidrive_scenario.openscenario.references import resolve_references
-from eidrive_scenario.perception.tracker_settings import TrackerSettings, tracker_setting
+from eidrive_scenario.openscenario.values.references import resolve_references
+from eidrive_scenario.perception.tracking.settings import TrackerSettings, tracker_setting
 from eidrive_scenario.registry import registry
 from eidrive_scenario.sensing.settings import (
     KINDS,
@@ -22,7 +22,7 @@ from eidrive_scenario.sensing.settings import (
     TruthSettings,
 )
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
-from eidrive_scenario.v2x.clock import StationClock
+from eidrive_scenario.v2x.messages.clock import StationClock
 
 MODULE = "eidrive"
 """The value of the property `module` by which a controller is one of ours."""

@@ -16,7 +16,7 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.learned.weight_files import ALLOW_TORCHSCRIPT, TORCHSCRIPT_SUFFIX
 from eidrive_scenario.registry import registry
 from eidrive_scenario.settings import load_yaml
-from eidrive_scenario.v2x.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.specs import actor_spec
 
 

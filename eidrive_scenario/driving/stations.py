@@ -9,27 +9,28 @@ from pathlib import Path
 
 from eidrive_scenario.driving.agent import Agent
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
-from eidrive_scenario.driving.overrides import ControlOverrides, Overrides
-from eidrive_scenario.driving.radio_line_of_sight import antenna_position, line_of_sight_states
+from eidrive_scenario.driving.communication.radio_line_of_sight import antenna_position, line_of_sight_states
+from eidrive_scenario.driving.control.overrides import ControlOverrides
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.station_declarations import declared_detectors, declared_encoders, declared_settings
-from eidrive_scenario.driving.step import AgentStep, Goal
+from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.parameters import Scope
+from eidrive_scenario.openscenario.values.parameters import Scope
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.registry import is_built_in
+from eidrive_scenario.requests import Goal, Overrides
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.channel_checks import check_delivered, check_interval, check_statistics, check_told
-from eidrive_scenario.v2x.link_events import LinkEvents
-from eidrive_scenario.v2x.link_statistics import LinkStatistics
-from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control
 from eidrive_scenario.world.view import WorldView

@@ -10,29 +10,10 @@ from numpy.typing import NDArray
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.sensing.readings import EgoState
-from eidrive_scenario.v2x.message import Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
 from eidrive_scenario.world.actor import Control
 
 Array = NDArray[np.float64]
-
-
-@fast_frozen
-@dataclass(frozen=True)
-class Goal:
-    """What the storyboard asks of a driven vehicle; None leaves it to the agent's own settings.
-
-    speed      to have now [m/s]
-    acceleration  with which that speed is changing [m/s²]
-    path       (M, 3) points of a line to drive along, to its end [m], world frame
-    lap        (M, 3) points that follow the path's end, again and again [m]; its end is its start
-    waypoints  (M, 3) points to pass where there is no path, the last is the destination [m]; the agent finds the way
-    """
-
-    speed: float | None = None
-    acceleration: float = 0.0
-    path: Array | None = None
-    waypoints: Array | None = None
-    lap: Array | None = None
 
 
 @fast_frozen

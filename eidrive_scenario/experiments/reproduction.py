@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.library import library_path, name_of
-from eidrive_scenario.openscenario.parameters import Assignment
-from eidrive_scenario.run import RunResult, RunSettings
+from eidrive_scenario.openscenario.values.parameters import Assignment
+from eidrive_scenario.simulation.run import RunResult, RunSettings
 from eidrive_scenario.v2x.profile import SUFFIXES
 
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
-from eidrive_scenario.recording.atomic_files import partial_path
-from eidrive_scenario.recording.file_lock import FileLock
+from eidrive_scenario.files.atomic import partial_path
+from eidrive_scenario.files.lock import FileLock
 from eidrive_scenario.recording.run_files import PICTURES, RECORDING, RESULT, read_result
 from eidrive_scenario.resolved_settings import ResolvedSettings
 

@@ -13,11 +13,11 @@ from typing import Any
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.reproduction import command_of
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
+from eidrive_scenario.files.atomic import atomic_output, exclusive
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
-from eidrive_scenario.openscenario.parameters import Assignment
+from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, Recorder, RunLog
-from eidrive_scenario.recording.atomic_files import atomic_output, exclusive
 from eidrive_scenario.recording.run_files import (
     PICTURES,
     RECORDING,
@@ -26,10 +26,10 @@ from eidrive_scenario.recording.run_files import (
     recording_in,
     result_of,
 )
-from eidrive_scenario.recording.run_log import STANDARD_OUTPUT
+from eidrive_scenario.recording.text.run_log import STANDARD_OUTPUT
 from eidrive_scenario.roads.reading.document import read_road_text
-from eidrive_scenario.run import checked_seed
 from eidrive_scenario.simulation import DEFAULT_SEED, RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [

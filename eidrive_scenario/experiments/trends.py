@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.radio_line_of_sight import line_of_sight_states
+from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
 from eidrive_scenario.fusion.average import AverageFusion
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.learned.average_precision import average_precision, match_by_share
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.message import Message, StationState
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.propagation.gains import blockage_moments, highway_los
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.packet_error import CURVES
 from eidrive_scenario.v2x.radio.profile import RadioProfile
-from eidrive_scenario.v2x.radio.propagation import blockage_moments, highway_los
 from eidrive_scenario.v2x.radio_environment import LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement

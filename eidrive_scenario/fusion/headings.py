@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.perception.motion_models import HEADING_DEVIATION, TURN_DENSITY, UNKNOWN_TURN
+from eidrive_scenario.perception.tracking.motion_models import HEADING_DEVIATION, TURN_DENSITY, UNKNOWN_TURN
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.message import StationState
+from eidrive_scenario.v2x.messages.message import StationState
 
 
 @fast_frozen

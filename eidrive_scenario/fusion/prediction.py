@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY
+from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from eidrive_scenario.fusion.headings import first_heading, known_turn, predicte
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, assigned_pairs, gated_pairs
 from eidrive_scenario.fusion.prediction import predict
-from eidrive_scenario.perception.existence import LIFETIME, detected, likelihood_ratio
-from eidrive_scenario.perception.existence import missed as after_miss
-from eidrive_scenario.perception.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
-from eidrive_scenario.perception.track_association import LEAST_DEVIATION, UNKNOWN_DEVIATION
+from eidrive_scenario.perception.tracking.association import LEAST_DEVIATION, UNKNOWN_DEVIATION
+from eidrive_scenario.perception.tracking.existence import LIFETIME, detected, likelihood_ratio
+from eidrive_scenario.perception.tracking.existence import missed as after_miss
+from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 
 Array = NDArray[np.float64]
 Table = NDArray[np.void]

@@ -1,8 +1,8 @@
 """OpenSCENARIO XML 1.0 to 1.3: files into a frozen, checked Scenario; distributions of parameter values into runs."""
 
 from eidrive_scenario.openscenario.distributions import ConcreteRun, DistributionExpansion, load_distribution
-from eidrive_scenario.openscenario.document import read_document
-from eidrive_scenario.openscenario.parsing import Source, text_of
+from eidrive_scenario.openscenario.reading.document import read_document
+from eidrive_scenario.openscenario.reading.parsing import Source, text_of
 from eidrive_scenario.openscenario.scenario import EntityObject, Scenario, load_scenario
 
 __all__ = [

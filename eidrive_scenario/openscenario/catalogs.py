@@ -10,18 +10,18 @@ from pathlib import Path
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, shortened, suggestion
-from eidrive_scenario.files import is_folder, is_regular_file
+from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.library import LIBRARY_FOLDER, library_path, place_of
 from eidrive_scenario.openscenario.budget import MAX_NESTED_REFERENCES, BudgetError
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.model import Catalog, CatalogLocations, CatalogReference, Element
-from eidrive_scenario.openscenario.parameters import Assignment, Parameter, Scope
-from eidrive_scenario.openscenario.parsing import Document, line_of, open_document
-from eidrive_scenario.openscenario.reader import FoundReference, Reader
-from eidrive_scenario.openscenario.scalars import Version
-from eidrive_scenario.openscenario.schema import rules
-from eidrive_scenario.openscenario.workarounds import apply_workarounds
+from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
+from eidrive_scenario.openscenario.reading.parsing import Document, line_of, open_document
+from eidrive_scenario.openscenario.reading.reader import FoundReference, Reader
+from eidrive_scenario.openscenario.reading.schema import rules
+from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
+from eidrive_scenario.openscenario.values.parameters import Assignment, Parameter, Scope
+from eidrive_scenario.openscenario.values.scalars import Version
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from eidrive_scenario.library import library_path
-from eidrive_scenario.openscenario.document import read_document
 from eidrive_scenario.openscenario.model import Element, MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.reading.document import read_document
 
 CATALOGS = "catalogs"
 """Their folder in the library."""

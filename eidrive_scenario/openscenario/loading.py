@@ -9,9 +9,9 @@ from pathlib import Path
 from eidrive_scenario.errors import ErrorCollector
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario.distributions import ConcreteRun
-from eidrive_scenario.openscenario.parameters import Assignment, as_assignments
-from eidrive_scenario.openscenario.parsing import Source
+from eidrive_scenario.openscenario.reading.parsing import Source
 from eidrive_scenario.openscenario.scenario import Scenario, load_scenario
+from eidrive_scenario.openscenario.values.parameters import Assignment, as_assignments
 from eidrive_scenario.openscenario.variation import drawn_parameters
 
 

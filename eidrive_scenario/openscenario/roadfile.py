@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from eidrive_scenario.errors import shortened, suggestion
-from eidrive_scenario.files import is_folder, is_regular_file
+from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import File, RoadNetwork

@@ -12,7 +12,6 @@ from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.library import from_library
 from eidrive_scenario.openscenario.catalogs import CatalogLibrary
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.document import read_root
 from eidrive_scenario.openscenario.model import (
     BoundingBox,
     CatalogReference,
@@ -32,11 +31,12 @@ from eidrive_scenario.openscenario.model import (
     VariableDeclarations,
     Vehicle,
 )
-from eidrive_scenario.openscenario.parameters import Assignment, Scope, as_assignments
-from eidrive_scenario.openscenario.parsing import Source, open_document
+from eidrive_scenario.openscenario.reading.document import read_root
+from eidrive_scenario.openscenario.reading.parsing import Source, open_document
 from eidrive_scenario.openscenario.roadfile import find_road_file
-from eidrive_scenario.openscenario.rules import check_rules
-from eidrive_scenario.openscenario.scenario_objects import scenario_objects
+from eidrive_scenario.openscenario.validation.rules import check_rules
+from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
+from eidrive_scenario.openscenario.values.parameters import Assignment, Scope, as_assignments
 
 EntityObject: TypeAlias = Vehicle | Pedestrian | MiscObject
 

@@ -16,8 +16,8 @@ from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, suggestion
 from eidrive_scenario.openscenario.model import CustomCommandAction
-from eidrive_scenario.openscenario.references import resolve_references, without
 from eidrive_scenario.openscenario.scenario import Scenario
+from eidrive_scenario.openscenario.values.references import resolve_references, without
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.settings import Settings, load_yaml, parse_settings
 

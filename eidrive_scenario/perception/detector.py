@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.learned.image_network import ImageDetections
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings

@@ -13,7 +13,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
-from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.readings import Readings, SignalReading
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.roads import RoadNetwork, Signal
-from eidrive_scenario.roads.model import SignalPlace
-from eidrive_scenario.roads.signal_states import lamp_colours, must_stop
+from eidrive_scenario.roads.model.road_map import SignalPlace
+from eidrive_scenario.roads.model.signal_states import lamp_colours, must_stop
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import is_stop_sign
 

@@ -16,8 +16,8 @@ from eidrive_scenario.pytest_plugin.options import RunVariant
 from eidrive_scenario.resolved_settings import ResolvedSettings, canonical_json
 
 if TYPE_CHECKING:
+    from eidrive_scenario.evaluation import Verdict
     from eidrive_scenario.openscenario import ConcreteRun, Source
-    from eidrive_scenario.recording import Verdict
     from eidrive_scenario.simulation import RunResult
 
 Properties = list[tuple[str, object]]
@@ -155,7 +155,7 @@ def failure_text(error: BaseException) -> str | None:
         return None
     lines = [str(error), *notes]
     if isinstance(error, ExtensionError):
-        from eidrive_scenario.attribution import traceback_from_extension
+        from eidrive_scenario.simulation.attribution import traceback_from_extension
 
         lines += ["", traceback_from_extension(error)]
     return "\n".join(lines).rstrip()

@@ -1,25 +1,16 @@
-"""The frame; what a run leaves behind, and reading it again."""
+"""Frames, trace hashes and recordings of runs."""
 
 from eidrive_scenario.recording.camera_images import CameraImageWriter
-from eidrive_scenario.recording.criterion import (
-    Criterion,
-    CriterionSettings,
-    Verdict,
-    actor_never_present,
-    evaluate_criteria,
-)
-from eidrive_scenario.recording.csv_writer import CsvWriter
-from eidrive_scenario.recording.explanation import Explanation
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.recording.recording import Recording, read_recording
-from eidrive_scenario.recording.run_log import RunLog
+from eidrive_scenario.recording.text.csv_writer import CsvWriter
+from eidrive_scenario.recording.text.explanation import Explanation
+from eidrive_scenario.recording.text.run_log import RunLog
 from eidrive_scenario.recording.trace_hash import TraceHash
 
 __all__ = [
     "CameraImageWriter",
-    "Criterion",
-    "CriterionSettings",
     "CsvWriter",
     "Explanation",
     "Frame",
@@ -27,8 +18,5 @@ __all__ = [
     "Recording",
     "RunLog",
     "TraceHash",
-    "Verdict",
-    "actor_never_present",
-    "evaluate_criteria",
     "read_recording",
 ]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.stations import Stations
+from eidrive_scenario.files.atomic import create
 from eidrive_scenario.geometry import box_corners
-from eidrive_scenario.perception.learned.image_network import ImageDetections
-from eidrive_scenario.perception.projection import pixels
-from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.perception.geometry.projection import pixels
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.sensing.readings import CameraReading
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.records import fast_frozen
-from eidrive_scenario.storyboard.states import StateChange
-from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.storyboard.state.states import StateChange
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import zstandard
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files import is_regular_file
+from eidrive_scenario.files.bounded import is_regular_file
 from eidrive_scenario.recording.damage import DamageReport
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from eidrive_scenario.errors import SimulationError
-from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.seal import NAME as SEAL

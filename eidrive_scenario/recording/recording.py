@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording import mcap_records as mcap
-from eidrive_scenario.recording.bounded_json import load_json
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.files import read_regular_file
-from eidrive_scenario.recording.atomic_files import PARTIAL, partial_path
-from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.files.atomic import PARTIAL, partial_path
+from eidrive_scenario.files.bounded import read_regular_file
+from eidrive_scenario.files.bounded_json import load_json
 
 RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
 """Names of the files in a run's folder."""

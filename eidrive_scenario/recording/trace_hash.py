@@ -12,8 +12,8 @@ import numpy as np
 
 from eidrive_scenario.recording.codec import Codec, codec
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
-from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 

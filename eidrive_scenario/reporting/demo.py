@@ -35,13 +35,13 @@ from eidrive_scenario.experiments.paper import (
 from eidrive_scenario.experiments.repetitions import Job, jobs_of, run_jobs
 from eidrive_scenario.experiments.single_run import as_json_text
 from eidrive_scenario.experiments.tables import render
+from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import resolve_scenario
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.recording.atomic_files import create
 from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, write_demo
-from eidrive_scenario.reporting.key_frames import KeyFrames, Story
-from eidrive_scenario.reporting.road_drawing import road_drawing
-from eidrive_scenario.reporting.street_view import driver_view, helper_view, street_picture
+from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
+from eidrive_scenario.reporting.drawing.road_drawing import road_drawing
+from eidrive_scenario.reporting.drawing.street_view import driver_view, helper_view, street_picture
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
 from eidrive_scenario.world.specs import actor_spec

@@ -22,10 +22,10 @@ from eidrive_scenario.experiments.paper import (
     difference,
     evaluate_claims,
 )
-from eidrive_scenario.reporting.chart import ChartSeries, line_chart
-from eidrive_scenario.reporting.key_frames import Moment, Story
+from eidrive_scenario.reporting.drawing.chart import ChartSeries, line_chart
+from eidrive_scenario.reporting.drawing.key_frames import Moment, Story
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
 from eidrive_scenario.reporting.page import png_address, write_page
-from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.files.atomic import create
 
 
 @cache

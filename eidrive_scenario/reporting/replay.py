@@ -15,17 +15,13 @@ from pydantic import ValidationError
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.recording.trace_hash import TraceHash
-from eidrive_scenario.reporting.page import write_page
-from eidrive_scenario.reporting.reported_run import reported
-from eidrive_scenario.reporting.road_drawing import recorded_roads
-from eidrive_scenario.reporting.settings_text import run_facts, shortened
-from eidrive_scenario.reporting.snapshot import USUAL, SnapshotBuilder, StationSnapshot
-from eidrive_scenario.reporting.top_view import (
+from eidrive_scenario.reporting.drawing.road_drawing import recorded_roads
+from eidrive_scenario.reporting.drawing.top_view import (
     AREA,
     GROUND,
     LANE,
@@ -39,6 +35,10 @@ from eidrive_scenario.reporting.top_view import (
     RoadDrawing,
     is_broken,
 )
+from eidrive_scenario.reporting.page import write_page
+from eidrive_scenario.reporting.run_report.reported_run import reported
+from eidrive_scenario.reporting.run_report.settings_text import run_facts, shortened
+from eidrive_scenario.reporting.snapshot import USUAL, SnapshotBuilder, StationSnapshot
 
 _LARGEST_PAGE = 64 * 2**20
 """Maximum size of the frames in a page, about [bytes]."""

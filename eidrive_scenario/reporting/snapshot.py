@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.partial_reports import PartialReportAssembler
+from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.world.view import WorldView
 
 USUAL = AgentSettings()

@@ -20,7 +20,7 @@ from eidrive_scenario.experiments.trends import (
     precision_by_delay,
     reception_by_distance,
 )
-from eidrive_scenario.recording.atomic_files import create
+from eidrive_scenario.files.atomic import create
 
 COLOURS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce")
 SPEEDS = (5.0, 10.0, 15.0)

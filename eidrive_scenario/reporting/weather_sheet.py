@@ -15,10 +15,10 @@ import typer
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.files.atomic import create
 from eidrive_scenario.library import library_path, names
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.atomic_files import create
-from eidrive_scenario.reporting.street_view import look_at
+from eidrive_scenario.reporting.drawing.street_view import look_at
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.sensing.settings import CameraSettings

@@ -1,9 +1,7 @@
 """OpenDRIVE roads: lane and road coordinates to x, y, z and back, and routes over lanes."""
 
-from eidrive_scenario.roads.distance import Chain
-from eidrive_scenario.roads.graph import RouteError
-from eidrive_scenario.roads.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
-from eidrive_scenario.roads.model import (
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
+from eidrive_scenario.roads.model.road_map import (
     Junction,
     Lane,
     LaneSection,
@@ -13,11 +11,14 @@ from eidrive_scenario.roads.model import (
     SignalController,
     SignalPlace,
 )
-from eidrive_scenario.roads.movement import Branch, BranchSelector
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import PlacedObject, outlines, placed_objects
-from eidrive_scenario.roads.route import Route
-from eidrive_scenario.roads.route_costs import Cost, fastest, fewest_junctions, random_costs
+from eidrive_scenario.roads.route_costs import fastest, fewest_junctions, random_costs
+from eidrive_scenario.roads.routing.costs import Cost
+from eidrive_scenario.roads.routing.distance import Chain
+from eidrive_scenario.roads.routing.graph import RouteError
+from eidrive_scenario.roads.routing.movement import Branch, BranchSelector
+from eidrive_scenario.roads.routing.route import Route
 from eidrive_scenario.roads.surfaces import KINDS, SurfaceMesh, surface_meshes
 
 __all__ = [

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from eidrive_scenario.roads import poses
-from eidrive_scenario.roads.location import LaneLocation, Pose
-from eidrive_scenario.roads.model import (
+from eidrive_scenario.roads.geometry import poses
+from eidrive_scenario.roads.model.location import LaneLocation, Pose
+from eidrive_scenario.roads.model.road_map import (
     Header,
     Junction,
     Road,
@@ -18,7 +18,7 @@ from eidrive_scenario.roads.model import (
     SignalController,
     SignalPlace,
 )
-from eidrive_scenario.roads.movement import driving_direction
+from eidrive_scenario.roads.routing.movement import driving_direction
 
 
 class RoadAttributes:

@@ -8,11 +8,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
-from eidrive_scenario.roads.links import LaneEnd, LaneLinks, end_section, side_at
-from eidrive_scenario.roads.location import LaneKey
-from eidrive_scenario.roads.map_warnings import MapWarning
-from eidrive_scenario.roads.model import Connection, Junction, Lane, LaneSection, Road, RoadLink
-from eidrive_scenario.roads.poses import lateral_axis
+from eidrive_scenario.roads.geometry.poses import lateral_axis
+from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
+from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
 
 JUMP = 0.01
 """Between a geometry's end and the next one's start [m]; also in s."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.roads.location import Array
-from eidrive_scenario.roads.model import Lane, LaneSection, Road, RoadMark
+from eidrive_scenario.roads.model.location import Array
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import outlines
 

@@ -12,24 +12,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.roads import poses
 from eidrive_scenario.roads.attributes import RoadAttributes
-from eidrive_scenario.roads.distance import Chain, RoadDistances
-from eidrive_scenario.roads.geo_reference import parse_geo_reference
-from eidrive_scenario.roads.geodesy import GeoReference
-from eidrive_scenario.roads.graph import LaneGraph, build_graph, find_lanes
-from eidrive_scenario.roads.links import LaneLinks
-from eidrive_scenario.roads.location import Array, Integers, LaneLocation, LaneLocations, Pose, Poses, PositionError
-from eidrive_scenario.roads.locator import REACH, Locator
+from eidrive_scenario.roads.geometry import poses
+from eidrive_scenario.roads.geometry.locator import REACH, Locator
+from eidrive_scenario.roads.geometry.tables import RoadTables
+from eidrive_scenario.roads.georeference.geo_reference import parse_geo_reference
+from eidrive_scenario.roads.georeference.geodesy import GeoReference
 from eidrive_scenario.roads.map_checks import check_road_map
-from eidrive_scenario.roads.map_warnings import group_map_warnings
-from eidrive_scenario.roads.model import RoadMap
-from eidrive_scenario.roads.movement import BranchSelector, Movement, driving_direction
-from eidrive_scenario.roads.nearby import locate_near
+from eidrive_scenario.roads.model.location import (
+    Array,
+    Integers,
+    LaneLocation,
+    LaneLocations,
+    Pose,
+    Poses,
+    PositionError,
+)
+from eidrive_scenario.roads.model.map_warnings import group_map_warnings
+from eidrive_scenario.roads.model.road_map import RoadMap
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
-from eidrive_scenario.roads.route import Route, concatenate_routes
-from eidrive_scenario.roads.route_costs import Cost, speed_on
-from eidrive_scenario.roads.tables import RoadTables
+from eidrive_scenario.roads.routing.costs import Cost, assumed_speed
+from eidrive_scenario.roads.routing.distance import Chain, RoadDistances
+from eidrive_scenario.roads.routing.graph import LaneGraph, build_graph, find_lanes
+from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.movement import BranchSelector, Movement, driving_direction
+from eidrive_scenario.roads.routing.nearby import locate_near
+from eidrive_scenario.roads.routing.route import Route, concatenate_routes
 
 KEPT = 2
 """So many networks of files are kept for the next run."""
@@ -253,7 +261,7 @@ class RoadNetwork(RoadAttributes):
         return None if found is None else found[2]
 
     def _usual_speed(self, road: str) -> float:
-        return speed_on(self, road, 0.5 * self.road(road).length)
+        return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
 
     def bounds(self) -> tuple[float, float, float, float]:
         """The smallest rectangle around all lane centres: least x, least y, greatest x, greatest y [m]."""

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.roads.location import Array, Pose
-from eidrive_scenario.roads.model import Corner, RoadObject
+from eidrive_scenario.roads.model.location import Array, Pose
+from eidrive_scenario.roads.model.road_map import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 
 LONGEST_PART = 5.0

@@ -3,33 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-from eidrive_scenario.roads.location import LaneKey
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy as np
+from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.network import RoadNetwork
+from eidrive_scenario.roads.routing.costs import JUNCTION_COST, Cost, assumed_speed
 
-    from eidrive_scenario.roads.network import RoadNetwork
-
-Cost = Callable[[LaneKey, LaneKey, Mapping[str, Any]], float]
-"""What an edge of the lane graph costs, given its two lanes and its data."""
-
-USUAL_SPEED = 50.0 / 3.6
-"""With which a road counts whose speed limit the map does not say [m/s]."""
-FREE_SPEED = 130.0 / 3.6
-"""With which a road counts that has no limit [m/s]."""
-JUNCTION_COST = 1e6
-"""Metres of detour that a junction is worth to who wants the fewest of them: more than any way has."""
 MOST_UNLIKELY = 10.0
 """The largest factor by which chance makes a road seem longer than it is."""
-
-
-def speed_on(network: RoadNetwork, road: str, s: float, lane: int | None = None) -> float:
-    """The speed with which a place on the road counts [m/s]."""
-    limit = network.speed_limit(road, s, lane)
-    return USUAL_SPEED if not limit else min(limit, FREE_SPEED)
 
 
 def fastest(network: RoadNetwork) -> Cost:
@@ -40,7 +24,7 @@ def fastest(network: RoadNetwork) -> Cost:
         key = LaneKey(*one[:3])
         if key not in known:
             section = network.road(key.road).sections[key.section]
-            known[key] = speed_on(network, key.road, 0.5 * (section.s + section.end), key.lane)
+            known[key] = assumed_speed(network.speed_limit(key.road, 0.5 * (section.s + section.end), key.lane))
         return float(data["weight"]) / known[key]
 
     return cost

@@ -12,15 +12,15 @@ from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.actor import Actor
-from eidrive_scenario.storyboard.builder import Builder
-from eidrive_scenario.storyboard.commands import Commands
-from eidrive_scenario.storyboard.controller_model import build_controller_models, unassigned_controller_warnings
+from eidrive_scenario.storyboard.context.controller_model import build_controller_models, unassigned_controller_warnings
+from eidrive_scenario.storyboard.context.runtime_context import ExternalPose, RuntimeContext
 from eidrive_scenario.storyboard.external import ExternalObjects
-from eidrive_scenario.storyboard.motion import ResolvedPosition
-from eidrive_scenario.storyboard.runtime_context import ExternalPose, RuntimeContext
-from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.storyboard.trailers import check_acyclic, declared_trailer, pairs, pose_behind
+from eidrive_scenario.storyboard.kinematics.actor import Actor
+from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.trailers import check_acyclic, declared_trailer, pairs, pose_behind
+from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.tree.builder import Builder
 from eidrive_scenario.world.actor import Placement
 from eidrive_scenario.world.view import WorldView
 

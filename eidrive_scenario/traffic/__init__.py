@@ -1,13 +1,13 @@
 """Background traffic."""
 
-from eidrive_scenario.traffic.areas import Cursor, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.background import BackgroundTraffic, Changes
-from eidrive_scenario.traffic.bodies import Participant, TrafficMix
 from eidrive_scenario.traffic.fleet import Fleet
-from eidrive_scenario.traffic.generators import Area, Sink, Source, Swarm, TrafficGenerator
 from eidrive_scenario.traffic.idm import IntelligentDriver
 from eidrive_scenario.traffic.mobil import LaneChanger
-from eidrive_scenario.traffic.sites import SpawnSites, sites_within_radius
+from eidrive_scenario.traffic.spawning.areas import Cursor, Stretch, polygon, road_range, stretches_cover
+from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
+from eidrive_scenario.traffic.spawning.generators import Area, Sink, Source, Swarm, TrafficGenerator
+from eidrive_scenario.traffic.spawning.sites import SpawnSites, sites_within_radius
 
 __all__ = [
     "Area",

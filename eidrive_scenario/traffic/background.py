@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.traffic.bodies import WALKING, Participant
 from eidrive_scenario.traffic.fleet import Fleet
-from eidrive_scenario.traffic.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.traffic.lanes import FREE
-from eidrive_scenario.traffic.sites import SpawnAreas, SpawnSites, is_unoccupied
+from eidrive_scenario.traffic.spawning.bodies import WALKING, Participant
+from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
+from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, is_unoccupied
 from eidrive_scenario.traffic.stop_lines import MustStop
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.roads.location import LaneKey
+from eidrive_scenario.roads.model.location import LaneKey
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from eidrive_scenario.roads.location import LaneKey
-from eidrive_scenario.roads.model import SignalPlace
+from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FIXED, Leaders, Occupants, find_leaders, no_occupants

@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from eidrive_scenario.v2x.links import LinkStatistics
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.statistics.links import LinkStatistics
 
 OutgoingMessage = tuple[Message, Sequence[str]]
 """A message and those who listen."""

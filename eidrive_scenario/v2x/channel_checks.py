@@ -10,8 +10,8 @@ import numpy as np
 
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.link_events import LinkEvents
-from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents
 
 _NUMBER = int | float | np.integer | np.floating
 

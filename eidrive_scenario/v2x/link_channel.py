@@ -6,9 +6,9 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
 from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
-from eidrive_scenario.v2x.links import Links, LinkStatistics
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import EMPTY_RADIO_ENVIRONMENT, RadioEnvironment
+from eidrive_scenario.v2x.statistics.links import Links, LinkStatistics
 
 
 class LinkChannel(Channel):

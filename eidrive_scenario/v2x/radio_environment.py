@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.message import LineOfSight
+from eidrive_scenario.v2x.messages.message import LineOfSight
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

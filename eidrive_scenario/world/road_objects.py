@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.roads import PlacedObject, RoadNetwork, Signal, outlines, placed_objects
-from eidrive_scenario.roads.location import Pose
+from eidrive_scenario.roads.model.location import Pose
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
     "tree": (4.0, 4.0, 7.0),

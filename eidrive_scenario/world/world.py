@@ -15,20 +15,20 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement, Vector3
 from eidrive_scenario.world.actor_table import ActorTable
 from eidrive_scenario.world.appearance import Appearance
-from eidrive_scenario.world.bodies import Body, ScriptedBody
-from eidrive_scenario.world.bullet import connect, disconnect
 from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
-from eidrive_scenario.world.contacts import ContactTracker
-from eidrive_scenario.world.driven_body import DrivenBody
-from eidrive_scenario.world.ground import GroundUnder
-from eidrive_scenario.world.physics import Physics, substeps_per_tick
-from eidrive_scenario.world.rays import Point, RayHits, cast_rays, first_met
+from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.bullet import connect, disconnect
+from eidrive_scenario.world.physics.contacts import ContactTracker
+from eidrive_scenario.world.physics.driven_body import DrivenBody
+from eidrive_scenario.world.physics.engine import Physics, substeps_per_tick
+from eidrive_scenario.world.physics.ground import GroundUnder
+from eidrive_scenario.world.physics.rays import Point, RayHits, cast_rays, first_met
+from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
 from eidrive_scenario.world.road_objects import signal_heads
-from eidrive_scenario.world.roadside import FIRST_LABEL
-from eidrive_scenario.world.scenery import Scenery
+from eidrive_scenario.world.scene.roadside import FIRST_LABEL
+from eidrive_scenario.world.scene.visuals import DisplayState, Visuals
 from eidrive_scenario.world.view import Contact, WorldView
-from eidrive_scenario.world.visuals import DisplayState, Visuals
 from eidrive_scenario.world.weather import Weather
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from whole_run import run as run
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.commands import Commands
-from eidrive_scenario.storyboard.states import StateChange
+from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.storyboard.state.states import StateChange
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.actor import Placement
 

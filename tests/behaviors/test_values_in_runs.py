@@ -9,7 +9,7 @@ from street_scene import NOTHING, after, everywhere, private
 
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.states import ElementTransition
+from eidrive_scenario.storyboard.state.states import ElementTransition
 
 
 @pytest.mark.element("EnvironmentAction")

@@ -20,8 +20,8 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.states import StateChange
-from eidrive_scenario.storyboard.trailers import pairs
+from eidrive_scenario.storyboard.kinematics.trailers import pairs
+from eidrive_scenario.storyboard.state.states import StateChange
 
 RMS_LIMIT = 0.10
 """Distance to the reference, root mean square over time [m]."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from eidrive_scenario.checks.distribution_checks import check_distribution
 from eidrive_scenario.errors import ConstraintError
-from eidrive_scenario.experiments.distribution_checks import check_distribution
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation

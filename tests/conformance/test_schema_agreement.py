@@ -23,8 +23,8 @@ from lxml import etree
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
-from eidrive_scenario.openscenario.document import read_root
-from eidrive_scenario.openscenario.parsing import open_document
+from eidrive_scenario.openscenario.reading.document import read_root
+from eidrive_scenario.openscenario.reading.parsing import open_document
 
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None
 pytestmark = pytest.mark.skipif(CORPORA is None, reason="EIDRIVE_CORPORA names no folder with files and schemas")

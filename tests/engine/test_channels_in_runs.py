@@ -19,9 +19,9 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.simulation import Observer, RunResult, RunSettings, Simulation, load_for_seed, run_file
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.link_statistics import LinkStatistics
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
+from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 
 ONE = resolve_scenario("coop/scenario_1")
 RSU_AT = '<WorldPosition x="42.2" y="-6.0" z="0" h="2.617994"/>'

@@ -28,7 +28,7 @@ def test_what_is_there_is_loaded_when_it_is_asked_for() -> None:
     [
         ("no.such.module:Thing", r"\(no\.such\.module:Thing\) does not load: No module named 'no'"),
         ("eidrive_criteria.collision:Colision", "does not load: .* has no attribute 'Colision'"),
-        ("eidrive_scenario.recording.criterion:Criterion", "lacks observe, verdict"),
+        ("eidrive_scenario.evaluation.criterion:Criterion", "lacks observe, verdict"),
     ],
 )
 def test_an_extension_that_cannot_work_is_named(value: str, told: str) -> None:

@@ -10,8 +10,8 @@ import pytest
 from lxml import etree
 from scenariogeneration import xodr, xosc
 
+from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.experiments.scenario_checks import check_scenario
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording import read_recording

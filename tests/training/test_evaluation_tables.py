@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES
-from eidrive_scenario.perception.learned.image_network import ImageDetections
 from training.dataset import Dataset, encode, write
 from training.light_scores import Reading, light_table
 from training.misses import CAUSES, causes, misses

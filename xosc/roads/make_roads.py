@@ -15,7 +15,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from eidrive_scenario.roads import curves
+from eidrive_scenario.roads.model import curves
 
 LANE = 3.5
 SIDEWALK = 2.0

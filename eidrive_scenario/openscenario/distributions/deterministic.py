@@ -22,7 +22,7 @@ from eidrive_scenario.openscenario.model import (
     Element,
     Range,
 )
-from eidrive_scenario.openscenario.parameters import Assignment, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, written
 
 Assignments = Mapping[str, Assignment]
 

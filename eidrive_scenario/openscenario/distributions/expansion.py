@@ -10,15 +10,15 @@ from pathlib import Path, PurePosixPath
 from typing import overload
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError, quoted, suggestion
-from eidrive_scenario.files import is_folder, is_regular_file
+from eidrive_scenario.files.bounded import is_folder, is_regular_file
 from eidrive_scenario.library import place_of
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.distributions.deterministic import CartesianProduct, combinations_of
 from eidrive_scenario.openscenario.distributions.stochastic import StochasticSampler, draws_of
-from eidrive_scenario.openscenario.document import read_root
 from eidrive_scenario.openscenario.model import File, OpenScenario, ParameterValueDistribution
-from eidrive_scenario.openscenario.parameters import Assignment
-from eidrive_scenario.openscenario.parsing import Source, open_document
+from eidrive_scenario.openscenario.reading.document import read_root
+from eidrive_scenario.openscenario.reading.parsing import Source, open_document
+from eidrive_scenario.openscenario.values.parameters import Assignment
 
 _GOLDEN = (math.sqrt(5) - 1) / 2
 

@@ -41,7 +41,7 @@ from eidrive_scenario.openscenario.model import (
     StochasticDistribution,
     UniformDistribution,
 )
-from eidrive_scenario.openscenario.parameters import Assignment, written
+from eidrive_scenario.openscenario.values.parameters import Assignment, written
 from eidrive_scenario.randomness import generator
 
 Quantile = Callable[[float], "float | str"]

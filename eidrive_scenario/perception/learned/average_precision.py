@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.perception.learned.suppression import covered, overlap
+from eidrive_scenario.perception.learned.networks.suppression import covered, overlap
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

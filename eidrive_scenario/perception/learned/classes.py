@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.detections import CLASSES
-from eidrive_scenario.roads.signal_states import OFF, lamps
+from eidrive_scenario.roads.model.signal_states import OFF, lamps
 
 OBJECT_CLASSES = ("car", "truck", "bus", "motorbike", "bicycle", "pedestrian")
 LIGHT_STATES = ("red", "yellow", "green", "off")

@@ -16,9 +16,13 @@ from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_settings
+from eidrive_scenario.perception.geometry.map_context import MapContext
+from eidrive_scenario.perception.geometry.visibility import in_camera
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import misspelt, object_category
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork, Layout
-from eidrive_scenario.perception.learned.image_network import ImageDetections, ImageNetwork
+from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.lights import LightsOnMap, signal_kinds
 from eidrive_scenario.perception.learned.weight_files import (
     DEFAULT_CONFIDENCE,
@@ -29,10 +33,7 @@ from eidrive_scenario.perception.learned.weight_files import (
     refused_torchscript,
     torchscript_is_allowed,
 )
-from eidrive_scenario.perception.lidar_geometry import Pattern, pattern_from_settings
-from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.map_context import MapContext
-from eidrive_scenario.perception.visibility import in_camera
+from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings

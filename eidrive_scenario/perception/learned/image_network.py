@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import suppression_groups
-from eidrive_scenario.perception.learned.suppression import suppress
+from eidrive_scenario.perception.learned.networks.suppression import suppress
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,18 +22,6 @@ LARGEST_OVERLAP = 0.5
 MOST_CANDIDATES = 1000
 MARGIN_GREY = 114
 """What is beside a letterboxed picture, in the networks of Ultralytics and those trained like them."""
-
-
-@dataclass(frozen=True)
-class ImageDetections:
-    """What a network found in a picture: boxes (N, 4) x1 y1 x2 y2 [px of the picture], best first, scores (N,)."""
-
-    boxes: Array
-    scores: Array
-    classes: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.boxes)
 
 
 @dataclass(frozen=True)

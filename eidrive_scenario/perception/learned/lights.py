@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.perception.geometry.projection import pixels
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import STOP_SIGN, light_state
-from eidrive_scenario.perception.learned.image_network import ImageDetections
 from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, crops, lamp_network
-from eidrive_scenario.perception.projection import pixels
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.signal_states import GREEN, RED, YELLOW, lamp_colours
+from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colours
 from eidrive_scenario.sensing.readings import CameraReading, SignalReading
 from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
 from eidrive_scenario.world.road_objects import signal_heads

@@ -10,12 +10,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from eidrive_scenario.perception.learned.blocks import fold
-from eidrive_scenario.perception.learned.boxes import corners
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
-from eidrive_scenario.perception.learned.ssd import decode, default_boxes
+from eidrive_scenario.perception.learned.networks.blocks import fold
+from eidrive_scenario.perception.learned.networks.boxes import corners
+from eidrive_scenario.perception.learned.networks.ssd import decode, default_boxes
+from eidrive_scenario.perception.learned.networks.yolov5 import STRIDES, YoloV5
 from eidrive_scenario.perception.learned.weights import load
-from eidrive_scenario.perception.learned.yolov5 import STRIDES, YoloV5
 
 
 class TorchNetwork(ImageNetwork):

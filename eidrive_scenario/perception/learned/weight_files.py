@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
-from eidrive_scenario.files import MIB, is_regular_file, read_regular_file, reason_of
+from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
 
 MAX_BYTES = 512 * MIB
 """Size of a file of weights, and of all arrays in a .npz together."""

@@ -14,7 +14,8 @@ import torch
 from torch import nn
 
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
-from eidrive_scenario.perception.learned.ssd import Ssd
+from eidrive_scenario.perception.learned.networks.ssd import Ssd
+from eidrive_scenario.perception.learned.networks.yolov5 import STRIDES, Anchors, YoloV5
 from eidrive_scenario.perception.learned.weight_files import (
     DEFAULT_CONFIDENCE,
     MAX_CLASSES,
@@ -22,7 +23,6 @@ from eidrive_scenario.perception.learned.weight_files import (
     read_arrays,
     read_weights,
 )
-from eidrive_scenario.perception.learned.yolov5 import STRIDES, Anchors, YoloV5
 
 _DESCRIPTION = "description"
 

@@ -8,7 +8,7 @@ from typing import Literal, overload
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
-from eidrive_scenario.roads.map_warnings import MapWarning
+from eidrive_scenario.roads.model.map_warnings import MapWarning
 
 MOST = 100
 """Problems after which reading ends."""

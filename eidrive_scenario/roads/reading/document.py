@@ -9,9 +9,11 @@ from typing import Literal, cast
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
-from eidrive_scenario.files import MIB, read_regular_file, reason_of
-from eidrive_scenario.roads.map_warnings import MapWarning
-from eidrive_scenario.roads.model import (
+from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
+from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
+from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.polynomials import Polynomials
+from eidrive_scenario.roads.model.road_map import (
     Connection,
     Header,
     Junction,
@@ -22,13 +24,11 @@ from eidrive_scenario.roads.model import (
     RoadObject,
     RoadType,
 )
-from eidrive_scenario.roads.polynomials import Polynomials
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 from eidrive_scenario.roads.reading.extent import check_extent
 from eidrive_scenario.roads.reading.lanes import read_lane_offset, read_sections, read_speed
 from eidrive_scenario.roads.reading.objects_and_signals import read_controllers, read_objects, read_signals
 from eidrive_scenario.roads.reading.plan_view import LONGEST, read_reference_line
-from eidrive_scenario.untrusted_xml import XmlLimits, parse_untrusted
 
 LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
 """Limits of an OpenDRIVE file."""

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from eidrive_scenario.errors import Diagnostic
-from eidrive_scenario.roads.curves import Cubic
-from eidrive_scenario.roads.model import Road
+from eidrive_scenario.roads.model.curves import Cubic
+from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MAX_SHAPE = 1e6

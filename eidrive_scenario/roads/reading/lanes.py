@@ -10,8 +10,8 @@ from typing import Literal
 
 from lxml import etree
 
-from eidrive_scenario.roads.model import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
-from eidrive_scenario.roads.polynomials import Polynomials, combine
+from eidrive_scenario.roads.model.polynomials import Polynomials, combine
+from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 
 UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}

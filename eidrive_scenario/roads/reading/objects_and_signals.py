@@ -7,8 +7,16 @@ from dataclasses import replace
 
 from lxml import etree
 
-from eidrive_scenario.roads.model import Corner, Repeat, Road, RoadObject, Signal, SignalController, SignalPlace
-from eidrive_scenario.roads.poses import BEYOND
+from eidrive_scenario.roads.geometry.poses import BEYOND
+from eidrive_scenario.roads.model.road_map import (
+    Corner,
+    Repeat,
+    Road,
+    RoadObject,
+    Signal,
+    SignalController,
+    SignalPlace,
+)
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
 MOST_REPEATED = 100_000

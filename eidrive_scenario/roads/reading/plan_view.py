@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from lxml import etree
 
 from eidrive_scenario.errors import suggestion
-from eidrive_scenario.roads import curves
-from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.model import curves
+from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")

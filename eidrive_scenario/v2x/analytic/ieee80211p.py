@@ -20,7 +20,7 @@ from eidrive_scenario.v2x.analytic.levels import (
     signal,
 )
 from eidrive_scenario.v2x.analytic.table import ErrorTable
-from eidrive_scenario.v2x.radio.propagation import winner_b1
+from eidrive_scenario.v2x.propagation.gains import winner_b1
 
 Array = NDArray[np.float64]
 

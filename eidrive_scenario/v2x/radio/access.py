@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from eidrive_scenario.settings import Settings
-from eidrive_scenario.v2x.message import Message
+from eidrive_scenario.v2x.messages.message import Message
+from eidrive_scenario.v2x.propagation.fading import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
-from eidrive_scenario.v2x.radio.fading import FadingDraws
 
 Array = NDArray[np.float64]
 

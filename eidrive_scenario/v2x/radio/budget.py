@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from eidrive_scenario.v2x.counter_random import Integers, Keys, combine_keys, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.path_loss import Link, LinkGeometry, PathLoss
-from eidrive_scenario.v2x.radio.propagation import probability_of_los
+from eidrive_scenario.v2x.propagation.gains import probability_of_los
+from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
 
 Array = NDArray[np.float64]

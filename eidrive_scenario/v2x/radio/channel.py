@@ -10,30 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.v2x.channel import OutgoingMessage
-from eidrive_scenario.v2x.composed import delay_of
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
-from eidrive_scenario.v2x.delay import ConstantDelay
 from eidrive_scenario.v2x.link_channel import LinkChannel
-from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
+from eidrive_scenario.v2x.link_models.composed import delay_of
+from eidrive_scenario.v2x.link_models.delay import ConstantDelay
+from eidrive_scenario.v2x.link_models.loss import NoLoss
+from eidrive_scenario.v2x.link_models.loss_process import LossProcess
 from eidrive_scenario.v2x.link_random import LinkRandom
-from eidrive_scenario.v2x.links import LinkStatistics
-from eidrive_scenario.v2x.loss import NoLoss
-from eidrive_scenario.v2x.loss_process import LossProcess
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.profile import ChannelProfile
+from eidrive_scenario.v2x.propagation.fading import FadingDraws, Nakagami
+from eidrive_scenario.v2x.propagation.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.access import MediumAccess, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget, LinkBudget
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.csma import Csma
 from eidrive_scenario.v2x.radio.events import DroppedBlock, ReceptionBlock
-from eidrive_scenario.v2x.radio.fading import FadingDraws, Nakagami
 from eidrive_scenario.v2x.radio.link_counter_table import LinkCounterTable
-from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
-from eidrive_scenario.v2x.radio.sidelink import Sidelink
+from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
-from eidrive_scenario.v2x.reception_log import Entry
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
+from eidrive_scenario.v2x.statistics.links import LinkStatistics
+from eidrive_scenario.v2x.statistics.reception_log import Entry
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.link_events import OutcomeBlock, OutcomeColumns
-from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Receptions
 from eidrive_scenario.v2x.radio_environment import STATES
+from eidrive_scenario.v2x.statistics.link_events import OutcomeBlock, OutcomeColumns
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.v2x.link_statistics import DISTANCE_BIN
-from eidrive_scenario.v2x.links import Links
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE
+from eidrive_scenario.v2x.statistics.link_statistics import DISTANCE_BIN
+from eidrive_scenario.v2x.statistics.links import Links
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

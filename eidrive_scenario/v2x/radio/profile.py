@@ -12,14 +12,14 @@ from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
 from eidrive_scenario.v2x.analytic.table import ErrorTable
-from eidrive_scenario.v2x.composed import ComposedProfile
+from eidrive_scenario.v2x.link_models.composed import ComposedProfile
+from eidrive_scenario.v2x.propagation.fading import Fading, NoFading
+from eidrive_scenario.v2x.propagation.path_loss import LinkGeometry, PathLoss, Tr37885
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.airtime import BITS_PER_SYMBOL, SUBFRAME, ieee80211p_airtime
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
-from eidrive_scenario.v2x.radio.fading import Fading, NoFading
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
-from eidrive_scenario.v2x.radio.path_loss import LinkGeometry, PathLoss, Tr37885
-from eidrive_scenario.v2x.radio.sidelink_settings import BLOCKS, SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
 
 Array = NDArray[np.float64]

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
 from eidrive_scenario.world.render.camera_view import CameraView, runs
-from eidrive_scenario.world.render.contact import dimmed
 from eidrive_scenario.world.render.culling import cull_and_project
-from eidrive_scenario.world.render.daylight import Daylight, daylight
-from eidrive_scenario.world.render.lamplight import Lamplight, lamplight
-from eidrive_scenario.world.render.lamps import Beam
+from eidrive_scenario.world.render.illumination.contact import dimmed
+from eidrive_scenario.world.render.illumination.daylight import Daylight, daylight
+from eidrive_scenario.world.render.illumination.lamplight import Lamplight, lamplight
+from eidrive_scenario.world.render.illumination.lamps import Beam
+from eidrive_scenario.world.render.illumination.shadows import ShadowGrid, ShadowMap, shadow_grid
+from eidrive_scenario.world.render.illumination.sky import dome, horizon
 from eidrive_scenario.world.render.materials import SOAKS
 from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
 from eidrive_scenario.world.render.rasterization import Cover, rasterize, rasterize_reference
 from eidrive_scenario.world.render.shading import Lit, lit_surfaces, points_at, sampled, shade, together
-from eidrive_scenario.world.render.shadows import ShadowGrid, ShadowMap, shadow_grid
-from eidrive_scenario.world.render.sky import dome, horizon
 from eidrive_scenario.world.weather import Weather
 
 DAYLIGHT = 1000.0

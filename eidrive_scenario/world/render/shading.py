@@ -8,16 +8,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.render import lamps, wet_road
+from eidrive_scenario.world.render import wet_road
 from eidrive_scenario.world.render.camera_view import CameraView, Pixels
 from eidrive_scenario.world.render.culling import Surfaces
-from eidrive_scenario.world.render.daylight import GROUND_ALBEDO, Daylight
-from eidrive_scenario.world.render.lamplight import Lamplight
+from eidrive_scenario.world.render.illumination import lamps
+from eidrive_scenario.world.render.illumination.daylight import GROUND_ALBEDO, Daylight
+from eidrive_scenario.world.render.illumination.lamplight import Lamplight
+from eidrive_scenario.world.render.illumination.shadows import ShadowMap
+from eidrive_scenario.world.render.illumination.sky import sample
 from eidrive_scenario.world.render.materials import GRAIN, MIRROR, RETURNS, SOAKS
 from eidrive_scenario.world.render.model import Array, Floats
 from eidrive_scenario.world.render.rasterization import Cover
-from eidrive_scenario.world.render.shadows import ShadowMap
-from eidrive_scenario.world.render.sky import sample
 from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather
 

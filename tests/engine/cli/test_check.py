@@ -162,7 +162,7 @@ def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_pa
 def test_one_that_breaks_the_checker_is_named_and_keeps_none_from_being_checked(
     eidrive: Eidrive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from eidrive_scenario.experiments import scenario_checks
+    from eidrive_scenario.checks import scenario_checks
 
     inspect = scenario_checks.check_scenario
 

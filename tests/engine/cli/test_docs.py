@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
-from eidrive_scenario.recording.csv_writer import COLUMNS
+from eidrive_scenario.recording.text.csv_writer import COLUMNS
 
 Eidrive = Callable[..., Result]
 PAGE = Path(__file__).parents[3] / "docs" / "why.md"

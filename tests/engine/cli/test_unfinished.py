@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
+from eidrive_scenario.files.atomic import exclusive
 from eidrive_scenario.recording import read_recording
-from eidrive_scenario.recording.atomic_files import exclusive
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import Simulation
 

@@ -11,7 +11,7 @@ from sample_car import CAR
 
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec, Control
-from eidrive_scenario.world.dynamics import SingleTrack, VehicleParameters
+from eidrive_scenario.world.physics.dynamics import SingleTrack, VehicleParameters
 
 SUBSTEPS = 10
 

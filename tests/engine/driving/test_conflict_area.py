@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.conflict_area import ConflictAreaPlanner, inside
+from eidrive_scenario.driving.planning.conflict_area import ConflictAreaPlanner, inside
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.registry import registry

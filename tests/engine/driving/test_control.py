@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import VehicleController
-from eidrive_scenario.driving.path import PlannedPath
-from eidrive_scenario.driving.pid import PID, Gains
-from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.control.pid import PID, Gains
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.step import Goal, Plan
+from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.requests import Goal
 from eidrive_scenario.world.actor import ActorSpec
 
 NOTHING = Detections(0.0)

@@ -9,11 +9,11 @@ import pytest
 from scenariogeneration import xodr
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import VehicleController
-from eidrive_scenario.driving.path import PlannedPath
-from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.step import Goal
+from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.world.actor import ActorSpec

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from eidrive_scenario.checks.registry import run_rules
 from eidrive_scenario.errors import ScenarioError
-from eidrive_scenario.experiments.rules import run_rules
 from eidrive_scenario.openscenario import load_scenario
 
 CORPORA = Path(os.environ["EIDRIVE_CORPORA"]) if "EIDRIVE_CORPORA" in os.environ else None

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
+from eidrive_scenario.checks.registry import ALL_RULES, run_rules
+from eidrive_scenario.checks.scenario_rules import Level
 from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.experiments.rules import ALL_RULES, run_rules
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.lint import Level
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "checks.md"
 

@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.covariance_intersection import CovarianceIntersectionFusion
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.v2x.message import StationState
+from eidrive_scenario.v2x.messages.message import StationState
 
 Place = tuple[float, float]
 

@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x.message import StationState
+from eidrive_scenario.v2x.messages.message import StationState
 
 Make = Callable[..., Report]
 Fuse = Callable[..., Detections]

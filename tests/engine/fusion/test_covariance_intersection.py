@@ -18,7 +18,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
 )
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.registry import registry
-from eidrive_scenario.v2x.message import StationState
+from eidrive_scenario.v2x.messages.message import StationState
 
 Make = Callable[..., Report]
 Fuse = Callable[..., Detections]

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from eidrive_scenario.fusion.prediction import predict
-from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
+from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, ConstantVelocity, Estimates
 
 STATE = np.array([[1.0, 2.0, 10.0, -3.0]])
 SPREAD = np.array([[[0.5, 0.1, 0.02, 0.0], [0.1, 0.4, 0.0, 0.03], [0.02, 0.0, 0.2, 0.05], [0.0, 0.03, 0.05, 0.3]]])

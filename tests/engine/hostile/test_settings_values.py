@@ -22,8 +22,8 @@ from trial import attempt
 
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InputError
+from eidrive_scenario.evaluation.criteria_parser import parse_criteria
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.recording.criteria_parser import parse_criteria
 from eidrive_scenario.registry import registry
 from eidrive_scenario.settings import Settings, parse_settings
 from eidrive_scenario.simulation import RunSettings, Simulation

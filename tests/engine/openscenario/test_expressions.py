@@ -4,7 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from eidrive_scenario.openscenario.expressions import MAX_LENGTH, ExpressionError, concatenate, evaluate, joins_text
+from eidrive_scenario.openscenario.values.expressions import (
+    MAX_LENGTH,
+    ExpressionError,
+    concatenate,
+    evaluate,
+    joins_text,
+)
 
 
 @pytest.mark.element("${expression}")

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.expressions import (
+from eidrive_scenario.openscenario.values.expressions import (
     MAX_LENGTH,
     ExpressionError,
     concatenate,

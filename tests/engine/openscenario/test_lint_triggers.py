@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
+from eidrive_scenario.checks.scenario_rules import RULES, LintContext
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.lint import RULES, LintContext
 
 PLACE = """<Private entityRef="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
 </TeleportAction></PrivateAction></Private>"""

@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from eidrive_scenario.openscenario.matching import Automaton, Group, Leaf, automaton
+from eidrive_scenario.openscenario.reading.matching import Automaton, Group, Leaf, automaton
 
 SEQUENCE = Group((Leaf("a", 0, 1), Leaf("b", 1, None), Leaf("c", 1, 1)), exclusive=False)
 CHOICE = Group((Leaf("a", 1, 1), Leaf("b", 2, None)), exclusive=True)

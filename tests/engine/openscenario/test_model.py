@@ -4,8 +4,8 @@ import pickle
 import pytest
 
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.document import VERSIONS
-from eidrive_scenario.openscenario.schema import rules
+from eidrive_scenario.openscenario.reading.document import VERSIONS
+from eidrive_scenario.openscenario.reading.schema import rules
 
 CLASSES = sorted(model.Element.__subclasses__(), key=lambda cls: cls.__name__)
 

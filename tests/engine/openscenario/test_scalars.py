@@ -5,7 +5,15 @@ import pytest
 
 from eidrive_scenario.openscenario.model import Priority, RelativeDistanceType, Rule
 from eidrive_scenario.openscenario.model.scalars import Limits
-from eidrive_scenario.openscenario.scalars import BOOLEAN, DATE_TIME, DOUBLE, INTEGER, Scalar, enumeration, whole_number
+from eidrive_scenario.openscenario.values.scalars import (
+    BOOLEAN,
+    DATE_TIME,
+    DOUBLE,
+    INTEGER,
+    Scalar,
+    enumeration,
+    whole_number,
+)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.existence import detected, likelihood_ratio, missed, survived
-from eidrive_scenario.perception.tracker_settings import TrackerSettings
-from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.perception.tracking.existence import detected, likelihood_ratio, missed, survived
+from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.tracker import Tracker
 
 
 @pytest.mark.parametrize("detection", [0.3, 0.9])

@@ -9,10 +9,10 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
 
-from eidrive_scenario.perception.learned.blocks import fold  # noqa: E402
-from eidrive_scenario.perception.learned.boxes import centred, complete_iou, corners, pairwise_iou  # noqa: E402
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES  # noqa: E402
-from eidrive_scenario.perception.learned.ssd import (  # noqa: E402
+from eidrive_scenario.perception.learned.networks.blocks import fold  # noqa: E402
+from eidrive_scenario.perception.learned.networks.boxes import centred, complete_iou, corners, pairwise_iou  # noqa: E402
+from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
     BOXES_PER_CELL,
     STRIDES,
     Ssd,
@@ -20,17 +20,17 @@ from eidrive_scenario.perception.learned.ssd import (  # noqa: E402
     default_boxes,
     encode,
 )
-from eidrive_scenario.perception.learned.ssd_loss import (  # noqa: E402
+from eidrive_scenario.perception.learned.networks.ssd_loss import (  # noqa: E402
     BACKGROUND,
     NOT_ASKED,
     SsdLoss,
     hardest,
     match,
 )
-from eidrive_scenario.perception.learned.targets import IGNORED, PADDING, Targets  # noqa: E402
+from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets  # noqa: E402
+from eidrive_scenario.perception.learned.networks.yolov5 import YoloV5  # noqa: E402
+from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss, assign  # noqa: E402
 from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates  # noqa: E402
-from eidrive_scenario.perception.learned.yolov5 import YoloV5  # noqa: E402
-from eidrive_scenario.perception.learned.yolov5_loss import YoloLoss, assign  # noqa: E402
 
 ANCHORS = (
     ((8.0, 10.0), (18.0, 14.0), (12.0, 30.0)),

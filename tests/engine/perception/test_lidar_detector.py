@@ -12,8 +12,8 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import DetectorContext
-from eidrive_scenario.perception.lidar_detector import LidarDetector, LidarDetectorSettings
-from eidrive_scenario.perception.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
+from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
+from eidrive_scenario.perception.lidar.detector import LidarDetector, LidarDetectorSettings
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings

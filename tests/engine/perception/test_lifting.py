@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.geometry import iou_bev, rotation_matrix
-from eidrive_scenario.perception.lidar_geometry import pattern_from_settings
-from eidrive_scenario.perception.lifting import lift
-from eidrive_scenario.perception.map_context import MapContext
-from eidrive_scenario.perception.projection import pixels, straight_boxes
+from eidrive_scenario.perception.geometry.lidar_geometry import pattern_from_settings
+from eidrive_scenario.perception.geometry.map_context import MapContext
+from eidrive_scenario.perception.geometry.projection import pixels, straight_boxes
+from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, Mount

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.motion_models import (
+from eidrive_scenario.perception.tracking.motion_models import (
     ACCELERATION_DENSITY,
     TURN_DENSITY,
     ConstantVelocity,

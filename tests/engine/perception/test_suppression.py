@@ -11,7 +11,7 @@ from eidrive_scenario.perception.learned.classes import (
     object_category,
     suppression_groups,
 )
-from eidrive_scenario.perception.learned.suppression import covered, overlap, suppress
+from eidrive_scenario.perception.learned.networks.suppression import covered, overlap, suppress
 
 
 def test_overlap_by_hand() -> None:

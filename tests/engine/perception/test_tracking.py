@@ -13,9 +13,9 @@ from pydantic import ValidationError
 from scipy.stats import chi2
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.perception.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
-from eidrive_scenario.perception.tracker_settings import TrackerSettings
-from eidrive_scenario.perception.tracking import Tracker
+from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
+from eidrive_scenario.perception.tracking.settings import TrackerSettings
+from eidrive_scenario.perception.tracking.tracker import Tracker
 
 DT = 0.1
 

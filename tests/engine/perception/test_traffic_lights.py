@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.driving.control import VehicleController
-from eidrive_scenario.driving.route_planner import RoutePlanner
+from eidrive_scenario.driving.control.vehicle_controller import VehicleController
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.planning.signal_stops import BEFORE_LINE, WAIT, SignalStops
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.driving.signal_stops import BEFORE_LINE, WAIT, SignalStops
-from eidrive_scenario.driving.step import Goal
 from eidrive_scenario.perception.traffic_lights import SignalsAhead, stop_lines
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.rig import Rig

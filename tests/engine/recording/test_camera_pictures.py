@@ -10,7 +10,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.single_run import PICTURES, run_and_save
-from eidrive_scenario.perception.learned.image_network import ImageDetections
+from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.recording.camera_images import drawn, drawn_in_space
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.simulation import RunSettings

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import InvalidResult, SettingError
-from eidrive_scenario.openscenario import Scenario, load_scenario
-from eidrive_scenario.recording.criteria_parser import (
+from eidrive_scenario.evaluation.criteria_parser import (
     exit_verdict,
     parse_criteria,
     stop_trigger_criteria,
     unsupported_criteria,
 )
-from eidrive_scenario.recording.criterion import Criterion, Verdict
+from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.storyboard.commands import CustomCommand
+from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 

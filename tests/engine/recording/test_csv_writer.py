@@ -11,8 +11,8 @@ import pytest
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import CsvWriter
-from eidrive_scenario.recording.csv_writer import csv_text, text_of_csv
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.text.csv_writer import csv_text, text_of_csv
 
 
 def test_rows(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:

@@ -10,8 +10,8 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
+from eidrive_scenario.evaluation.false_tracks import FalseTracks
 from eidrive_scenario.library import resolve_scenario
-from eidrive_scenario.recording.false_tracks import FalseTracks
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.world.view import WorldView

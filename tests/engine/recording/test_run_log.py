@@ -8,8 +8,8 @@ import pytest
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.recording import Frame, RunLog
-from eidrive_scenario.storyboard.elements import EMPTY
-from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.tree.elements import EMPTY
 
 START, STOP, SKIP, END = ElementTransition.START, ElementTransition.STOP, ElementTransition.SKIP, ElementTransition.END
 RUNNING, STANDBY, COMPLETE = ElementState.RUNNING, ElementState.STANDBY, ElementState.COMPLETE

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.step import AgentStep, Plan
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import Control
 from eidrive_scenario.world.view import WorldView
 

@@ -8,7 +8,17 @@ from itertools import pairwise
 import pytest
 from lxml import etree
 
-from eidrive_scenario.reporting.chart import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, ChartSeries, line_chart, ticks
+from eidrive_scenario.reporting.drawing.chart import (
+    BOTTOM,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    ChartSeries,
+    line_chart,
+    ticks,
+)
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -13,8 +13,8 @@ from eidrive_scenario.experiments.paper import ARMS, LINKS, OWN, PUBLISHED, RULE
 from eidrive_scenario.experiments.statistics import wilson
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.demo_page import CameraPicture, DemoSite, _speed, write_demo
-from eidrive_scenario.reporting.key_frames import KeyFrames, Story
-from eidrive_scenario.reporting.top_view import RoadDrawing
+from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing
 
 AREA = np.array([[29.0, 4.5], [32.0, 4.5], [32.0, 10.5], [29.0, 10.5]])
 

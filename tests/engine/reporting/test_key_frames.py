@@ -13,7 +13,7 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.key_frames import KeyFrames, Story
+from eidrive_scenario.reporting.drawing.key_frames import KeyFrames, Story
 from eidrive_scenario.world.view import Contact, WorldView
 
 Play = Callable[..., list[Frame]]

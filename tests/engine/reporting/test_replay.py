@@ -17,8 +17,8 @@ from eidrive_scenario.recording import Recorder, read_recording
 from eidrive_scenario.recording.damage import DamageReport
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.replay import replay_data, write_replay
-from eidrive_scenario.reporting.settings_text import short_number
-from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.reporting.run_report.settings_text import short_number
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 
 Play = Callable[..., list[Frame]]
 

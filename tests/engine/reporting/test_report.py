@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from lxml import html
 
+from eidrive_scenario import reporting
 from eidrive_scenario.errors import InputError
-from eidrive_scenario.reporting.report import write_report
+from eidrive_scenario.reporting.run_report.report import write_report
 
 
 def result(seed: int, channel: str, passed: bool, **changes: Any) -> dict[str, Any]:
@@ -117,7 +118,7 @@ def test_metrics_have_the_units_of_their_criteria(tmp_path: Path) -> None:
 
 
 def test_all_colours_of_a_page_have_one_for_the_dark() -> None:
-    templates = Path(write_report.__code__.co_filename).parent / "templates"
+    templates = Path(reporting.__file__).parent / "templates"
     style = (templates / "style.css").read_text(encoding="utf-8")
     light, dark = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]
     named = [re.findall(r"(--\w+): #", colours) for colours in (light, dark)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from eidrive_scenario.reporting.road_drawing import road_drawing, thinned
-from eidrive_scenario.reporting.top_view import Window
-from eidrive_scenario.roads.model import Road
+from eidrive_scenario.reporting.drawing.road_drawing import road_drawing, thinned
+from eidrive_scenario.reporting.drawing.top_view import Window
+from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.reading.document import parse_road_map
 
 ROAD = b"""<?xml version="1.0"?>

@@ -10,11 +10,11 @@ from lxml import html
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.single_run import as_json_text, run_and_save
-from eidrive_scenario.recording.bounded_json import load_json
+from eidrive_scenario.files.bounded_json import load_json
 from eidrive_scenario.recording.run_files import read_results
-from eidrive_scenario.reporting.report import write_report
-from eidrive_scenario.reporting.reported_run import ReportedRun, reported
-from eidrive_scenario.reporting.run_groups import group_runs
+from eidrive_scenario.reporting.run_report.report import write_report
+from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, reported
+from eidrive_scenario.reporting.run_report.run_groups import group_runs
 from eidrive_scenario.simulation import RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"

@@ -7,10 +7,10 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.reporting.storyboard_boxes import Role, init_boxes, stop_lines, story_boxes
-from eidrive_scenario.reporting.storyboard_layout import DiagramLayout, layout_diagram
-from eidrive_scenario.reporting.storyboard_picture import storyboard_picture, write_storyboard_picture
-from eidrive_scenario.reporting.text_width import broken, width_of
+from eidrive_scenario.reporting.storyboard_diagram.boxes import Role, init_boxes, stop_lines, story_boxes
+from eidrive_scenario.reporting.storyboard_diagram.layout import DiagramLayout, layout_diagram
+from eidrive_scenario.reporting.storyboard_diagram.picture import storyboard_picture, write_storyboard_picture
+from eidrive_scenario.reporting.storyboard_diagram.text_width import broken, width_of
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 HEAD = """<OpenSCENARIO>

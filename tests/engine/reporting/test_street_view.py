@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.reporting.street_view import HEIGHT, WIDTH, driver_view, helper_view, look_at, street_picture
+from eidrive_scenario.reporting.drawing.street_view import (
+    HEIGHT,
+    WIDTH,
+    driver_view,
+    helper_view,
+    look_at,
+    street_picture,
+)
 from eidrive_scenario.world.actor import ActorSpec
 
 Play = Callable[..., list[Frame]]

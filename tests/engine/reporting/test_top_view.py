@@ -11,9 +11,9 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
-from eidrive_scenario.reporting.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 
 Play = Callable[..., list[Frame]]
 SVG = "{http://www.w3.org/2000/svg}"

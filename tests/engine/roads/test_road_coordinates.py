@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.roads import PositionError, RoadNetwork, curves
-from eidrive_scenario.roads.curves import Arc, Cubic, Curve, ReferenceLine
-from eidrive_scenario.roads.model import Header, Lane, LaneSection, Road, RoadMap
-from eidrive_scenario.roads.polynomials import Polynomials, combine
+from eidrive_scenario.roads import PositionError, RoadNetwork
+from eidrive_scenario.roads.model import curves
+from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.model.polynomials import Polynomials, combine
+from eidrive_scenario.roads.model.road_map import Header, Lane, LaneSection, Road, RoadMap
 
 Text = Callable[..., str]
 BANKED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'

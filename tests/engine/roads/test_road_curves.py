@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from eidrive_scenario.roads import curves
-from eidrive_scenario.roads.curves import Arc, Cubic, CurveTable, ReferenceLine, Spiral
+from eidrive_scenario.roads.model import curves
+from eidrive_scenario.roads.model.curves import Arc, Cubic, CurveTable, ReferenceLine, Spiral
 
 
 def test_a_quarter_of_an_arc_ends_a_radius_ahead_and_a_radius_aside() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from eidrive_scenario.roads import PositionError, RoadNetwork
-from eidrive_scenario.roads.geo_reference import parse_geo_reference
+from eidrive_scenario.roads.georeference.geo_reference import parse_geo_reference
 
 MAP = '<OpenDRIVE><header revMajor="1" revMinor="6">{inside}</header>{road}</OpenDRIVE>'
 

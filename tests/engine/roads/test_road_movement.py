@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.movement import Branch
+from eidrive_scenario.roads.routing.movement import Branch
 
 Text = Callable[..., str]
 

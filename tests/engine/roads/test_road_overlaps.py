@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads import poses as scalar
+from eidrive_scenario.roads.geometry import poses as scalar
 
 
 def beneath(network: RoadNetwork, x: float, y: float) -> set[tuple[str, int]]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eidrive_scenario.roads.polynomials import Polynomials, PolynomialTable, combine
+from eidrive_scenario.roads.model.polynomials import Polynomials, PolynomialTable, combine
 
 STEPS = Polynomials([(0.0, 1.0, 0.5, 0.0, 0.0), (10.0, 6.0, 0.0, 0.1, -0.01)])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from eidrive_scenario.roads.signal_states import lamps, lit, must_stop
+from eidrive_scenario.roads.model.signal_states import lamps, lit, must_stop
 
 GREEN, RED = (("red", "off"), ("yellow", "off"), ("green", "on")), (("red", "on"), ("yellow", "off"), ("green", "off"))
 

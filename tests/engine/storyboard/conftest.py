@@ -12,10 +12,10 @@ from py_trees.common import Status
 from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.registry import Registry
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.condition import Condition
-from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.context.condition import Condition
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world.view import WorldView
 

@@ -6,17 +6,17 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.elements import (
+from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.tree.elements import (
     ActElement,
     ManeuverElement,
     ManeuverGroupElement,
     StoryboardElement,
     StoryNode,
 )
-from eidrive_scenario.storyboard.events import ActionElement, EventElement
-from eidrive_scenario.storyboard.init_block import InitBlock
-from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
+from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.tree.init_block import InitBlock
+from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 YES, NO = True, False
 

@@ -10,8 +10,8 @@ import pytest
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario, model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.positions import resolve_position
-from eidrive_scenario.storyboard.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.positions.resolution import resolve_position
 
 LATITUDE, METRES_PER_DEGREE = 48.0, 111_190.32
 """Arc of the WGS 84 meridian per degree around 48°N: a (1 - e²) (1 - e² sin² 48°)^(-3/2) π / 180 [m]."""

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from eidrive_scenario.checks.scenario_rules.outline import Outline
+from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
 from eidrive_scenario.openscenario import load_scenario
-from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
-from eidrive_scenario.openscenario.storyboard_names import ReferenceMatch, is_suffix
+from eidrive_scenario.openscenario.validation.storyboard_names import ReferenceMatch, is_suffix
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.elements import StoryElement
-from eidrive_scenario.storyboard.events import EventElement
+from eidrive_scenario.storyboard.tree.elements import StoryElement
+from eidrive_scenario.storyboard.tree.events import EventElement
 
 FILE = """<OpenSCENARIO>
   <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="many" author="test"/>

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.motion import LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion, ResolvedPosition
 
 
 def on_lane(roads: Any, lane: Any, s: Any, *, heading: Any = 0.0, offset: Any = 0.0) -> Any:

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from eidrive_scenario.openscenario.lint.outline import Outline
-from eidrive_scenario.openscenario.lint.reachability import ReachabilityAnalysis
-from eidrive_scenario.storyboard.states import ElementTransition
+from eidrive_scenario.checks.scenario_rules.outline import Outline
+from eidrive_scenario.checks.scenario_rules.reachability import ReachabilityAnalysis
+from eidrive_scenario.storyboard.state.states import ElementTransition
 from eidrive_scenario.storyboard.storyboard import Storyboard
 
 TICKS = 60

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.states import ElementTransition
-from eidrive_scenario.storyboard.trigger import ConditionEvaluator
+from eidrive_scenario.storyboard.state.states import ElementTransition
+from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator
 
 PLACE = """<PrivateAction><TeleportAction><Position><WorldPosition x="5" y="0"/></Position></TeleportAction>
   </PrivateAction>"""

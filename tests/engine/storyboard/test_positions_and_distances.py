@@ -11,11 +11,11 @@ import pytest
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.distances import closing_speed, distance
-from eidrive_scenario.storyboard.motion import ResolvedPosition
-from eidrive_scenario.storyboard.positions import resolve_position
-from eidrive_scenario.storyboard.road_positions import count_lanes
-from eidrive_scenario.storyboard.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.positions.distances import closing_speed, distance
+from eidrive_scenario.storyboard.positions.resolution import resolve_position
+from eidrive_scenario.storyboard.positions.road_positions import count_lanes
 from eidrive_scenario.world.view import WorldView
 
 JOINED = """<OpenDRIVE><header revMajor="1" revMinor="6"/>

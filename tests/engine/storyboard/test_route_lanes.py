@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.motion import LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion, ResolvedPosition
 
 TURN = 20.0 * math.pi
 

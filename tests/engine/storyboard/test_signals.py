@@ -8,7 +8,7 @@ import pytest
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.signals import Signals
+from eidrive_scenario.storyboard.state.signals import Signals
 
 ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
   <road name="" length="100" id="1" junction="-1"><link/>

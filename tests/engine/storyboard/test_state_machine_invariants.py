@@ -9,8 +9,10 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from eidrive_scenario.storyboard.domains import Domain
-from eidrive_scenario.storyboard.elements import (
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.state.domains import Domain
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.tree.elements import (
     ActElement,
     ManeuverElement,
     ManeuverGroupElement,
@@ -18,10 +20,8 @@ from eidrive_scenario.storyboard.elements import (
     StoryElement,
     StoryNode,
 )
-from eidrive_scenario.storyboard.events import ActionElement, EventElement
-from eidrive_scenario.storyboard.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.states import ElementState, ElementTransition, StateChange
-from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
+from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 TICKS = 14
 LEGAL = {

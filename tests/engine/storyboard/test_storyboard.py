@@ -11,7 +11,7 @@ import pytest
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.registry import Registry
-from eidrive_scenario.storyboard.states import ElementTransition
+from eidrive_scenario.storyboard.state.states import ElementTransition
 
 TELEPORT = """<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"""
 AT = '<WorldPosition x="{x}" y="0"/>'

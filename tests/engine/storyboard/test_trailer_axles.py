@@ -9,8 +9,8 @@ import pytest
 
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.actor import Actor
-from eidrive_scenario.storyboard.trailers import bar, pose_behind
+from eidrive_scenario.storyboard.kinematics.actor import Actor
+from eidrive_scenario.storyboard.kinematics.trailers import bar, pose_behind
 
 REACH = 6.0
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from eidrive_scenario.experiments.scenario_checks import check_scenario
-from eidrive_scenario.storyboard.lint.paths import MAX_POINTS, SPACING
-from eidrive_scenario.storyboard.lint.road_context import RoadLintContext
+from eidrive_scenario.checks.road_rules.context import RoadLintContext
+from eidrive_scenario.checks.road_rules.paths import MAX_POINTS, SPACING
+from eidrive_scenario.checks.scenario_checks import check_scenario
 
 FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T00:00:00" description="t" author="test"/>
 <CatalogLocations><VehicleCatalog><Directory path="eidrive_library/catalogs"/></VehicleCatalog></CatalogLocations>

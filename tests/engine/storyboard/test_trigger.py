@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from eidrive_scenario.storyboard.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
+from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, ConditionGroup, Trigger, WaitForTrigger
 
 YES, NO = True, False
 

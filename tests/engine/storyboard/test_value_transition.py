@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.openscenario.model import DynamicsShape
-from eidrive_scenario.storyboard.transition_profile import TransitionProfile
+from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
 
 
 @pytest.mark.parametrize(

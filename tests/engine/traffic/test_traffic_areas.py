@@ -11,7 +11,7 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic import Cursor, SpawnSites, Stretch, polygon, road_range, stretches_cover
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.sites import SpawnAreas
+from eidrive_scenario.traffic.spawning.sites import SpawnAreas
 
 Street = Callable[..., RoadNetwork]
 

@@ -12,7 +12,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.model.enumerations import Role, VehicleCategory
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.traffic import TrafficMix
-from eidrive_scenario.traffic.bodies import library_bodies
+from eidrive_scenario.traffic.spawning.bodies import library_bodies
 
 NO_CONTROLLER = model.ControllerDistribution(
     controller_distribution_entry=(

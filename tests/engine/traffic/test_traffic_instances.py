@@ -22,9 +22,9 @@ from eidrive_scenario.traffic import (
     polygon,
     sites_within_radius,
 )
-from eidrive_scenario.traffic.bodies import TrafficMix
-from eidrive_scenario.traffic.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.traffic.idm import IntelligentDriver
+from eidrive_scenario.traffic.spawning.bodies import TrafficMix
+from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment

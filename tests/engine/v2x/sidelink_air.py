@@ -7,7 +7,7 @@ from typing import Any
 
 from radio_talk import QUIET, Place, message
 
-from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment

@@ -11,8 +11,8 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.v2x.asn1 import Asn1Encoder, cpm_value
-from eidrive_scenario.v2x.message import Message, StationState
+from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder, cpm_value
+from eidrive_scenario.v2x.messages.message import Message, StationState
 
 pytest.importorskip("asn1tools", reason="asn1tools is not installed (pip install 'eidrive-scenario[asn1]')")
 

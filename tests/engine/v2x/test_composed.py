@@ -10,10 +10,10 @@ import pytest
 from pydantic import TypeAdapter
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.delay import Delay, LognormalDelay
-from eidrive_scenario.v2x.message import Message, StationState
-from eidrive_scenario.v2x.size import cpm_size
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.link_models.delay import Delay, LognormalDelay
+from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.size import cpm_size
 
 
 def channel(seed: int = 0, **profile: object) -> ComposedChannel:

@@ -7,8 +7,8 @@ import pytest
 from pydantic import ValidationError
 from radio_talk import message, radio, talk
 
-from eidrive_scenario.v2x.message import LinkEvent
-from eidrive_scenario.v2x.radio.fading import Nakagami
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.propagation.fading import Nakagami
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

@@ -9,9 +9,9 @@ import pytest
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x import age_of_information, reception_log
-from eidrive_scenario.v2x.message import Message, ReceivedMessage, StationState
-from eidrive_scenario.v2x.reception_log import Entry, ReceptionLog
+from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.statistics import age_of_information, reception_log
+from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
 
 NAMES = ("A", "B", "C")
 NOW = 45.0

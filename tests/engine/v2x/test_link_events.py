@@ -11,11 +11,11 @@ import pytest
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.recording import TraceHash
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.v2x.link_events import LinkEvents, OutcomeBlock
-from eidrive_scenario.v2x.message import LinkEvent, Message, StationState
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, StationState
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.world.view import WorldView
 
 DT = 0.05

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.links import Links
-from eidrive_scenario.v2x.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage, StationState
+from eidrive_scenario.v2x.statistics.links import Links
 
 DT = 0.05
 STATIONS = ("Ego", "RSU", "Spectator")

@@ -12,10 +12,10 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from eidrive_scenario.detections import Detections
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.delay_trace import TraceDelay
-from eidrive_scenario.v2x.loss import DistanceLoss, GilbertElliottLoss, Loss
-from eidrive_scenario.v2x.message import Message, StationState
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
+from eidrive_scenario.v2x.link_models.loss import DistanceLoss, GilbertElliottLoss, Loss
+from eidrive_scenario.v2x.messages.message import Message, StationState
 from eidrive_scenario.v2x.profile import load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from radio_talk import DT, QUIET, message, radio, talk
 
-from eidrive_scenario.v2x.message import LinkEvent
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.delay import ConstantDelay
-from eidrive_scenario.v2x.loss import BernoulliLoss, NoLoss
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.link_models.delay import ConstantDelay
+from eidrive_scenario.v2x.link_models.loss import BernoulliLoss, NoLoss
 from eidrive_scenario.v2x.profile import build_channel, load_profile, profile_names
 from eidrive_scenario.v2x.radio.channel import RadioChannel
 

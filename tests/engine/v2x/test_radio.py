@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from radio_talk import DT, QUIET, Place, message, radio, talk
 
-from eidrive_scenario.v2x.composed import ComposedChannel, ComposedProfile
-from eidrive_scenario.v2x.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
+from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
+from eidrive_scenario.v2x.propagation.path_loss import Tr37885
 from eidrive_scenario.v2x.radio import budget, csma, reception
 from eidrive_scenario.v2x.radio.airtime import ieee80211p_airtime
 from eidrive_scenario.v2x.radio.budget import LinkBudget
-from eidrive_scenario.v2x.radio.path_loss import Tr37885
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates, RadioEnvironment
 
 ROW = {name: (60.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCDE")}

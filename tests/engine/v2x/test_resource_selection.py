@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.v2x.radio.resource_selection import WINDOW, Request, Sensed, candidates
+from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, Sensed, candidates
 
 NOW, BANDS = 5000, 4
 REQUEST = Request(now=NOW, first=NOW + 1, last=NOW + 100, width=1, length=1, interval=100, uses=100, threshold=-128.0)

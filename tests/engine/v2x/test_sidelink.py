@@ -10,7 +10,7 @@ import pytest
 from radio_talk import message, radio
 from sidelink_air import MODE_4, TWO, Air, many
 
-from eidrive_scenario.v2x.radio.sidelink_settings import SidelinkSettings
+from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 

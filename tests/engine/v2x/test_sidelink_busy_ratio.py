@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from radio_talk import DT, message, radio, talk
 from sidelink_air import MODE_4, TWO, Air, many
 
-from eidrive_scenario.v2x.radio.sidelink import Sidelink
+from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 

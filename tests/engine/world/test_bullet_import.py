@@ -24,7 +24,7 @@ def test_other_output_passes() -> None:
         "        if name == 'pybullet':\n"
         "            os.write(2, b'within\\n')\n"
         "sys.meta_path.insert(0, Finder())\n"
-        "import eidrive_scenario.world.bullet\n"
+        "import eidrive_scenario.world.physics.bullet\n"
         "os.write(2, b'after')\n"
     )
     assert done.stderr == "before within\nafter"

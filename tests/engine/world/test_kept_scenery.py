@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.library import names
-from eidrive_scenario.reporting.street_view import look_at
+from eidrive_scenario.reporting.drawing.street_view import look_at
 from eidrive_scenario.reporting.weather_sheet import street
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement

@@ -11,10 +11,10 @@ import pytest
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.daylight import LUMA, daylight
-from eidrive_scenario.world.render.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
+from eidrive_scenario.world.render.illumination.daylight import LUMA, daylight
+from eidrive_scenario.world.render.illumination.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
+from eidrive_scenario.world.render.illumination.sky import SIZE, dome, horizon
 from eidrive_scenario.world.render.rasterization import rasterize
-from eidrive_scenario.world.render.sky import SIZE, dome, horizon
 from eidrive_scenario.world.weather import Weather, load_weather
 
 CarFactory = Callable[..., ActorSpec]

@@ -12,7 +12,7 @@ import pytest
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.dynamics import GRAVITY, VehicleParameters
+from eidrive_scenario.world.physics.dynamics import GRAVITY, VehicleParameters
 
 CarFactory = Callable[..., ActorSpec]
 

@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.errors import SettingError, SimulationError
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.physics import substeps_per_tick
+from eidrive_scenario.world.physics.engine import substeps_per_tick
 
 CarFactory = Callable[..., ActorSpec]
 

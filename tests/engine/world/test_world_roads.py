@@ -11,7 +11,7 @@ import pytest
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.dynamics import GRAVITY
+from eidrive_scenario.world.physics.dynamics import GRAVITY
 
 CarFactory = Callable[..., ActorSpec]
 

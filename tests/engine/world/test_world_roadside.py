@@ -16,8 +16,17 @@ from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.meshes import actor_mesh
+from eidrive_scenario.world.meshes.sign_faces import (
+    NO_ENTRY,
+    OTHER,
+    PRIORITY,
+    STOP,
+    WARNING,
+    YIELD,
+    SignFace,
+    sign_face,
+)
 from eidrive_scenario.world.meshes.signs import sign
-from eidrive_scenario.world.signs import NO_ENTRY, OTHER, PRIORITY, STOP, WARNING, YIELD, SignFace, sign_face
 from eidrive_scenario.world.weather import Weather
 
 CarFactory = Callable[..., ActorSpec]

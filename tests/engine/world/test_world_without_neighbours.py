@@ -11,9 +11,9 @@ import pytest
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Control, Placement
-from eidrive_scenario.world.bodies import Body, ScriptedBody
-from eidrive_scenario.world.driven_body import DrivenBody
-from eidrive_scenario.world.physics import Physics
+from eidrive_scenario.world.physics.bodies import Body, ScriptedBody
+from eidrive_scenario.world.physics.driven_body import DrivenBody
+from eidrive_scenario.world.physics.engine import Physics
 
 CarFactory = Callable[..., ActorSpec]
 

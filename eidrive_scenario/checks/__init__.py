@@ -1,0 +1,1 @@
+"""Rules of `eidrive check` and the reports on scenarios, catalogs, roads and distributions."""

@@ -1,0 +1,60 @@
+"""A scenario and its roads, as the rules look at them that ask where something is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from eidrive_scenario.checks.scenario_rules import LintContext
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import Position
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position
+from eidrive_scenario.world.view import WorldView
+
+
+class RoadLintContext(LintContext):
+    """What the rules ask about a scenario and its roads, before anybody is in the world."""
+
+    def __init__(self, scenario: Scenario, roads: RoadNetwork | None) -> None:
+        super().__init__(scenario)
+        self.roads = roads
+        self.context = RuntimeContext(scenario, roads, dt=0.0, seed=0, empty_view=_nobody())
+
+    def place(self, position: Position) -> ResolvedPosition | None:
+        """Where a position is, None where that depends on where somebody is. Raises InputError if it is nowhere."""
+        if referenced_entities(position):
+            return None
+        try:
+            return resolve_position(position, self.context)
+        except (EntityAbsentError, ValueError):
+            return None
+
+    @cached_property
+    def unresolved(self) -> dict[int, InputError]:
+        """Why a position is nowhere, by the identity of the position."""
+        return dict(self._lost())
+
+    def _lost(self) -> Iterator[tuple[int, InputError]]:
+        for element in self.elements:
+            if isinstance(element, Position):
+                try:
+                    self.place(element)
+                except InputError as error:
+                    yield id(element), error
+
+    def outside(self, x: list[float], y: list[float]) -> list[float]:
+        """How far points lie from the nearest road's edge [m]; 0 on a road."""
+        assert self.roads is not None
+        found: list[float] = self.roads.locate(x, y, reach=np.inf).outside.tolist()
+        return found
+
+
+def _nobody() -> WorldView:
+    none, points = np.empty(0), np.empty((0, 3))
+    return WorldView(0.0, -1, (), (), points, none, none, none, points, points, none, none, points, points)

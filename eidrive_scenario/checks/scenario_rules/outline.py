@@ -1,0 +1,240 @@
+"""A scenario as the rules look at it: the storyboard with its catalog maneuvers, who acts, who is placed, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from lxml import etree
+
+from eidrive_scenario.openscenario.model import (
+    Act,
+    Action,
+    AddEntityAction,
+    CatalogReference,
+    Element,
+    EntityAction,
+    Event,
+    FollowTrajectoryAction,
+    Maneuver,
+    ManeuverGroup,
+    MiscObject,
+    Pedestrian,
+    PrivateAction,
+    StoryboardElementType,
+    TeleportAction,
+    Trailer,
+    Trigger,
+    Vehicle,
+)
+from eidrive_scenario.openscenario.reading.document import VERSIONS
+from eidrive_scenario.openscenario.reading.parsing import open_document
+from eidrive_scenario.openscenario.reading.schema import rules
+from eidrive_scenario.openscenario.scenario import Scenario
+from eidrive_scenario.openscenario.validation.storyboard_names import LEVELS, ReferenceMatch
+
+_OBJECT_TYPES = {"vehicle": Vehicle, "pedestrian": Pedestrian, "miscellaneous": MiscObject}
+
+
+@dataclass(eq=False)
+class Node:
+    """An element of the storyboard, with maneuvers from catalogs in their places; the root has no level."""
+
+    element: Element
+    level: StoryboardElementType | None
+    path: tuple[str, ...]
+    parent: Node | None
+    children: list[Node] = field(default_factory=list)
+
+    @property
+    def title(self) -> str:
+        """What messages call it."""
+        return f"{self.level.value} {self.path[-1]!r}" if self.level else "the storyboard"
+
+    @property
+    def start(self) -> Trigger | None:
+        """Its start trigger; None where it starts with its parent. A trigger without groups counts as none."""
+        trigger = self.element.start_trigger if isinstance(self.element, Act | Event) else None
+        return trigger if trigger is not None and trigger.condition_group else None
+
+    @property
+    def limit(self) -> int:
+        """How often it may be executed."""
+        if isinstance(self.element, Event | ManeuverGroup) and self.element.maximum_execution_count is not None:
+            return self.element.maximum_execution_count
+        return 1
+
+    def above(self) -> Iterator[Node]:
+        """The elements around it, the nearest first."""
+        node = self.parent
+        while node is not None:
+            yield node
+            node = node.parent
+
+    def walk(self) -> Iterator[Node]:
+        """This element and all below."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def group(self) -> ManeuverGroup | None:
+        """The maneuver group that it is or belongs to."""
+        for node in (self, *self.above()):
+            if isinstance(node.element, ManeuverGroup):
+                return node.element
+        return None
+
+
+class Outline:
+    """The storyboard of a scenario and what stands around it."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.root = Node(scenario.storyboard, None, ("storyboard",), None)
+        self.root.children = [self._node(story, self.root, ()) for story in scenario.storyboard.story]
+        self.nodes = tuple(self.root.walk())
+        self._meant = ReferenceMatch((node.path, node) for node in self.nodes)
+
+    def _node(self, element: Element, parent: Node, above: tuple[str, ...]) -> Node:
+        path = (*above, str(getattr(element, "name", "")))
+        node = Node(element, LEVELS[type(element)], path, parent)
+        for child in element.children():
+            below = self.scenario.entries.get(child) if isinstance(child, CatalogReference) else child
+            if type(below) in LEVELS and (below is child or isinstance(below, Maneuver)):
+                node.children.append(self._node(below, node, path))
+        return node
+
+    def find(self, level: StoryboardElementType, reference: str) -> list[Node]:
+        """The elements that a reference means."""
+        return [node for node in self._meant.by(reference) if node.level is level]
+
+    def members(self, name: str, around: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """The entity of this name, or those of the selection of this name; `around` are selections that it is in."""
+        if name in self.scenario.entities:
+            return (name,)
+        entities = self.scenario.document.entities
+        found: list[str] = []
+        for selection in entities.entity_selection if entities else ():
+            if selection.name != name:
+                continue
+            for ref in selection.members.entity_ref:
+                if ref.entity_ref not in (name, *around):
+                    found += self.members(ref.entity_ref, (*around, name))
+            for given in selection.members.by_type:
+                kind = _OBJECT_TYPES.get(given.object_type.value)
+                found += [one for one, body in self.scenario.entities.items() if kind and isinstance(body, kind)]
+        return tuple(dict.fromkeys(found)) or (name,)
+
+    def actors(self, node: Node) -> tuple[str, ...]:
+        """The entities that act in an element of the storyboard, as far as the file names them."""
+        group = node.group()
+        names = [name for ref in (group.actors.entity_ref if group else ()) for name in self.members(ref.entity_ref)]
+        return tuple(dict.fromkeys(names))
+
+    @cached_property
+    def elements(self) -> tuple[Element, ...]:
+        """All elements of the file and of the catalog entries that it uses."""
+        trees = (self.scenario.document, *self.scenario.entries.values())
+        return tuple(element for tree in trees for element in tree.walk())
+
+    @cached_property
+    def performances(self) -> tuple[tuple[PrivateAction, tuple[str, ...]], ...]:
+        """Every private action, and who performs it; those of Init first."""
+        init = [
+            (action, self.members(private.entity_ref))
+            for private in self.scenario.storyboard.init.actions.private
+            for action in private.private_action
+        ]
+        events = [
+            (node.element.private_action, self.actors(node))
+            for node in self.nodes
+            if isinstance(node.element, Action) and node.element.private_action is not None
+        ]
+        return (*init, *events)
+
+    @cached_property
+    def trailers(self) -> frozenset[str]:
+        """Entities that another one draws: they come and go with it."""
+        drawn: set[str] = set()
+        for element in self.elements:
+            if isinstance(element, Trailer):
+                drawn |= {element.trailer.name} if element.trailer else set()
+                drawn |= {element.trailer_ref.entity_ref} if element.trailer_ref else set()
+        return frozenset(drawn)
+
+    @cached_property
+    def at_start(self) -> frozenset[str]:
+        """The entities that Init puts into the world, and those that are there anyway as the road network has them."""
+        actions = self.scenario.storyboard.init.actions
+        teleported = {
+            name
+            for private in actions.private
+            if any(_places(action) for action in private.private_action)
+            for name in self.members(private.entity_ref)
+        }
+        added = {
+            name
+            for action in actions.global_action
+            if action.entity_action is not None and action.entity_action.add_entity_action is not None
+            for name in self.members(action.entity_action.entity_ref)
+        }
+        entities = self.scenario.document.entities
+        objects = entities.scenario_object if entities else ()
+        external = {one.name for one in objects if one.external_object_reference is not None}
+        return frozenset(teleported | added | external | self.trailers)
+
+    @cached_property
+    def placed(self) -> frozenset[str]:
+        """The entities that are in the world at some time."""
+        later = {name for action, actors in self.performances if _places(action) for name in actors}
+        added = {
+            name
+            for element in self.elements
+            if isinstance(element, EntityAction) and isinstance(element.add_entity_action, AddEntityAction)
+            for name in self.members(element.entity_ref)
+        }
+        return self.at_start | later | added
+
+    @cached_property
+    def named(self) -> dict[str, set[str]]:
+        """By kind ("entity", "variable", …) the names to which elements refer."""
+        found: dict[str, set[str]] = {}
+        for element in self.elements:
+            for kind, name_field in _pointers(type(element)):
+                name = getattr(element, name_field, None)
+                if isinstance(name, str):
+                    found.setdefault(kind, set()).add(name)
+        return found
+
+    @cached_property
+    def files(self) -> tuple[etree._Element, ...]:
+        """The scenario as it is written, with `$` and all, then the catalogs that it uses; () where it has no text."""
+        scenario = self.scenario.path or self.scenario.text
+        if scenario is None:
+            return ()
+        catalogs = dict.fromkeys(entry.source for entry in self.scenario.entries.values())
+        return tuple(open_document(source).root for source in (scenario, *map(Path, catalogs)))
+
+
+def _places(action: PrivateAction) -> bool:
+    """Whether an action puts its actor somewhere: one that is not in the world begins a trajectory at its start."""
+    return any(isinstance(below, TeleportAction | FollowTrajectoryAction) for below in action.walk())
+
+
+def _pointers(cls: type[Element]) -> Sequence[tuple[str, str]]:
+    """What the attributes of a class point to in any version, and their fields."""
+    known = _POINTERS.get(cls)
+    if known is None:
+        pairs = [
+            (rule.points_to, rule.field)
+            for version in VERSIONS
+            for rule in rules(cls, version).attributes.values()
+            if rule.points_to
+        ]
+        known = _POINTERS[cls] = tuple(dict.fromkeys(pairs))
+    return known
+
+
+_POINTERS: dict[type[Element], tuple[tuple[str, str], ...]] = {}

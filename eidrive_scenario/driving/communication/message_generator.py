@@ -1,0 +1,174 @@
+"""What a station says, and when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
+from eidrive_scenario.v2x.messages.generation.cam import EQUAL, LONGEST, SHORTEST, CamGenerationRules
+from eidrive_scenario.v2x.messages.generation.cpm import CpmGenerationRules
+from eidrive_scenario.v2x.messages.generation.object_ids import ObjectIdAssigner
+from eidrive_scenario.v2x.messages.message import Message, StationState
+from eidrive_scenario.v2x.messages.point_cloud import PointCloud
+from eidrive_scenario.v2x.messages.size import cam_size, cpm_size, objects_that_fit
+from eidrive_scenario.world.actor import ActorSpec
+
+
+class MessageGenerator:
+    """Makes the messages of one station, by the rules that its settings name.
+
+    sensors  how many the station has;  encoder  writes messages to learn their size, None: by the size model
+    """
+
+    def __init__(
+        self, spec: ActorSpec, settings: AgentSettings, *, sensors: int, encoder: Asn1Encoder | None = None
+    ) -> None:
+        self._spec = spec
+        self._settings = settings
+        self._sensors = sensors
+        self._encoder = encoder
+        self._clock = settings.clock
+        self._number = 0
+        self._periods = -1
+        self._cam_rules = CamGenerationRules()
+        self._cpm_rules = CpmGenerationRules()
+        self._numbering = ObjectIdAssigner()
+        self._said = dict.fromkeys(settings.messages, -math.inf)
+        """When each kind of message was last made [s]."""
+
+    def generate(
+        self,
+        state: StationState,
+        detections: Detections,
+        now: float,
+        points: PointCloud | None = None,
+        *,
+        interval: float = 0.0,
+    ) -> tuple[Message, ...]:
+        """The messages of this tick, none where none is due; the first CPM carries the points.
+
+        interval  least time between two messages of this station by congestion control [s]; the rules of ETSI keep to
+                  it. Of two kinds of messages then only one is made at a time, first that which was made longer ago
+        """
+        etsi = self._settings.generation == "etsi"
+        if not etsi and not self._in_turn(now):
+            return ()
+        interval = min(interval, LONGEST)
+        said: list[Message] = []
+        kinds = self._settings.messages
+        if len(kinds) > 1:
+            kinds = tuple(sorted(kinds, key=lambda kind: (self._said[kind], kind)))
+        for kind in kinds:
+            if etsi and interval > 0.0 and now - max(self._said.values()) < interval - EQUAL:
+                break
+            if etsi:
+                messages = self._due(kind, state, detections, now, max(interval, SHORTEST))
+            else:
+                messages = [self._cam(state, now) if kind == "cam" else self._full_cpm(state, detections, now)]
+            if points is not None and messages and kind == "cpm":
+                messages[0] = replace(messages[0], points=points, size=messages[0].size + points.size)
+            if messages:
+                self._said[kind] = now
+            said += messages
+        return tuple([self._clock.with_station_timestamps(message, now) for message in said])
+
+    def _due(
+        self, kind: str, state: StationState, detections: Detections, now: float, shortest: float
+    ) -> list[Message]:
+        """The messages of this kind that the rules of ETSI ask for now."""
+        if kind == "cpm":
+            return self._triggered_cpms(state, detections, now, shortest)
+        return [self._cam(state, now)] if self._cam_rules.is_due(state, now, shortest) else []
+
+    def _in_turn(self, now: float) -> bool:
+        """Each tick, or at a rate."""
+        rate = self._settings.message_rate
+        if rate is None:
+            return True
+        period = math.floor(now * rate + 1e-6)
+        if period <= self._periods:
+            return False
+        self._periods = period
+        return True
+
+    def _full_cpm(self, state: StationState, detections: Detections, now: float) -> Message:
+        """All that is in sight; also where that is nothing, as that is news too."""
+        size = cpm_size(len(detections), self._sensors, self._settings.security_bytes)
+        return self._sized(Message(self._spec.name, self._take_number(), now, state, detections, size), self._sensors)
+
+    def _triggered_cpms(
+        self, state: StationState, detections: Detections, now: float, shortest: float
+    ) -> list[Message]:
+        """What the rules of ETSI choose, in as many messages as it needs."""
+        numbers = self._numbering.assign_ids(detections)
+        contents = self._cpm_rules.contents(detections, numbers, now, shortest)
+        if contents is None:
+            return []
+        security, mtu = self._settings.security_bytes, self._settings.mtu
+        sensors = self._sensors if contents.sensors else 0
+        rows = list(contents.rows)
+        said: list[Message] = []
+        while rows or not said:
+            room = objects_that_fit(mtu, sensors, security)
+            part, rows = rows[:room], rows[room:]
+            message = Message(
+                self._spec.name,
+                self._take_number(),
+                now,
+                state,
+                detections.subset(part),
+                cpm_size(len(part), sensors, security),
+                objects=tuple(numbers[row] for row in part),
+            )
+            said.append(self._sized(message, sensors))
+            sensors = 0
+        return said
+
+    def _cam(self, state: StationState, now: float) -> Message:
+        """The station itself."""
+        low_frequency = self._cam_rules.low_frequency(now)
+        message = Message(
+            self._spec.name,
+            self._take_number(),
+            now,
+            state,
+            own_body(self._spec, state),
+            cam_size(low_frequency),
+            kind="cam",
+        )
+        return self._sized(message, 0, low_frequency)
+
+    def _sized(self, message: Message, sensors: int, low_frequency: bool = False) -> Message:
+        if self._encoder is None:
+            return message
+        encoded = self._encoder.encode(message, sensors=sensors, low_frequency=low_frequency)
+        return replace(message, size=len(encoded) + self._settings.security_bytes)
+
+    def _take_number(self) -> int:
+        self._number += 1
+        return self._number - 1
+
+
+def own_body(spec: ActorSpec, state: StationState) -> Detections:
+    """A station as an object that others can know of, where it says it is."""
+    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    ahead, aside, up = spec.offset
+    centre: Sequence[float] = (
+        state.x + cos * ahead - sin * aside,
+        state.y + sin * ahead + cos * aside,
+        state.z + up,
+    )
+    return Detections(
+        state.time,
+        np.array([[*centre, *spec.size, state.yaw]]),
+        np.ones(1),
+        (spec.category,),
+        np.array([[state.speed * cos, state.speed * sin]]),
+        np.full((1, 2, 2), np.nan),
+    )

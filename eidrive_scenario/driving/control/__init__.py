@@ -1,0 +1,1 @@
+"""Control of a vehicle along a planned trajectory."""

@@ -1,0 +1,1 @@
+"""Planners: routes, reference paths, stops at signals, trajectories."""

@@ -1,0 +1,63 @@
+"""Conflict areas in which no vehicle can ever be, as no road lies there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from eidrive_scenario.driving.planning.conflict_area import inside
+from eidrive_scenario.driving.settings import AgentSettings, Polygon, is_agent_controller
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.roads import RoadNetwork
+
+MARGIN = 2.0
+"""Distance from the outermost lane that still counts as on the road [m]: a bay, a verge."""
+_CELLS = 12
+"""Cells along each side of an area that are examined."""
+
+
+def areas_off_road(
+    scenario: Scenario, settings: Mapping[str, AgentSettings], roads: RoadNetwork | None
+) -> Iterator[Diagnostic]:
+    """Yield a warning for each conflict area of a station of which no part lies on a road."""
+    if roads is None:
+        return
+    for name, station in settings.items():
+        for number, area in enumerate(station.conflict_area or (), 1):
+            gap = distance_to_road(area, roads)
+            if gap > MARGIN:
+                which = "the conflict area" if len(station.conflict_area or ()) == 1 else f"conflict area {number}"
+                source, line = _place(scenario, name)
+                yield Diagnostic(
+                    f"{which} of {name!r} never holds a vehicle on a road: it lies {gap:.0f} m off the nearest one",
+                    "give world coordinates [m] in the frame of the road network: [x0, x1, y0, y1]",
+                    source,
+                    line,
+                )
+
+
+def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
+    """A lower bound of the distance between an area and the outermost lanes [m]; 0 if they may overlap."""
+    low = [min(point[axis] for point in area) for axis in (0, 1)]
+    step = [(max(point[axis] for point in area) - low[axis]) / _CELLS for axis in (0, 1)]
+    centers = [
+        (low[0] + (i + 0.5) * step[0], low[1] + (j + 0.5) * step[1]) for i in range(_CELLS) for j in range(_CELLS)
+    ]
+    points = [*area, *(center for center in centers if inside(*center, area))]
+    reach = math.hypot(*step) / 2.0
+    x, y = np.array(points, dtype=float).T
+    nearest = float(roads.locate(x, y, reach=np.inf).outside.min())
+    return max(0.0, nearest - reach)
+
+
+def _place(scenario: Scenario, name: str) -> tuple[str, int]:
+    """File and line of the property that states the areas of a station."""
+    for controller in filter(is_agent_controller, scenario.controllers.get(name, ())):
+        for entry in controller.properties.property if controller.properties is not None else ():
+            if entry.name == "conflict_area":
+                return controller.source, entry.line
+        return controller.source, controller.line
+    return "", 0

@@ -1,0 +1,208 @@
+"""The route planner: along the roads to the goal, as fast as target and curves allow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.driving.planning.path import SPACING, PlannedPath
+from eidrive_scenario.driving.planning.planner import Planner
+from eidrive_scenario.driving.planning.signal_stops import SignalStops, StopPoint
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState, SignalReading
+from eidrive_scenario.world.actor import ActorSpec
+
+Array = NDArray[np.float64]
+
+HORIZON = 60
+"""Points of a plan ahead of the vehicle."""
+LOOK_AHEAD = 300
+"""Points of the lane that are followed at once where there is no destination."""
+STRIDE = 10
+"""So many of them are looked up at once where the lane allows it."""
+TURNS = 50.0
+"""A road up to this length may lead into itself within a stride [m]."""
+STRAYED = 2.5
+"""A vehicle this far from the lane that it follows was moved by somebody else, and looks for its lane anew [m]."""
+BEHIND = 5
+"""Points behind the vehicle that stay when the path is carried on."""
+
+
+class RoutePlanner(Planner):
+    """Drives along the goal's path, or by the shortest route through its waypoints, and stops at the end.
+
+    A lap that follows the path is driven round and round. Without path and waypoints it follows its lane straight on,
+    to the end of the road at most. Off the roads, waypoints are joined by a smooth curve.
+    Objects are not looked at. With `obey_signals` it stops at red lights and stop signs that it has seen.
+    Raises RouteError if no road leads to a waypoint.
+    """
+
+    def __init__(
+        self, settings: AgentSettings, spec: ActorSpec, roads: RoadNetwork | None, *, dt: float, seed: int
+    ) -> None:
+        super().__init__(settings, spec, roads, dt=dt, seed=seed)
+        self._path: PlannedPath | None = None
+        self._goal: Goal | None = None
+        self._way: tuple[Array | None, Array | None, Array | None] = (None, None, None)
+        self._progress = 0
+        self._lane: list[LaneLocation] = []
+        self._first_speed: float | None = None
+        self._stops = SignalStops(roads, spec) if settings.obey_signals else None
+        self._laid: PlannedPath | None = None
+
+    def observe_signals(self, signals: Sequence[SignalReading]) -> None:
+        if self._stops is not None:
+            self._stops.signals.see(signals)
+
+    def plan(self, ego: EgoState, objects: Detections, goal: Goal | None, now: float) -> Plan:
+        x, y, _ = ego.position.tolist()
+        path = self._current_path(x, y, ego.yaw, goal)
+        self._progress = path.project(x, y, self._progress)
+        if self._way[0] is None and self._way[1] is None and path.distance(x, y, self._progress) > STRAYED:
+            self._lane = []
+            path = self._path = self._lane_ahead(x, y, ego.yaw)
+            self._progress = path.project(x, y)
+        if not path.ends and len(path) - self._progress < 2 * HORIZON:
+            behind = path.points[max(self._progress - BEHIND, 0) :]
+            lap = self._way[2]
+            path = self._path = self._lane_ahead(x, y, ego.yaw) if lap is None else _with_laps(behind, lap)
+            self._progress = path.project(x, y)
+        part = slice(self._progress, self._progress + HORIZON)
+        target = self._target_speed(ego, goal)
+        speeds = np.minimum(path.limits[part], target)
+        free = bool(speeds[0] >= target)
+        reason = "keep speed" if free else "curve or end of route ahead"
+        stop = self._stop(path, ego, x, y, now)
+        if stop is not None and self._stops is not None:
+            held = self._stops.limits(stop, part)
+            if np.any(held < speeds):
+                speeds, free, reason = np.minimum(speeds, held), False, stop.reason
+        acceleration = goal.acceleration if goal is not None and free else 0.0
+        return Plan(path.points[part], speeds, reason, acceleration)
+
+    def _stop(self, path: PlannedPath, ego: EgoState, x: float, y: float, now: float) -> StopPoint | None:
+        """The traffic light or stop sign for which to stop next."""
+        if self._stops is None:
+            return None
+        if self._laid is not path:
+            self._laid = path
+            self._stops.follow(path.points)
+        return self._stops.next(self._stops.place_of(self._progress, path.points, x, y), ego.speed, now)
+
+    def _target_speed(self, ego: EgoState, goal: Goal | None) -> float:
+        if goal is not None and goal.speed is not None:
+            return goal.speed
+        if self.settings.target_speed is not None:
+            return self.settings.target_speed
+        if self._first_speed is None:
+            self._first_speed = max(ego.speed, 0.0)
+        return self._first_speed
+
+    def _current_path(self, x: float, y: float, yaw: float, goal: Goal | None) -> PlannedPath:
+        if self._path is not None and goal is self._goal:
+            return self._path
+        self._goal = goal
+        way = (None, None, None) if goal is None else (goal.path, goal.waypoints, goal.lap)
+        if self._path is None or not all(map(_same, way, self._way)):
+            self._way, self._progress, self._lane = way, 0, []
+            self._path = self._laid_out(x, y, yaw, *way)
+        return self._path
+
+    def _laid_out(
+        self, x: float, y: float, yaw: float, path: Array | None, waypoints: Array | None, lap: Array | None
+    ) -> PlannedPath:
+        line: Array | None = None
+        if path is not None and len(path) > 1:
+            if lap is not None:
+                return _with_laps(path, lap)
+            line = path[:, :2]
+        elif waypoints is not None and len(waypoints):
+            line = self._by_road(x, y, waypoints)
+            line = _curve(x, y, yaw, waypoints) if line is None else line
+        if line is None:
+            return self._lane_ahead(x, y, yaw)
+        try:
+            return PlannedPath(line, ends=True)
+        except ValueError:  # the destination is here
+            return PlannedPath(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
+
+    def _by_road(self, x: float, y: float, waypoints: Array) -> Array | None:
+        """The route through all waypoints, None if one of them or the vehicle itself is on no road."""
+        if self.roads is None:
+            return None
+        places = [self.roads.locate_at(px, py) for px, py in [(x, y), *waypoints[:, :2].tolist()]]
+        on_road = [place for place in places if place is not None]
+        if len(on_road) < len(places):
+            return None
+        line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
+        return np.asarray(line)[:, :2]
+
+    def _lane_ahead(self, x: float, y: float, yaw: float) -> PlannedPath:
+        """Along the lane and those that follow it, from where the last call left off; straight on where no lane is."""
+        if self.roads is not None:
+            self._lane = self._lane[max(0, self._progress - BEHIND) :] or self._lane_here(x, y, yaw)
+            onward = True
+            while onward and self._lane and len(self._lane) < LOOK_AHEAD:
+                more = _further(self.roads, self._lane[-1])
+                self._lane += more
+                onward = bool(more)
+            if len(self._lane) > 1:
+                return PlannedPath(self.roads.centres(self._lane), ends=not onward)
+        reach = np.array([[0.0], [float(LOOK_AHEAD)]])
+        return PlannedPath(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
+
+    def _lane_here(self, x: float, y: float, yaw: float) -> list[LaneLocation]:
+        """The lane under the vehicle, if it leads where the vehicle looks."""
+        if self.roads is None:
+            return []
+        place = self.roads.locate_at(x, y)
+        if place is None:
+            return []
+        heading = self.roads.lane_pose_at(place.road, place.lane, place.s, 0.0).h
+        direction = self.roads.driving_direction(place.road, place.lane)
+        return [place] if direction * math.cos(yaw - heading) > 0.0 else []
+
+
+def _further(roads: RoadNetwork, place: LaneLocation) -> list[LaneLocation]:
+    """The next STRIDE places along the lane, about SPACING apart; fewer where it ends."""
+    there = roads.advance(place, STRIDE * SPACING)
+    if there is not None and there[:2] == place[:2]:
+        road, step = roads.road(place.road), (there.s - place.s) / STRIDE
+        same = road.section_at(place.s) is road.section_at(there.s)
+        if same and road.length > TURNS and step * roads.driving_direction(place.road, place.lane) > 0.0:
+            return [*(place._replace(s=place.s + number * step) for number in range(1, STRIDE)), there]
+    places = [place]
+    while len(places) <= STRIDE and (onward := roads.advance(places[-1], SPACING)) is not None:
+        places.append(onward)
+    return places[1:]
+
+
+def _with_laps(line: Array, lap: Array) -> PlannedPath:
+    """The line and as many laps after it as are looked at ahead."""
+    length = float(np.hypot(*np.diff(lap[:, :2], axis=0).T).sum())
+    laps = [lap[1:, :2]] * math.ceil(LOOK_AHEAD * SPACING / length)
+    return PlannedPath(np.concatenate([line[:, :2], *laps]), ends=False)
+
+
+def _same(first: Array | None, second: Array | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return first is second or np.array_equal(first, second)
+
+
+def _curve(x: float, y: float, yaw: float, waypoints: Array) -> Array:
+    """A smooth line from here through the waypoints, (K, 2); it leaves along the heading."""
+    nose = [x + SPACING * math.cos(yaw), y + SPACING * math.sin(yaw)]
+    knots = np.array([[x, y], nose, *waypoints[:, :2].tolist()])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(knots, axis=0).T))])
+    keep = np.concatenate([[True], np.diff(along) > 1e-6])
+    stations = np.linspace(0.0, along[-1], max(2, math.ceil(along[-1] / SPACING) + 1))
+    return np.asarray(PchipInterpolator(along[keep], knots[keep])(stations))

@@ -1,0 +1,213 @@
+"""Parsing of XML from untrusted sources: no network, no document type, no entities, bounded size and depth.
+
+Messages never quote the content of a file that is not well-formed: the path may lead to a file of another kind.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NoReturn, cast
+from xml.parsers import expat
+
+from lxml import etree
+
+from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.files.xml_lines import parse_numbered
+
+MAX_DEPTH = 100
+"""Levels of elements."""
+MAX_ATTRIBUTES = 200
+"""Attributes of one element; the time that libxml2 takes for them grows with their square."""
+
+_REMEDY = "every tag has to be closed, every value quoted, & written as &amp;"
+_ENCODINGS = "save the file in UTF-8 and declare encoding='UTF-8'"
+_TOO_MANY = etree.XPath(f"descendant-or-self::*[@*[{MAX_ATTRIBUTES + 1}]]")
+_LEADS_TO_LINE = re.compile(r"\bline (\d+)")
+
+
+@dataclass(frozen=True)
+class XmlLimits:
+    """Limits of one kind of file.
+
+    max_bytes   size of the file
+    max_nodes   elements and attributes in total; each takes 100 to 200 bytes of memory
+    """
+
+    max_bytes: int
+    max_nodes: int
+
+
+class _Done(Exception):
+    """Ends the scan of a prolog or the count of nodes."""
+
+
+def parse_untrusted(
+    content: bytes,
+    source: str,
+    limits: XmlLimits,
+    error: Callable[[Diagnostic], InputError],
+    *,
+    remove_comments: bool = False,
+) -> etree._Element:
+    """Return the root element of the bytes of an XML file.
+
+    error   makes the exception that is raised for a diagnostic; each names `source` and the line
+    """
+
+    def refuse(message: str, remedy: str, line: int | None) -> NoReturn:
+        raise error(Diagnostic(message, remedy, source, line))
+
+    if len(content) > limits.max_bytes:
+        refuse(f"the file is larger than {limits.max_bytes // 2**20} MiB", "split it", None)
+    try:
+        _scan(content, limits, refuse)
+    except expat.ExpatError as failure:
+        what = f"not well-formed XML: {expat.ErrorString(failure.code)}"
+        refuse(what, _REMEDY, failure.lineno)
+    except (LookupError, ValueError):  # of the codec that the file names, if there is one
+        refuse("the encoding of the file is not supported", _ENCODINGS, 1)
+    parser = etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=remove_comments,
+        remove_pis=remove_comments,
+    )
+    try:
+        root = parse_numbered(content, parser)
+    except etree.XMLSyntaxError as failure:
+        refuse(f"not well-formed XML: {_described(failure)}", _REMEDY, failure.lineno or None)
+    docinfo: Any = root.getroottree().docinfo
+    if docinfo.doctype:
+        refuse("the file has a document type declaration (DOCTYPE)", "remove it", 1)
+    too_deep = next(iter(cast(list[etree._Element], root.xpath("/*" * (MAX_DEPTH + 1)))), None)
+    if too_deep is not None:
+        refuse(f"elements are nested more than {MAX_DEPTH} deep", "flatten them", _line(too_deep))
+    if content.count(b"=") > MAX_ATTRIBUTES:
+        for element in cast(list[etree._Element], _TOO_MANY(root)):
+            refuse(f"an element has more than {MAX_ATTRIBUTES} attributes", "remove them", _line(element))
+    return root
+
+
+def first_elements(content: bytes, at_most: int, visit: Callable[[int, str], bool]) -> bool:
+    """Call `visit` with depth (root: 1) and name, without its prefix, of the first elements until it returns True.
+
+    Return whether it did. No entity is expanded. Raise ValueError if the file is not XML up to there.
+    """
+    parser = expat.ParserCreate()
+    depth = count = 0
+    found = False
+
+    def start(name: str, _: object) -> None:
+        nonlocal depth, count, found
+        depth += 1
+        count += 1
+        found = visit(depth, name.rsplit(":", 1)[-1])
+        if found or count >= at_most:
+            raise _Done
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.DefaultHandler = lambda _: None  # with this handler expat leaves entities as they are
+    try:
+        parser.Parse(content, True)
+    except _Done:
+        pass
+    except (expat.ExpatError, LookupError) as error:
+        raise ValueError("not XML") from error
+    return found
+
+
+def _scan(content: bytes, limits: XmlLimits, refuse: Callable[[str, str, int | None], NoReturn]) -> None:
+    """Refuse a document type and too many nodes before a tree is built.
+
+    Beyond the prolog a file is scanned only if its size allows too many nodes.
+    """
+    parser = expat.ParserCreate()
+    may_exceed = content.count(b"<") - content.count(b"</") + content.count(b"=") > limits.max_nodes
+    nodes = 0
+
+    def document_type(*_: object) -> None:
+        refuse(
+            "the file has a document type declaration (DOCTYPE), which may bring in entities and other files",
+            "remove it; neither OpenSCENARIO nor OpenDRIVE needs one",
+            parser.CurrentLineNumber,
+        )
+
+    def element(_: str, attributes: list[str]) -> None:
+        nonlocal nodes
+        nodes += 1 + len(attributes) // 2
+        if not may_exceed:
+            raise _Done
+        if nodes > limits.max_nodes:
+            what = f"the file has more than {limits.max_nodes} elements and attributes"
+            refuse(what, "split it", parser.CurrentLineNumber)
+
+    parser.ordered_attributes = True
+    parser.StartDoctypeDeclHandler = document_type
+    parser.StartElementHandler = element
+    try:
+        parser.Parse(content, True)
+    except _Done:
+        return
+
+
+def _line(element: etree._Element) -> int | None:
+    return cast("int | None", element.sourceline)
+
+
+def _described(error: etree.XMLSyntaxError) -> str:
+    """The kind of a syntax error in words, without anything of the file but the number of a line."""
+    number = getattr(error, "code", None) or 0
+    text = error.msg or ""
+    start = _LEADS_TO_LINE.search(text)
+    if number in _KINDS_OF_ERRORS:
+        what = _KINDS_OF_ERRORS[number]
+        return what.format(start=f", which begins in line {start[1]}," if start else "")
+    return f"libxml2 reports error {number}"
+
+
+_CODES = etree.ErrorTypes
+_KINDS_OF_ERRORS = {
+    int(getattr(_CODES, name)): words
+    for name, words in {
+        "ERR_DOCUMENT_EMPTY": "the document is empty",
+        "ERR_DOCUMENT_END": "there is content after the end of the root element",
+        "ERR_INVALID_CHAR": "a character is not allowed in XML",
+        "ERR_INVALID_CHARREF": "a character reference is not valid",
+        "ERR_INVALID_ENCODING": "bytes do not fit the encoding",
+        "ERR_UNSUPPORTED_ENCODING": "the encoding is not supported",
+        "ERR_UNKNOWN_ENCODING": "the encoding is not supported",
+        "ERR_UNDECLARED_ENTITY": "an entity is not declared",
+        "ERR_ENTITYREF_SEMICOL_MISSING": "a reference lacks its semicolon",
+        "ERR_NAME_REQUIRED": "a name is expected",
+        "ERR_ATTRIBUTE_NOT_STARTED": "the value of an attribute is not quoted",
+        "ERR_ATTRIBUTE_NOT_FINISHED": "the value of an attribute is not closed",
+        "ERR_ATTRIBUTE_WITHOUT_VALUE": "an attribute has no value",
+        "ERR_ATTRIBUTE_REDEFINED": "an attribute stands twice in one element",
+        "ERR_LT_IN_ATTRIBUTE": "the value of an attribute contains <",
+        "ERR_TAG_NAME_MISMATCH": "an end tag does not match its start tag{start}",
+        "ERR_TAG_NOT_FINISHED": "the start tag of an element{start} is not closed",
+        "ERR_GT_REQUIRED": "a tag is not closed",
+        "ERR_LTSLASH_REQUIRED": "an end tag is missing",
+        "ERR_COMMENT_NOT_FINISHED": "a comment is not closed",
+        "ERR_HYPHEN_IN_COMMENT": "a comment contains --",
+        "ERR_CDATA_NOT_FINISHED": "a CDATA section is not closed",
+        "ERR_PI_NOT_FINISHED": "a processing instruction is not closed",
+        "ERR_SPACE_REQUIRED": "a space is missing between attributes",
+        "ERR_STRING_NOT_STARTED": "the XML declaration is not valid",
+        "ERR_XMLDECL_NOT_FINISHED": "the XML declaration is not closed",
+        "ERR_RESERVED_XML_NAME": "the XML declaration does not stand at the very start",
+        "ERR_NAME_TOO_LONG": "a name is too long",
+        "ERR_INTERNAL_ERROR": "a limit of the parser is exceeded, such as depth or length of a value",
+        "ERR_RESOURCE_LIMIT": "a limit of the parser is exceeded, such as depth or length of a value",
+        "NS_ERR_UNDEFINED_NAMESPACE": "the prefix of a namespace is not declared",
+    }.items()
+    if hasattr(_CODES, name)
+}

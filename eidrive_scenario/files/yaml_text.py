@@ -1,0 +1,164 @@
+"""YAML from untrusted sources: no object tags, aliases or merge keys, bounded in size and depth, lines of keys."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import yaml
+
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.files.bounded import read_regular_file, reason_of
+
+MAX_YAML = 2**17
+"""Characters of a YAML text."""
+MAX_DEPTH = 20
+"""Levels of lists and mappings in YAML."""
+MAX_NODES = 50_000
+"""Values and keys of a YAML text."""
+MAX_DIGITS = 40
+"""Characters of a number in YAML."""
+
+_QUOTED = re.compile(r"'[^']{2,}'|\"[^\"]{2,}\"")
+"""Quoted words of a text, and not the brackets and commas that YAML expects."""
+
+
+_ALIAS = "anchors and aliases are not read"
+_MERGE = "merge keys are not read"
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML's safe loader, which by itself keeps the last of several equal keys, and expands aliases without bounds.
+
+    An expression `${…}` is one text, inside braces and brackets too, where YAML takes its brace for a mapping.
+    """
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._depth = 0
+        self._count = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse aliases, which may stand for themselves or multiply, and what is too deep or too large."""
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        self._count += 1
+        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+            raise yaml.MarkedYAMLError(problem=_ALIAS, problem_mark=event.start_mark)
+        if self._depth >= MAX_DEPTH:
+            raise yaml.MarkedYAMLError(problem="nested too deeply", problem_mark=event.start_mark)
+        if self._count > MAX_NODES:
+            raise yaml.MarkedYAMLError(problem=f"more than {MAX_NODES} values", problem_mark=event.start_mark)
+        self._depth += 1
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def scan_plain(self) -> yaml.ScalarToken:
+        """Scan a scalar without quotes."""
+        if self.flow_level and self.prefix(2) == "${":
+            length = self._length_of_expression()
+            if length:
+                start = self.get_mark()
+                text = self.prefix(length)
+                self.forward(length)
+                self.allow_simple_key = False
+                return yaml.ScalarToken(text, False, start, self.get_mark(), "'")
+        token: yaml.ScalarToken = super().scan_plain()
+        return token
+
+    def _length_of_expression(self) -> int:
+        """Number of characters up to its closing brace; 0 if there is none in this line."""
+        length = 2
+        while self.peek(length) not in "\0\r\n{}":
+            length += 1
+        return length + 1 if self.peek(length) == "}" else 0
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "a key is a single word", key.start_mark)
+            if key.tag == "tag:yaml.org,2002:merge":
+                raise yaml.constructor.ConstructorError(None, None, _MERGE, key.start_mark)
+            if key.value in seen:
+                what = f"{quoted(key.value, 100)} stands here twice"
+                raise yaml.constructor.ConstructorError(None, None, what, key.start_mark)
+            seen.add(key.value)
+        found: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        return found
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        if len(node.value) > MAX_DIGITS:
+            what = f"a number has more than {MAX_DIGITS} digits"
+            raise yaml.constructor.ConstructorError(None, None, what, node.start_mark)
+        return int(super().construct_yaml_int(node))
+
+    def construct_yaml_float(self, node: yaml.ScalarNode) -> float:
+        if len(node.value) > MAX_DIGITS:
+            what = f"a number has more than {MAX_DIGITS} digits"
+            raise yaml.constructor.ConstructorError(None, None, what, node.start_mark)
+        return float(super().construct_yaml_float(node))
+
+    def construct_undefined(self, node: yaml.Node) -> NoReturn:
+        raise yaml.constructor.ConstructorError(None, None, "tags are not read", node.start_mark)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_yaml_float)
+_Loader.add_constructor(None, _Loader.construct_undefined)
+
+
+def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = True) -> Any:
+    """YAML without object tags, aliases and merge keys, of bounded size and depth.
+
+    quote   whether messages may quote words of the text; False for files, which may be of another kind
+
+    A key that stands twice is a mistake, as one of its values would be lost. Raises SettingError with the line of the
+    mistake, counted from `line` if given.
+    """
+    if len(text) > MAX_YAML:
+        problem = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
+        raise SettingError(problem)
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = (line or 1) + min(mark.line, text.count("\n")) if mark is not None else line
+        what = getattr(error, "problem", None) or "a character is not allowed"
+        what = what if quote else _QUOTED.sub("…", what)
+        hint = "write the value out in each place" if what in (_ALIAS, _MERGE) else "check the syntax there"
+        raise SettingError(Diagnostic(f"not valid YAML: {what}", hint, source, place)) from error
+    except (ValueError, ArithmeticError) as error:  # what looks like a date or a number and is none
+        what = f"not valid YAML: {_QUOTED.sub('…', str(error))}"
+        raise SettingError(Diagnostic(what, "put it in quotes", source, line)) from error
+
+
+def load_yaml_file(path: Path) -> tuple[Any, dict[str, int]]:
+    """A YAML file and the line of each of its keys. Raises SettingError."""
+    try:
+        text = read_regular_file(path, 4 * MAX_YAML).decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = "it is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
+        raise SettingError(Diagnostic(f"cannot read: {reason}", "give the path of a YAML file", str(path))) from error
+    return load_yaml(text, source=str(path), quote=False), key_lines(text)
+
+
+def key_lines(text: str, first: int = 1) -> dict[str, int]:
+    """The line of each key of a text that `load_yaml` has accepted, the first line having the number `first`. Keys
+    inside others have dots, and entries of lists numbers: `delay`, `delay.seconds`, `limits.0`."""
+    lines: dict[str, int] = {}
+    waiting = [("", yaml.compose(text, Loader=_Loader))]
+    while waiting:
+        path, node = waiting.pop()
+        entries: list[tuple[str, yaml.Node, yaml.Node]] = []
+        if isinstance(node, yaml.MappingNode):
+            entries = [(str(key.value), key, value) for key, value in node.value]
+        elif isinstance(node, yaml.SequenceNode):
+            entries = [(str(place), value, value) for place, value in enumerate(node.value)]
+        for name, where, value in entries:
+            inner = f"{path}.{name}" if path else name
+            lines[inner] = first + where.start_mark.line
+            waiting.append((inner, value))
+    return lines

@@ -1,0 +1,295 @@
+"""XML elements into the model, as the classes of the model say; every finding with its file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, cast
+
+from lxml import etree
+
+from eidrive_scenario.errors import Diagnostic, quoted, suggestion
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.model import (
+    Action,
+    Catalog,
+    CatalogReference,
+    CustomCommandAction,
+    Element,
+    Enumeration,
+    ObjectController,
+    ParameterDeclaration,
+    ParameterDeclarations,
+    Property,
+)
+from eidrive_scenario.openscenario.reading.parsing import line_of
+from eidrive_scenario.openscenario.reading.schema import AttributeRule, Rules, rules
+from eidrive_scenario.openscenario.reading.structure import check_children
+from eidrive_scenario.openscenario.values.expressions import ExpressionError
+from eidrive_scenario.openscenario.values.parameters import REFERENCE, Assignment, Parameter, Scope, declare
+from eidrive_scenario.openscenario.values.scalars import DOUBLE, STRING, Version, availability
+
+_SCHEMA_INSTANCE = "{http://www.w3.org/2001/XMLSchema-instance}"
+_IGNORED = {_SCHEMA_INSTANCE + "noNamespaceSchemaLocation", _SCHEMA_INSTANCE + "schemaLocation"}
+_MAY_BE_EMPTY = (Action, ObjectController)
+"""An action that does nothing, an object without controller."""
+_INFINITE = ("inf", "-inf")
+_WITH_TEXT = etree.XPath("descendant-or-self::*[text()[normalize-space()]]")
+_WITH_SPACE = etree.XPath("descendant-or-self::*[text() and not(*)]")
+
+
+@dataclass(frozen=True)
+class FoundReference:
+    """A catalog reference and the kinds of entry that fit there."""
+
+    reference: CatalogReference
+    kinds: tuple[type[Element], ...]
+
+
+class Reader:
+    """Reads elements of one file.
+
+    Elements that are wrong are built as far as they go, so that all findings of a file come in one go; use what
+    was built only if `findings` has no problems.
+    """
+
+    def __init__(self, source: str, version: Version, findings: DiagnosticCollector) -> None:
+        self.source = source
+        self.version = version
+        self.findings = findings
+        self.references: list[FoundReference] = []
+        self.declared: Scope | None = None
+        """The parameters that the element read declares itself."""
+        self._flaws = 0
+        self._with_text: set[etree._Element] = set()
+        self._with_space: set[etree._Element] = set()
+
+    def read(
+        self,
+        node: etree._Element,
+        cls: type[Element],
+        assignments: Mapping[str, Assignment] | None = None,
+        lent: Scope | None = None,
+    ) -> Element:
+        """The element and all below.
+
+        assignments  values for the parameters that it declares itself
+        lent         parameters of another file, for those that it does not declare
+        """
+        self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
+        self._with_space = set(cast(list[etree._Element], _WITH_SPACE(node)))
+        open_assignments = dict(assignments or {})
+        element = self._element(node, cls, lent or Scope(budget=self.findings.budget), open_assignments)
+        self._unknown_parameters(open_assignments, ())
+        return element
+
+    def _element(
+        self, node: etree._Element, cls: type[Element], scope: Scope, assignments: dict[str, Assignment]
+    ) -> Element:
+        known = rules(cls, self.version)
+        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        below = list(node.iterchildren(etree.Element))
+        if "ParameterDeclarations" in known.children:
+            declarations = next((child for child in below if child.tag == "ParameterDeclarations"), None)
+            if declarations is not None:
+                scope = scope.inner()
+                self.declared = self.declared or scope
+                values["parameter_declarations"] = self._declarations(declarations, scope, assignments)
+        self._attributes(node, known, scope, values)
+        self._text(node, known, values)
+        if cls is Property or cls is CustomCommandAction:
+            _keep_scope(node, scope, values)
+        repeated: dict[str, list[Element]] = {}
+        for child in below:
+            self._child(node, child, known, scope, values, repeated)
+        values.update((name, tuple(found)) for name, found in repeated.items())
+        if below or known.children:
+            check_children(node, below, known, self.version, self._error)
+        if known.choice and not any(child.tag in known.choice or child.tag not in known.children for child in below):
+            self._chooses_nothing(node, cls, known)
+        if "catalog_reference" in values:
+            self._note_references(known, values["catalog_reference"])
+        return make(cls, values)
+
+    def _attributes(self, node: etree._Element, known: Rules, scope: Scope, values: dict[str, Any]) -> None:
+        present = set()
+        for name, text in cast(list[tuple[str, str]], node.items()):
+            rule = known.attributes.get(name)
+            if rule is not None:
+                present.add(name)
+                values[rule.field] = self._value(node, name, text, rule, scope)
+            elif name not in _IGNORED:
+                usage = known.other_attributes.get(name)
+                remedy = availability(usage, self.version) if usage else suggestion(name, known.attributes)
+                self._error(f"{node.tag} has no attribute {name!r}", remedy, node)
+        for name, rule in known.attributes.items():
+            if rule.required and name not in present:
+                self._error(f"{node.tag} lacks the attribute {name!r}", f"it is {rule.scalar.name}", node)
+
+    def _value(self, node: etree._Element, name: str, text: str, rule: AttributeRule, scope: Scope) -> Any:
+        value: Any = None
+        try:
+            value = self._converted(text, rule, scope)
+        except ExpressionError as error:
+            self._flaws += 1
+            if error.message:
+                self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
+        except ValueError as error:
+            if text == "None" and not rule.required:
+                self._by_python(name, node, text, "as Python writes what is missing; it is taken so", "leave it out")
+            elif text in _INFINITE and rule.scalar is DOUBLE:
+                value = float(text)
+                self._by_python(name, node, text, "as Python writes infinity; it is taken so", f"write {text.upper()}")
+            else:
+                message = f"{name} of {node.tag} is {quoted(text)}, which is not {rule.scalar.name}"
+                self._error(message, str(error), node)
+        if rule.deprecated:
+            self._deprecated(f"the attribute {name!r} of {node.tag}", rule.deprecated, node)
+        if isinstance(value, Enumeration) and rule.scalar.is_deprecated(value):
+            self._deprecated(f"{value.value!r} of {type(value).__name__}", value.usage.deprecated, node)
+        return value
+
+    def _converted(self, text: str, rule: AttributeRule, scope: Scope) -> Any:
+        if not text.startswith("$"):
+            return rule.scalar.convert(text)
+        if rule.points_to == "parameter" and REFERENCE.fullmatch(text):
+            return text[1:]
+        if text.startswith("${") and self.version < (1, 1):
+            if rule.scalar is STRING:
+                return text
+            raise ExpressionError(f"{quoted(text)} is an expression", "OpenSCENARIO has them since 1.1")
+        return scope.resolve(text, rule.scalar)
+
+    def _text(self, node: etree._Element, known: Rules, values: dict[str, Any]) -> None:
+        if known.text_field:
+            values[known.text_field] = "".join(cast(list[str], node.xpath("text()")))
+        elif node in self._with_text:
+            self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
+        elif not known.children and node in self._with_space:
+            self.findings.warning(
+                f"{node.tag} holds white space, where the schema wants nothing",
+                f"write <{node.tag} …/>",
+                source=self.source,
+                line=line_of(node),
+            )
+
+    def _child(
+        self,
+        node: etree._Element,
+        child: etree._Element,
+        known: Rules,
+        scope: Scope,
+        values: dict[str, Any],
+        repeated: dict[str, list[Element]],
+    ) -> None:
+        rule = known.children.get(child.tag)
+        if rule is None:
+            return
+        if rule.deprecated:
+            self._deprecated(f"{child.tag} in {node.tag}", rule.deprecated, child)
+        if rule.cls is ParameterDeclarations:
+            return
+        element = self._element(child, rule.cls, scope, {})
+        if rule.many:
+            repeated.setdefault(rule.field, []).append(element)
+        else:
+            values.setdefault(rule.field, element)
+
+    def _chooses_nothing(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
+        """Up to 1.2 the schema lets an element choose nothing. That is in use where _MAY_BE_EMPTY says so."""
+        report = self.findings.warning if cls in _MAY_BE_EMPTY else self.findings.error
+        remedy = "it holds one of " + ", ".join(known.choice)
+        report(f"{node.tag} is empty", remedy, source=self.source, line=line_of(node))
+
+    def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
+        """Reads declarations one by one, so that each may use those before it."""
+        known = rules(ParameterDeclarations, self.version)
+        values: dict[str, Any] = {"line": node.sourceline, "source": self.source}
+        below = list(node.iterchildren(etree.Element))
+        self._attributes(node, known, scope, values)
+        self._text(node, known, values)
+        check_children(node, below, known, self.version, self._error)
+        declared = []
+        for child in below:
+            if child.tag in known.children:
+                before = self._flaws
+                declaration = self._element(child, ParameterDeclaration, scope, {})
+                sound = self._flaws == before
+                declared.append(self._declared(cast(ParameterDeclaration, declaration), scope, assignments, sound))
+        values["parameter_declaration"] = tuple(declared)
+        self._unknown_parameters(assignments, scope.parameters)
+        assignments.clear()
+        return make(ParameterDeclarations, values)
+
+    def _declared(
+        self, declaration: ParameterDeclaration, scope: Scope, assignments: dict[str, Assignment], sound: bool
+    ) -> ParameterDeclaration:
+        """Puts a parameter into its scope. The declaration comes back with the value that counts."""
+        name = str(declaration.name)
+        given = assignments.pop(name, None)
+        other = scope.parameters.get(name)
+        if other is not None:
+            self._declared_twice(declaration, other)
+            return replace(declaration, value=other.text)
+        if not sound:
+            scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
+            return declaration
+        declare(scope, declaration, given, self.findings)
+        return replace(declaration, value=given.text) if given else declaration
+
+    def _declared_twice(self, declaration: ParameterDeclaration, other: Parameter) -> None:
+        message = f"the parameter {declaration.name!r} is declared twice"
+        report = self.findings.warning if declaration.value == other.declared else self.findings.error
+        report(message, "rename or remove one", source=self.source, line=declaration.line)
+
+    def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
+        for name, assignment in assignments.items():
+            place = assignment.origin or Diagnostic("", "", self.source)
+            self.findings.error(
+                f"unknown parameter {name!r}", suggestion(name, declared), source=place.source, line=place.line
+            )
+
+    def _note_references(self, known: Rules, value: Any) -> None:
+        entries = {child.cls for child in rules(Catalog, self.version).children.values()}
+        kinds = tuple(child.cls for child in known.children.values() if child.cls in entries)
+        references = value if isinstance(value, tuple) else (value,)
+        self.references.extend(FoundReference(reference, kinds) for reference in references)
+
+    def _by_python(self, name: str, node: etree._Element, text: str, what: str, remedy: str) -> None:
+        """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
+        message = f"{name} of {node.tag} is {quoted(text)}, {what}"
+        self.findings.warning(message, remedy, source=self.source, line=line_of(node))
+
+    def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
+        self.findings.warning(
+            f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
+        )
+
+    def _error(self, message: str, remedy: str, node: etree._Element) -> None:
+        self._flaws += 1
+        self.findings.error(message, remedy, source=self.source, line=line_of(node))
+
+
+def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:
+    """Keep the visible parameters for references inside a text, or inside the file that a command names.
+
+    A property whose value begins with a reference is resolved already.
+    """
+    text = node.get("value") or ""
+    if "content" in values or ("$" in text and not text.startswith("$")):
+        values["scope"] = scope
+
+
+def make(cls: type[Element], values: Mapping[str, Any]) -> Element:
+    """An element with these values and its defaults, complete or not: a wrong file is reported, not half refused."""
+    defaults = _DEFAULTS.get(cls)
+    if defaults is None:
+        defaults = {entry.name: None if entry.default is MISSING else entry.default for entry in fields(cls)}
+        _DEFAULTS[cls] = defaults
+    element = object.__new__(cls)
+    element.__dict__.update(defaults)
+    element.__dict__.update(values)
+    return element
+
+
+_DEFAULTS: dict[type[Element], dict[str, Any]] = {}

@@ -1,0 +1,222 @@
+"""What a class of the model allows in one version of the standard: read off its fields, once, when first needed."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, Field, dataclass, fields
+from datetime import datetime
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.model import Element, Enumeration
+from eidrive_scenario.openscenario.model.content import All, Changed, Choice, Content, Sequence
+from eidrive_scenario.openscenario.model.element import ABOUT, USAGE, Usage, alternatives
+from eidrive_scenario.openscenario.model.scalars import Limits, NameOf
+from eidrive_scenario.openscenario.reading.matching import Automaton, Group, Leaf, automaton
+from eidrive_scenario.openscenario.values import scalars
+from eidrive_scenario.openscenario.values.scalars import Scalar, Version, is_known, parsed
+
+_SCALARS = {
+    float: scalars.DOUBLE,
+    int: scalars.INTEGER,
+    bool: scalars.BOOLEAN,
+    str: scalars.STRING,
+    datetime: scalars.DATE_TIME,
+}
+_PLAIN = Usage()
+
+
+@dataclass(frozen=True)
+class AttributeRule:
+    """An attribute: its field, its type, whether it has to be there."""
+
+    field: str
+    scalar: Scalar
+    required: bool
+    deprecated: str
+    points_to: str
+    """What the attribute names: see model.scalars.NameOf; "" where it is no name of anything."""
+
+
+@dataclass(frozen=True)
+class ChildRule:
+    """A child: its field, its class, how often it may stand."""
+
+    field: str
+    cls: type[Element]
+    minimum: int
+    many: bool
+    single: bool
+    """Whether the version allows one only, though the field holds many."""
+    deprecated: str
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What one version allows an element of a class to have.
+
+    order      automaton over the children's names; None where any order will do
+    elsewhere  attributes and children that only other versions have
+    summary    how the children have to stand, in words
+    """
+
+    cls: type[Element]
+    attributes: MappingProxyType[str, AttributeRule]
+    children: MappingProxyType[str, ChildRule]
+    text_field: str
+    order: Automaton | None
+    other_attributes: MappingProxyType[str, Usage]
+    other_children: MappingProxyType[str, Usage]
+    summary: str
+    choice: tuple[str, ...]
+    """Children of which one has to be there for the element to mean anything, though this version's schema lets it be
+    empty."""
+
+
+def rules(cls: type[Element], version: Version) -> Rules:
+    """The rules for a class in a version."""
+    key = (cls, version)
+    known = _KNOWN.get(key)
+    if known is None:
+        known = _KNOWN[key] = _read(cls, version)
+    return known
+
+
+def _read(cls: type[Element], version: Version) -> Rules:
+    hints = get_type_hints(cls, localns=vars(model), include_extras=True)
+    attributes: dict[str, AttributeRule] = {}
+    below: dict[str, ChildRule] = {}
+    other_attributes: dict[str, Usage] = {}
+    other_children: dict[str, Usage] = {}
+    spelling: dict[str, str] = {}
+    text_field = ""
+    for entry in fields(cls):
+        usage: Usage = entry.metadata.get(USAGE, _PLAIN)
+        if entry.name in ABOUT:
+            continue
+        if usage.text:
+            text_field = entry.name
+            continue
+        kind, extras, many = _kind(hints[entry.name])
+        is_child = isinstance(kind, type) and issubclass(kind, Element)
+        name = usage.name or _spelled(entry.name, capital=is_child)
+        if not is_known(usage, version):
+            (other_children if is_child else other_attributes)[name] = usage
+        elif is_child:
+            below[name] = _child(entry, usage, kind, many, version)
+            spelling[entry.name] = name
+        else:
+            attributes[name] = AttributeRule(
+                entry.name,
+                _scalar(kind, extras, version),
+                _required(entry, usage, version),
+                _deprecated(usage, version),
+                next((extra.kind for extra in extras if isinstance(extra, NameOf)), ""),
+            )
+    content = cls.content_model
+    if isinstance(content, Changed):
+        content = content.before if version < parsed(content.since) else content.after
+    group = _group(content, below, spelling, version)
+    return Rules(
+        cls,
+        MappingProxyType(attributes),
+        MappingProxyType(below),
+        text_field,
+        None if isinstance(content, All) else automaton(group),
+        MappingProxyType(other_attributes),
+        MappingProxyType(other_children),
+        "in any order " + ", ".join(below) if isinstance(content, All) else _in_words(group),
+        _meant_choice(cls, spelling, version),
+    )
+
+
+def _kind(hint: Any) -> tuple[Any, tuple[Any, ...], bool]:
+    """The type behind Optional, Annotated and tuple; what Annotated says of it; whether it is a tuple."""
+    if get_origin(hint) in (Union, UnionType):
+        hint = next(option for option in get_args(hint) if option is not type(None))
+    many = get_origin(hint) is tuple
+    if many:
+        hint = get_args(hint)[0]
+    extras: tuple[Any, ...] = ()
+    if get_origin(hint) is Annotated:
+        hint, *rest = get_args(hint)
+        extras = tuple(rest)
+    return hint, extras, many
+
+
+def _scalar(kind: Any, extras: tuple[Any, ...], version: Version) -> Scalar:
+    if issubclass(kind, Enumeration):
+        return scalars.enumeration(kind, version)
+    limits = next((extra for extra in extras if isinstance(extra, Limits)), None)
+    return scalars.whole_number(limits) if limits else _SCALARS[kind]
+
+
+def _child(entry: Field[Any], usage: Usage, kind: type[Element], many: bool, version: Version) -> ChildRule:
+    minimum = usage.minimum if _required(entry, usage, version) else 0
+    single = many and bool(usage.single_until) and version <= parsed(usage.single_until)
+    return ChildRule(entry.name, kind, minimum, many, single or not many, _deprecated(usage, version))
+
+
+def _required(entry: Field[Any], usage: Usage, version: Version) -> bool:
+    without_default = entry.default is MISSING and entry.default_factory is MISSING
+    return (
+        without_default
+        or usage.required
+        or (bool(usage.required_until) and version <= parsed(usage.required_until))
+        or (bool(usage.required_since) and version >= parsed(usage.required_since))
+    )
+
+
+def _deprecated(usage: Usage, version: Version) -> str:
+    return usage.deprecated if usage.deprecated and version >= parsed(usage.deprecated) else ""
+
+
+def _spelled(field_name: str, *, capital: bool) -> str:
+    """The spelling in the file: camel case, children with a capital."""
+    first, *rest = field_name.rstrip("_").split("_")
+    head = first[:1].upper() + first[1:] if capital else first
+    return head + "".join(word[:1].upper() + word[1:] for word in rest)
+
+
+def _group(content: Content, below: dict[str, ChildRule], spelling: dict[str, str], version: Version) -> Group:
+    """A content model with the fields that the version has, under the names of the file."""
+    exclusive = isinstance(content, Choice)
+    named = getattr(content, "parts", ()) or tuple(spelling)
+    parts: list[Leaf | Group] = []
+    for part in named:
+        if isinstance(part, Sequence | Choice):
+            parts.append(_group(part, below, spelling, version))
+        elif part in spelling:
+            child = below[spelling[part]]
+            repeated = isinstance(content, Choice) and content.maximum is None
+            minimum = max(child.minimum, 1) if exclusive else child.minimum
+            parts.append(Leaf(spelling[part], minimum, 1 if child.single or repeated else None))
+    if not isinstance(content, Choice):
+        return Group(tuple(parts), exclusive=False)
+    empty = bool(content.empty_until) and version <= parsed(content.empty_until)
+    return Group(tuple(parts), True, content.minimum == 0 or empty or not parts, content.maximum is None)
+
+
+def _meant_choice(cls: type[Element], spelling: dict[str, str], version: Version) -> tuple[str, ...]:
+    content = cls.content_model
+    if isinstance(content, Changed):
+        lenient = version < parsed(content.since)
+    else:
+        parts = content.parts if isinstance(content, Sequence) else (content,)
+        choices = [part for part in parts if isinstance(part, Choice)]
+        lenient = any(part.empty_until and version <= parsed(part.empty_until) for part in choices)
+    return tuple(spelling[name] for name in alternatives(cls) if name in spelling) if lenient else ()
+
+
+def _in_words(group: Group) -> str:
+    def word(part: Leaf | Group) -> str:
+        if isinstance(part, Group):
+            return f"({_in_words(part)})"
+        return part.name + ("…" if part.maximum is None else "")
+
+    if not group.parts:
+        return "nothing"
+    return (" or " if group.exclusive else ", ").join(word(part) for part in group.parts)
+
+
+_KNOWN: dict[tuple[type[Element], Version], Rules] = {}

@@ -1,0 +1,69 @@
+"""Values of variables and parameters that are not of the type that is declared: kept as texts, with a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.model import (
+    Element,
+    ParameterAction,
+    ParameterDeclaration,
+    ParameterType,
+    VariableAction,
+    VariableDeclaration,
+)
+from eidrive_scenario.openscenario.values.parameters import TYPES, fits_type
+
+_WITHOUT_NUMBERS = (ParameterType.BOOLEAN, ParameterType.DATE_TIME, ParameterType.STRING)
+_TRUTH = ("true", "false")
+"""Whatever their case: Python writes capitals."""
+
+
+def check_types(elements: Iterable[Element], findings: DiagnosticCollector) -> None:
+    """Warns of values that are declared, set or calculated with against the declared type."""
+    elements = tuple(elements)
+    types: dict[tuple[str, str], set[ParameterType]] = {}
+    for one in elements:
+        if isinstance(one, VariableDeclaration):
+            types.setdefault(("variable", one.name), set()).add(one.variable_type)
+            if _misfits(one.value, one.variable_type):
+                declared = one.variable_type.value
+                what = f"the variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
+                findings.warning(what, "it is taken as a text", source=one.source, line=one.line)
+        elif isinstance(one, ParameterDeclaration):
+            types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
+    for one in elements:
+        if isinstance(one, VariableAction):
+            _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), findings)
+        elif isinstance(one, ParameterAction):
+            _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), findings)
+
+
+def _check_action(
+    action: VariableAction | ParameterAction,
+    kind: str,
+    name: str,
+    types: set[ParameterType] | None,
+    findings: DiagnosticCollector,
+) -> None:
+    """One action; several declarations of a name in different types leave open which one is meant."""
+    if types is None or len(types) != 1:
+        return
+    (declared,) = types
+    setting = action.set_action
+    if setting is not None and _misfits(setting.value, declared):
+        what = f"the {kind} {name!r} is declared as {declared.value}, and here set to {setting.value!r}"
+        findings.warning(what, "it is taken as a text", source=setting.source, line=setting.line)
+    elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
+        what = f"the {kind} {name!r} is declared as {declared.value}, and here calculated with"
+        findings.warning(what, "declare it as double", source=action.source, line=action.line)
+
+
+def _misfits(text: object, declared: ParameterType) -> bool:
+    """Whether a value is not of a type; what could not be read has been reported."""
+    if not isinstance(text, str) or not isinstance(declared, ParameterType):
+        return False
+    if declared is ParameterType.BOOLEAN and text.lower() in _TRUTH:
+        return False
+    return not fits_type(text, TYPES[declared])

@@ -1,0 +1,121 @@
+"""Names: whether each is given once, and whether each that is referred to is there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from eidrive_scenario.errors import suggestion
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.model import (
+    CatalogReference,
+    Condition,
+    Controller,
+    Element,
+    MonitorDeclaration,
+    ObjectController,
+    OpenScenario,
+    ParameterAssignment,
+    ParameterCondition,
+    ParameterDeclaration,
+    StoryboardElementStateCondition,
+    TrafficSignalController,
+    Trailer,
+    VariableDeclaration,
+)
+from eidrive_scenario.openscenario.reading.schema import rules
+from eidrive_scenario.openscenario.validation.scenario_objects import scenario_objects
+from eidrive_scenario.openscenario.validation.storyboard_names import StoryboardNames
+from eidrive_scenario.openscenario.values.scalars import Version
+
+CRITERIA = "criteria_"
+"""ScenarioRunner's criteria are parameter conditions of such names; their parameter is none of the file's."""
+
+_DECLARED_BY: Mapping[type[Element], str] = {
+    ParameterDeclaration: "parameter",
+    VariableDeclaration: "variable",
+    MonitorDeclaration: "monitor",
+    TrafficSignalController: "signal controller",
+    Controller: "controller",
+    ObjectController: "controller",
+}
+_UNIQUE = ("entity", "variable", "monitor", "signal controller")
+
+
+def check_names(
+    root: OpenScenario,
+    elements: Iterable[Element],
+    version: Version,
+    entries: Mapping[CatalogReference, Element],
+    findings: DiagnosticCollector,
+) -> None:
+    """Reports names given twice and references to nothing."""
+    elements = list(elements)
+    known: dict[str, dict[str, Element]] = {kind: {} for kind in ("entity", *_DECLARED_BY.values())}
+    nameless: set[str] = set()
+    for kind, name, element in _given(root, elements, entries):
+        if name is None:
+            nameless.add(kind)
+            continue
+        if name in known[kind] and kind in _UNIQUE:
+            findings.error(
+                f"two {_plural(kind)} are named {name!r}",
+                f"the other stands in line {known[kind][name].line}; rename one",
+                source=element.source,
+                line=element.line,
+            )
+        known[kind].setdefault(name, element)
+    complete = {kind: names for kind, names in known.items() if kind not in nameless}
+    exempt = {id(one) for element in elements if isinstance(element, Condition) for one in _criterion(element)}
+    exempt |= {id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _draws_none(element)}
+    storyboard = StoryboardNames(root.storyboard, entries)
+    storyboard.check_unique(findings)
+    for element in elements:
+        if isinstance(element, StoryboardElementStateCondition):
+            storyboard.check_reference(element, findings)
+        elif not isinstance(element, ParameterAssignment) and id(element) not in exempt:
+            _check_references(element, version, complete, findings)
+
+
+def _given(
+    root: OpenScenario, elements: Iterable[Element], entries: Mapping[CatalogReference, Element]
+) -> Iterator[tuple[str, str | None, Element]]:
+    """Every name with its kind and the element that gives it; None where the reader could not make out the name."""
+    for one, _ in scenario_objects(root.entities, entries):
+        yield "entity", one.name, one
+    for selection in root.entities.entity_selection if root.entities else ():
+        yield "entity", selection.name, selection
+    for element in elements:
+        kind = _DECLARED_BY.get(type(element))
+        if kind is not None and not (isinstance(element, ObjectController) and element.name is None):
+            yield kind, getattr(element, "name", None), element
+
+
+def _criterion(condition: Condition) -> Iterator[ParameterCondition]:
+    if isinstance(condition.name, str) and condition.name.startswith(CRITERIA) and condition.by_value_condition:
+        parameter = condition.by_value_condition.parameter_condition
+        if parameter is not None:
+            yield parameter
+
+
+def _draws_none(trailer: Trailer) -> bool:
+    """Catalogs let a scenario say by a parameter what a vehicle draws; its default is the empty name."""
+    return trailer.trailer_ref is not None and trailer.trailer_ref.entity_ref == ""
+
+
+def _check_references(
+    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], findings: DiagnosticCollector
+) -> None:
+    for spelling, rule in rules(type(element), version).attributes.items():
+        kind = rule.points_to
+        name = getattr(element, rule.field) if kind in known else None
+        if isinstance(name, str) and name not in known[kind]:
+            findings.error(
+                f"{spelling} of {type(element).__name__} names the {kind} {name!r}, which is not there",
+                suggestion(name, known[kind]),
+                source=element.source,
+                line=element.line,
+            )
+
+
+def _plural(kind: str) -> str:
+    return "entities" if kind == "entity" else kind + "s"

@@ -1,0 +1,138 @@
+"""What the schema cannot say but is wrong all the same: double names, dangling ones, values that exclude others.
+
+The rules look at a scenario as far as it could be read, so a field may be missing where the reader has complained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.model import (
+    CatalogReference,
+    Clothoid,
+    ClothoidSpline,
+    Condition,
+    DynamicsDimension,
+    Element,
+    LongitudinalDistanceAction,
+    Nurbs,
+    OpenScenario,
+    Orientation,
+    Polyline,
+    RelativeLanePosition,
+    Timing,
+    TransitionDynamics,
+)
+from eidrive_scenario.openscenario.validation.declared_types import check_types
+from eidrive_scenario.openscenario.validation.names import check_names
+from eidrive_scenario.openscenario.validation.numbers import unusable
+from eidrive_scenario.openscenario.values.scalars import Version
+
+_NOTHING_SAID = Orientation()
+
+
+def check_rules(
+    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], findings: DiagnosticCollector
+) -> None:
+    """Reports whatever breaks a rule in a scenario or in the catalog entries that it uses."""
+    elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
+    check_values(elements, version, findings)
+    check_types(elements, findings)
+    check_names(root, elements, version, entries, findings)
+
+
+def check_values(elements: Sequence[Element], version: Version, findings: DiagnosticCollector) -> None:
+    """Report elements whose values exclude each other, or cannot be calculated with."""
+    flawed = {(problem.source, problem.line) for problem in findings.problems}
+    for element in elements:
+        check = _CHECKS.get(type(element))
+        message = unusable(element, version) or (check(element) if check else "")
+        if message and (element.source, element.line) not in flawed:
+            findings.error(message, source=element.source, line=element.line)
+        if isinstance(element, Orientation) and element == _NOTHING_SAID:
+            what = "Orientation says nothing, which by the standard means the heading 0 of the world"
+            remedy = 'leave it out, or write type="relative", to look along the road'
+            findings.warning(what, remedy, source=element.source, line=element.line)
+
+
+def _distance(action: LongitudinalDistanceAction) -> str:
+    given = sum(value is not None for value in (action.distance, action.time_gap))
+    return "" if given == 1 else "LongitudinalDistanceAction has to have either distance or timeGap"
+
+
+def _lane_position(position: RelativeLanePosition) -> str:
+    both = position.ds is not None and position.ds_lane is not None
+    return "RelativeLanePosition has to have either ds or dsLane" if both else ""
+
+
+def _nurbs(curve: Nurbs) -> str:
+    order: int | None = curve.order
+    points, knots = len(curve.control_point or ()), [knot.value for knot in curve.knot or ()]
+    if order is None or None in knots:
+        return ""
+    if order < 2:
+        return f"Nurbs has the order {order}; it has to be at least 2, of which straight lines are"
+    if points < order:
+        return f"Nurbs of order {order} has {points} control points; it has to have at least {order}"
+    if len(knots) != points + order:
+        return f"Nurbs has {len(knots)} knots; {points} control points of order {order} want {points + order}"
+    if any(after < before for before, after in pairwise(knots)):
+        return "Nurbs has knots that descend; each has to be at least the one before"
+    if knots[order - 1] == knots[points]:
+        return f"Nurbs has no extent: its knots {order} to {points + 1} are all {knots[points]:g}"
+    return _clock([point.time for point in curve.control_point])
+
+
+def _polyline(line: Polyline) -> str:
+    return _clock([vertex.time for vertex in line.vertex or ()])
+
+
+def _clothoid(curve: Clothoid) -> str:
+    return _clock([curve.start_time, curve.stop_time])
+
+
+def _clothoid_spline(curve: ClothoidSpline) -> str:
+    return _clock([*(segment.time_start for segment in curve.clothoid_spline_segment or ()), curve.time_end])
+
+
+def _clock(times: Sequence[float | None]) -> str:
+    for before, after in pairwise([time for time in times if time is not None]):
+        if after < before:
+            return f"a trajectory goes back in time, from {before:g} s to {after:g} s; times have to ascend"
+    return ""
+
+
+def _delay(condition: Condition) -> str:
+    return "Condition has a negative delay" if condition.delay is not None and condition.delay < 0 else ""
+
+
+def _transition(dynamics: TransitionDynamics) -> str:
+    """A rate may have a sign in practice: it does not matter."""
+    if dynamics.value is None or dynamics.value >= 0 or dynamics.dynamics_dimension is DynamicsDimension.RATE:
+        return ""
+    return f"a transition cannot take {dynamics.value:g} {'s' if _takes_time(dynamics) else 'm'}"
+
+
+def _takes_time(dynamics: TransitionDynamics) -> bool:
+    return dynamics.dynamics_dimension is DynamicsDimension.TIME
+
+
+def _timing(timing: Timing) -> str:
+    wrong = timing.scale is not None and timing.scale <= 0
+    return f"Timing has the scale {timing.scale:g}; it has to be above 0" if wrong else ""
+
+
+_CHECKS: Mapping[type[Element], Callable[[Any], str]] = {
+    Clothoid: _clothoid,
+    ClothoidSpline: _clothoid_spline,
+    Condition: _delay,
+    LongitudinalDistanceAction: _distance,
+    Nurbs: _nurbs,
+    Polyline: _polyline,
+    RelativeLanePosition: _lane_position,
+    Timing: _timing,
+    TransitionDynamics: _transition,
+}

@@ -1,0 +1,1 @@
+"""Typed values, expressions and parameters."""

@@ -1,0 +1,279 @@
+"""Parameters: declared with a type and a default, overridden from outside, and put in wherever `$name` stands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, quoted, shortened, suggestion
+from eidrive_scenario.openscenario.budget import MAX_TEXT, Budget, BudgetError
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
+from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
+from eidrive_scenario.openscenario.model.scalars import Limits
+from eidrive_scenario.openscenario.values import expressions
+from eidrive_scenario.openscenario.values.expressions import ExpressionError, Value
+from eidrive_scenario.openscenario.values.scalars import (
+    BOOLEAN,
+    DATE_TIME,
+    DOUBLE,
+    INTEGER,
+    STRING,
+    Scalar,
+    whole_number,
+)
+
+REFERENCE = re.compile(r"\$([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
+EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}", re.ASCII)
+
+TYPES: Mapping[ParameterType, Scalar] = {
+    ParameterType.BOOLEAN: BOOLEAN,
+    ParameterType.DATE_TIME: DATE_TIME,
+    ParameterType.DOUBLE: DOUBLE,
+    ParameterType.INT: INTEGER,
+    ParameterType.INTEGER: INTEGER,
+    ParameterType.STRING: STRING,
+    ParameterType.UNSIGNED_INT: whole_number(Limits(0, 2**32 - 1)),
+    ParameterType.UNSIGNED_SHORT: whole_number(Limits(0, 2**16 - 1)),
+}
+
+TEXTUAL = (STRING, DOUBLE, BOOLEAN, DATE_TIME)
+"""Types whose texts are read as they stand. Whole numbers may be written with a fraction of zero, as -5.0."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter and its value, as text and as what its type makes of it."""
+
+    name: str
+    text: str
+    value: Any
+    declared: str
+    """The text of its declaration; `text` may be another that was assigned."""
+    is_valid: bool = True
+    """False where its declaration is wrong: what follows from that is not worth a further message."""
+
+    @property
+    def operand(self) -> Value:
+        """The value as an expression takes it: a text that reads as a number is one."""
+        if isinstance(self.value, int | float):
+            return self.value
+        try:
+            number: float = DOUBLE.convert(self.text)
+        except ValueError:
+            return self.text
+        return int(number) if number.is_integer() and "." not in self.text else number
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """A parameter's value from outside the file, and where it was given if that is a file too."""
+
+    text: str
+    origin: Diagnostic | None = None
+
+
+def as_assignments(values: Mapping[str, str | Assignment] | None) -> dict[str, Assignment]:
+    """Values of parameters by name, each as an Assignment."""
+    return {
+        name: value if isinstance(value, Assignment) else Assignment(_typed(value))
+        for name, value in (values or {}).items()
+    }
+
+
+def _typed(value: object) -> str:
+    """A value as a caller in Python gives it: `True` is `true` in a file."""
+    return written(value) if isinstance(value, bool) else str(value)
+
+
+@dataclass
+class Scope:
+    """The parameters that are visible at a place; those of the surrounding scopes are too."""
+
+    outer: Scope | None = None
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    lent: set[str] | None = None
+    """Where another file's parameters are lent to this one: those that it has made use of."""
+    budget: Budget = field(default_factory=Budget)
+    """What the texts of expressions may add up to."""
+
+    def inner(self) -> Scope:
+        """A scope within this one."""
+        return Scope(self, budget=self.budget)
+
+    def find(self, name: str) -> Parameter:
+        """The parameter of that name. Raises ExpressionError."""
+        scope: Scope | None = self
+        while scope is not None:
+            found = scope.parameters.get(name)
+            if found is not None:
+                if not found.is_valid:
+                    raise ExpressionError("")
+                if scope.lent is not None:
+                    scope.lent.add(name)
+                return found
+            scope = scope.outer
+        raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
+
+    def names(self) -> set[str]:
+        """All names that are visible here."""
+        return set(self.parameters) | (self.outer.names() if self.outer else set())
+
+    def resolve(self, text: str, scalar: Scalar) -> Any:
+        """The value of an attribute that begins with `$`. Raises ExpressionError, or ValueError as `convert` does."""
+        match = REFERENCE.fullmatch(text)
+        if match:
+            parameter = self.find(match.group(1))
+            return self._convert(parameter.text, scalar, f"${parameter.name} is {quoted(parameter.text)}")
+        if not (text.startswith("${") and text.endswith("}") and scalar.takes_expressions):
+            return scalar.convert(text)
+        if scalar is not STRING and not EXPRESSION.fullmatch(text):
+            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
+        return self._evaluated(text[2:-1], scalar)
+
+    def evaluate(self, text: str) -> Value:
+        """The value of `$name` or `${expression}` by its own type, for texts that are no attributes.
+
+        Raises ExpressionError.
+        """
+        match = REFERENCE.fullmatch(text)
+        if match:
+            parameter = self.find(match.group(1))
+            return parameter.value if isinstance(parameter.value, bool | int | float | str) else parameter.text
+        body = text[2:-1]
+        used = {name: self.find(name) for name in expressions.parameters_of(body)}
+        operands = {name: parameter.operand for name, parameter in used.items()}
+        if expressions.joins_text(body, operands):
+            return self._joined(body, {name: parameter.text for name, parameter in used.items()})
+        if not EXPRESSION.fullmatch(text):
+            raise ExpressionError(f"{quoted(text)} holds characters that an expression may not have", expressions.HELP)
+        return expressions.evaluate(body, operands)
+
+    def _evaluated(self, text: str, scalar: Scalar) -> Any:
+        used = {name: self.find(name) for name in expressions.parameters_of(text)}
+        operands = {name: parameter.operand for name, parameter in used.items()}
+        if scalar is STRING and expressions.joins_text(text, operands):
+            return self._joined(text, {name: parameter.text for name, parameter in used.items()})
+        result = written(expressions.evaluate(text, operands))
+        return self._convert(result, scalar, f"the expression {quoted(text)} is {result}")
+
+    def _joined(self, text: str, values: Mapping[str, str]) -> str:
+        length = len(text) + sum(len(values[name]) for name in expressions.parameters_of(text))
+        try:
+            self.budget.join(length)
+        except BudgetError as error:
+            raise ExpressionError(f"the expression {quoted(text)} is too long: {error}", "join less") from error
+        return expressions.concatenate(text, values)
+
+    def _convert(self, text: str, scalar: Scalar, what: str) -> Any:
+        try:
+            return scalar.convert(text if scalar in TEXTUAL else _whole(text))
+        except ValueError as error:
+            raise ExpressionError(f"{what}, which is not {scalar.name}", str(error)) from error
+
+
+def written(value: Value) -> str:
+    """A value as a file writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return value if isinstance(value, str) else repr(value)
+
+
+def declare(
+    scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, findings: DiagnosticCollector
+) -> None:
+    """Puts a parameter into its scope, once its value fits its type and its constraints."""
+    scalar = TYPES[declaration.parameter_type]
+    place = (assignment and assignment.origin) or Diagnostic("", "", declaration.source, declaration.line)
+    name, text = declaration.name, assignment.text if assignment else declaration.value
+    text = _without_fraction(text, scalar)
+    if not fits_type(_without_fraction(declaration.value, scalar), scalar):
+        findings.warning(
+            f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
+            f"{quoted(declaration.value)}",
+            "it is taken as a text",
+            source=declaration.source,
+            line=declaration.line,
+        )
+        scalar = STRING
+    try:
+        if len(text) > MAX_TEXT:
+            raise ValueError(f"at most {MAX_TEXT} characters are read")
+        value = scalar.convert(text)
+    except ValueError as error:
+        findings.error(
+            f"the parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
+            str(error),
+            source=place.source,
+            line=place.line,
+        )
+        scope.parameters[name] = Parameter(name, text[:MAX_TEXT], text[:MAX_TEXT], declaration.value, is_valid=False)
+        return
+    scope.parameters[name] = Parameter(name, text, value, declaration.value)
+    groups = declaration.constraint_group
+    try:
+        fits = not groups or any(_holds(group, value, scalar) for group in groups)
+    except ValueError as error:
+        message = f"a constraint of the parameter {name!r} is not {scalar.name}"
+        findings.error(message, str(error), source=declaration.source, line=declaration.line)
+        return
+    if not fits:
+        allowed = " or ".join(
+            " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
+        )
+        findings.constraint_error(
+            f"the parameter {name!r} is {quoted(text)}, outside its constraints",
+            f"it has to be {allowed}",
+            source=place.source,
+            line=place.line,
+        )
+
+
+def fits_type(text: str, scalar: Scalar) -> bool:
+    """Whether a text is a value of a type."""
+    try:
+        scalar.convert(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
+    return all(
+        compare(value, one.rule, scalar.convert(_without_fraction(one.value, scalar))) for one in group.value_constraint
+    )
+
+
+def compare(left: Any, rule: Rule, right: Any) -> bool:
+    """Whether two values of one type are as the rule says."""
+    if isinstance(left, datetime) and isinstance(right, datetime):
+        left, right = (moment if moment.tzinfo else moment.replace(tzinfo=UTC) for moment in (left, right))
+    return bool(_COMPARISONS[rule](left, right))
+
+
+_COMPARISONS = {
+    Rule.EQUAL_TO: lambda left, right: left == right,
+    Rule.NOT_EQUAL_TO: lambda left, right: left != right,
+    Rule.GREATER_THAN: lambda left, right: left > right,
+    Rule.GREATER_OR_EQUAL: lambda left, right: left >= right,
+    Rule.LESS_THAN: lambda left, right: left < right,
+    Rule.LESS_OR_EQUAL: lambda left, right: left <= right,
+}
+
+
+def _without_fraction(text: str, scalar: Scalar) -> str:
+    """Return a text that is no whole number, where one is expected, without its fraction of zero: -5.0 is -5."""
+    return text if scalar in TEXTUAL or fits_type(text, scalar) else _whole(text)
+
+
+def _whole(text: str) -> str:
+    """A number without a fraction as a whole number; any other text as it is."""
+    try:
+        number: float = DOUBLE.convert(text)
+    except ValueError:
+        return text
+    return str(int(number)) if number.is_integer() else text

@@ -1,0 +1,91 @@
+"""References to parameters inside settings: `{seconds: $Latency}`, `{seconds: ${$Latency * 2}}`.
+
+A value is put in after the text was parsed: whatever it looks like, it stays one number, truth value or text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.openscenario.values.expressions import ExpressionError
+from eidrive_scenario.openscenario.values.parameters import REFERENCE, Scope
+
+
+def is_reference(value: object) -> bool:
+    """Whether a value is the text `$name` or `${expression}`, and nothing else beside it."""
+    return isinstance(value, str) and (
+        REFERENCE.fullmatch(value) is not None or (value.startswith("${") and value.endswith("}"))
+    )
+
+
+def resolve_references(
+    data: Any,
+    scope: Scope | None,
+    *,
+    source: str = "",
+    line: int | None = None,
+    lines: Mapping[str, int] | None = None,
+    path: str = "",
+) -> Any:
+    """Return parsed settings with the values of the parameters to which they refer.
+
+    data   mappings, lists and scalars as YAML gives them; keys stay as they are
+    scope  visible parameters; None leaves the data unchanged
+    line   of the settings; `lines` of single keys, by their dotted path from `path` on, as `key_lines` gives them
+
+    Raises SettingError with one Problem per unknown parameter or wrong expression.
+    """
+    if scope is None:
+        return data
+    problems: list[Diagnostic] = []
+    resolved = _resolve(data, scope, path, source, line, lines or {}, problems)
+    if problems:
+        raise SettingError(problems)
+    return resolved
+
+
+def _resolve(
+    data: Any,
+    scope: Scope,
+    path: str,
+    source: str,
+    line: int | None,
+    lines: Mapping[str, int],
+    problems: list[Diagnostic],
+) -> Any:
+    line = lines.get(path, line)
+    if isinstance(data, Mapping):
+        return {
+            key: _resolve(value, scope, _below(path, key), source, line, lines, problems) for key, value in data.items()
+        }
+    if isinstance(data, list | tuple):
+        return [
+            _resolve(value, scope, _below(path, place), source, line, lines, problems)
+            for place, value in enumerate(data)
+        ]
+    if not is_reference(data):
+        return data
+    try:
+        return scope.evaluate(data)
+    except ExpressionError as error:
+        if error.message:
+            what = f"setting {path!r}: {error.message}" if path else error.message
+            problems.append(Diagnostic(what, error.remedy, source, line))
+        return data
+
+
+def _below(path: str, key: object) -> str:
+    return f"{path}.{key}" if path else str(key)
+
+
+def without(scope: Scope | None, names: Iterable[str]) -> Scope | None:
+    """The scope without some parameters, such as those that have no value yet."""
+    if scope is None:
+        return None
+    hidden = set(names)
+    outer = without(scope.outer, hidden)
+    return Scope(
+        outer, {name: one for name, one in scope.parameters.items() if name not in hidden}, scope.lent, scope.budget
+    )

@@ -1,0 +1,1 @@
+"""Projection, visibility and map context that several detectors share."""

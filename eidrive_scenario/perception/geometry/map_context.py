@@ -1,0 +1,97 @@
+"""What a map tells a detector: where roads are, how they lead, how high they lie."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.physics.ground import is_level
+
+Array = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+
+CELL = 0.5
+"""The mask of what is near a road has cells of this size [m], larger ones where a map is so large that it would have
+more than MOST_CELLS."""
+MOST_CELLS = 16_000_000
+BEYOND = 20.0
+"""How far the mask goes on beside the lanes' centre lines [m]."""
+UNKNOWN, OFF, ON = -1, 0, 1
+
+
+class MapContext:
+    """The roads around a station, asked for many points at once; without a map it knows nothing.
+
+    margin   how far beside a road something may be to count as near it [m]
+    """
+
+    def __init__(self, roads: RoadNetwork | None, *, margin: float = 0.5) -> None:
+        self.margin = margin
+        self._roads = roads
+        self._mask: NDArray[np.int8] | None = None
+        self._level = is_level(roads)
+        if roads is not None:
+            x0, y0, x1, y1 = roads.bounds()
+            width, height = x1 - x0 + 2.0 * BEYOND, y1 - y0 + 2.0 * BEYOND
+            self._cell = max(CELL, math.sqrt(width * height / MOST_CELLS), max(width, height) / MOST_CELLS)
+            self._corner = np.array([x0 - BEYOND, y0 - BEYOND])
+            shape = (math.ceil(height / self._cell), math.ceil(width / self._cell))
+            self._mask = np.full(shape, UNKNOWN, dtype=np.int8)
+
+    @property
+    def has_map(self) -> bool:
+        """Whether there are roads to ask."""
+        return self._roads is not None
+
+    def near_road(self, plan: Array) -> Booleans:
+        """(N,) whether points (N, 2) lie at most `margin` beside a road, to within a cell; True without a map."""
+        if self._mask is None or self._roads is None or not len(plan):
+            return np.ones(len(plan), dtype=bool)
+        column, row = (np.floor((plan - self._corner) / self._cell).astype(np.int64)).T
+        inside = (column >= 0) & (row >= 0) & (column < self._mask.shape[1]) & (row < self._mask.shape[0])
+        near = np.zeros(len(plan), dtype=bool)
+        cells = np.where(inside, row * self._mask.shape[1] + column, 0)
+        mask = self._mask.reshape(-1)
+        new = np.unique(cells[inside & (mask[cells] == UNKNOWN)])
+        if new.size:
+            x = self._corner[0] + (new % self._mask.shape[1] + 0.5) * self._cell
+            y = self._corner[1] + (new // self._mask.shape[1] + 0.5) * self._cell
+            found = self._roads.locate(x, y)
+            mask[new] = np.where((found.road >= 0) & (found.outside <= self.margin), ON, OFF)
+        near[inside] = mask[cells[inside]] == ON
+        return near
+
+    def lane_heading(self, plan: Array) -> Array:
+        """(N,) direction in which traffic drives at points (N, 2) [rad], NaN off the roads and in junctions."""
+        headings = np.full(len(plan), np.nan)
+        if self._roads is None or not len(plan):
+            return headings
+        found = self._roads.locate(plan[:, 0], plan[:, 1])
+        for row in np.flatnonzero((found.road >= 0) & (found.outside <= 0.0) & (found.lane != 0)).tolist():
+            road, lane = found.roads[int(found.road[row])], int(found.lane[row])
+            if self._roads.roads[road].junction_id is not None:
+                continue
+            against = self._roads.driving_direction(road, lane) < 0
+            headings[row] = float(found.heading[row]) + (np.pi if against else 0.0)
+        return headings
+
+    def facing(self, boxes: Array) -> Array:
+        """(N,) headings of boxes (N, 7), turned about where their lane clearly leads the other way [rad]."""
+        lane = self.lane_heading(boxes[:, :2])
+        against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
+        return np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
+
+    def ground(self, plan: Array, otherwise: float) -> Array:
+        """(N,) height of the road below points (N, 2); `otherwise` off the roads and without a map [m]."""
+        height = np.full(len(plan), otherwise)
+        if self._roads is None or self._level or not len(plan):
+            return height
+        found = self._roads.locate(plan[:, 0], plan[:, 1])
+        for row in np.flatnonzero((found.road >= 0) & (found.outside <= 5.0)).tolist():
+            road = found.roads[int(found.road[row])]
+            height[row] = self._roads.road_pose_at(road, float(found.s[row]), float(found.t[row])).z
+        return height

@@ -1,0 +1,61 @@
+"""Between the world and the pixels of a camera."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
+from eidrive_scenario.sensing.readings import CameraReading
+
+Array = NDArray[np.float64]
+
+NEAREST = 0.1
+"""What is nearer along the optical axis is not in the picture [m]."""
+
+
+def pixels(points: Array, camera: CameraReading) -> tuple[Array, Array]:
+    """(N, 2) where points (N, 3) of the world are in the picture [px], and (N,) how far along the optical axis [m].
+
+    NaN for points that are not before the camera. Brown's distortion, as OpenCV has it.
+    """
+    inverse = camera.pose[:3, :3].T
+    seen = (points - camera.pose[:3, 3]) @ inverse.T
+    found = np.full((len(points), 2), np.nan)
+    ahead = seen[:, 2] > NEAREST
+    if ahead.any():
+        plane: Any
+        plane, _ = cv2.projectPoints(
+            np.ascontiguousarray(seen[ahead]), np.zeros(3), np.zeros(3), camera.intrinsics, camera.distortion
+        )
+        found[ahead] = plane[:, 0]
+    return found, seen[:, 2]
+
+
+def straight_boxes(boxes: Array, camera: CameraReading) -> Array:
+    """(N, 4) boxes [px] in the plane at distance 1 from a camera without distortion: left, top, right, bottom.
+
+    The middle of each edge is taken there.
+    """
+    x0, y0, x1, y1 = boxes.T
+    x, y = (x0 + x1) / 2.0, (y0 + y1) / 2.0
+    middles = np.stack([np.stack([x0, y], 1), np.stack([x, y0], 1), np.stack([x1, y], 1), np.stack([x, y1], 1)], 1)
+    flat: Any = cv2.undistortPoints(
+        np.ascontiguousarray(middles.reshape(-1, 1, 2)), camera.intrinsics, camera.distortion
+    )
+    rays = np.asarray(flat, dtype=float).reshape(-1, 4, 2)
+    return np.stack([rays[:, 0, 0], rays[:, 1, 1], rays[:, 2, 0], rays[:, 3, 1]], axis=1)
+
+
+def level_frame(camera: CameraReading) -> tuple[LevelFrame, Array]:
+    """The level frame under a camera, x along its optical axis, and (3, 3) its rotation to the camera's axes."""
+    pose = camera.pose
+    x, y, z = pose[:3, 3].tolist()
+    yaw = math.atan2(pose[1, 2], pose[0, 2])
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    level = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return LevelFrame(x, y, z, yaw), np.asarray(pose[:3, :3].T @ level)

@@ -1,0 +1,1 @@
+"""Network architectures, their losses and box operations."""

@@ -1,0 +1,105 @@
+"""The network `yolov5`: CSP backbone, pyramid pooling, path aggregation neck, three scales with anchors; nano size.
+
+Written from the published architecture: CSPNet (Wang et al. 2020), PANet (Liu et al. 2018), YOLOv3's anchors on three
+scales (Redmon and Farhadi 2018), YOLOv4's widened centre offsets (Bochkovskiy et al. 2020).
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from eidrive_scenario.perception.learned.networks.blocks import ConvUnit, CrossStage, PyramidPooling
+
+STRIDES = (8, 16, 32)
+ANCHORS_PER_SCALE = 3
+WIDTHS = (16, 32, 64, 128, 256)
+"""Channels at strides 2, 4, 8, 16, 32: a quarter of the large network's."""
+DEPTHS = (1, 2, 3, 1)
+"""Bottlenecks at strides 4, 8, 16, 32: a third of the large network's."""
+
+Anchors = tuple[tuple[tuple[float, float], ...], ...]
+
+
+class YoloV5(nn.Module):
+    """Pictures (B, 3, H, W) in [0, 1], H and W multiples of 32, to raw outputs (B, A, H/s, W/s, 5 + C) of each scale.
+
+    anchors  width and height [px of the network's input] of three boxes for each of the strides 8, 16 and 32
+    """
+
+    def __init__(self, classes: int, anchors: Anchors) -> None:
+        super().__init__()
+        self.classes = classes
+        self.anchors: Tensor
+        self.register_buffer("anchors", torch.tensor(anchors, dtype=torch.float32))
+        if self.anchors.shape != (len(STRIDES), ANCHORS_PER_SCALE, 2):
+            raise ValueError(f"anchors have shape {tuple(self.anchors.shape)}, expected (3, 3, 2)")
+        w1, w2, w3, w4, w5 = WIDTHS
+        d2, d3, d4, d5 = DEPTHS
+        self.fine = nn.Sequential(
+            ConvUnit(3, w1, 6, 2, padding=2),
+            ConvUnit(w1, w2, 3, 2),
+            CrossStage(w2, w2, d2),
+            ConvUnit(w2, w3, 3, 2),
+            CrossStage(w3, w3, d3),
+        )
+        self.middle = nn.Sequential(ConvUnit(w3, w4, 3, 2), CrossStage(w4, w4, d4))
+        self.coarse = nn.Sequential(ConvUnit(w4, w5, 3, 2), CrossStage(w5, w5, d5), PyramidPooling(w5))
+        self.up = nn.Upsample(scale_factor=2, mode="nearest")
+        self.lateral_coarse = ConvUnit(w5, w4)
+        self.merge_middle = CrossStage(2 * w4, w4, 1, shortcut=False)
+        self.lateral_middle = ConvUnit(w4, w3)
+        self.merge_fine = CrossStage(2 * w3, w3, 1, shortcut=False)
+        self.down_fine = ConvUnit(w3, w3, 3, 2)
+        self.out_middle = CrossStage(2 * w3, w4, 1, shortcut=False)
+        self.down_middle = ConvUnit(w4, w4, 3, 2)
+        self.out_coarse = CrossStage(2 * w4, w5, 1, shortcut=False)
+        self.heads = nn.ModuleList(nn.Conv2d(width, ANCHORS_PER_SCALE * (5 + classes), 1) for width in (w3, w4, w5))
+        self._start_rare()
+
+    def forward(self, pictures: Tensor) -> list[Tensor]:
+        fine = self.fine(pictures)
+        middle = self.middle(fine)
+        coarse = self.lateral_coarse(self.coarse(middle))
+        middle = self.lateral_middle(self.merge_middle(torch.cat([self.up(coarse), middle], dim=1)))
+        fine = self.merge_fine(torch.cat([self.up(middle), fine], dim=1))
+        middle = self.out_middle(torch.cat([self.down_fine(fine), middle], dim=1))
+        coarse = self.out_coarse(torch.cat([self.down_middle(middle), coarse], dim=1))
+        outputs = []
+        for head, features in zip(self.heads, (fine, middle, coarse), strict=True):
+            raw: Tensor = head(features)
+            batch, _, height, width = raw.shape
+            outputs.append(
+                raw.view(batch, ANCHORS_PER_SCALE, 5 + self.classes, height, width).permute(0, 1, 3, 4, 2).contiguous()
+            )
+        return outputs
+
+    def decode(self, outputs: list[Tensor]) -> Tensor:
+        """(B, N, 5 + C): cx cy w h [px], objectness, probability of each class."""
+        found = []
+        for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
+            share = raw.sigmoid()
+            cells = cell_corners(raw.shape[2], raw.shape[3], raw.device)
+            centre = (2.0 * share[..., :2] - 0.5 + cells) * stride
+            size = (2.0 * share[..., 2:4]).square() * self.anchors[scale][None, :, None, None, :]
+            found.append(torch.cat([centre, size, share[..., 4:]], dim=-1).flatten(1, 3))
+        return torch.cat(found, dim=1)
+
+    def _start_rare(self) -> None:
+        """Biases by which the first guess is that objects are rare (Lin et al., Focal loss 2017, section 4.1)."""
+        for head, stride in zip(self.heads, STRIDES, strict=True):
+            assert isinstance(head, nn.Conv2d)
+            assert head.bias is not None
+            bias = head.bias.detach().view(ANCHORS_PER_SCALE, -1)
+            bias[:, 4] = math.log(8.0 / (512.0 * 384.0 / stride**2))
+            bias[:, 5:] = math.log(0.6 / (self.classes - 0.99))
+
+
+def cell_corners(height: int, width: int, device: torch.device) -> Tensor:
+    """(H, W, 2) column and line of each cell."""
+    lines, columns = torch.meshgrid(
+        torch.arange(height, device=device), torch.arange(width, device=device), indexing="ij"
+    )
+    return torch.stack([columns, lines], dim=-1).float()

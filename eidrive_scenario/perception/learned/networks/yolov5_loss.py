@@ -1,0 +1,112 @@
+"""Which cell and anchor answers for which object, and the loss of `yolov5`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn.functional import binary_cross_entropy_with_logits
+
+from eidrive_scenario.perception.learned.networks.boxes import complete_iou
+from eidrive_scenario.perception.learned.networks.targets import Targets
+from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCALE, STRIDES, YoloV5, cell_corners
+
+LARGEST_RATIO = 4.0
+"""An anchor answers for a box if neither side of one is more than this many times that of the other: sizes decode to at
+most (2·1)² = 4 times the anchor."""
+SCALE_WEIGHTS = (4.0, 1.0, 0.4)
+"""Of the objectness at strides 8, 16, 32: small objects are many and hard."""
+BOX_WEIGHT, OBJECT_WEIGHT, CLASS_WEIGHT = 2.5, 25.0, 0.6
+
+
+class Assignment(NamedTuple):
+    """The K answers of one scale: picture, anchor, line and column (K,), box (K, 4) [px], class (K,)."""
+
+    picture: Tensor
+    anchor: Tensor
+    line: Tensor
+    column: Tensor
+    boxes: Tensor
+    classes: Tensor
+
+
+def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: int) -> Assignment:
+    """The answers of one scale of height x width cells; anchors (A, 2) [px].
+
+    An object is answered for by all anchors of like size, in the cell of its centre and in the two next cells whose
+    widened offsets, -0.5 to 1.5, still reach it.
+    """
+    picture, boxes, classes = targets.objects()
+    ratio = boxes[:, None, 2:] / anchors[None]
+    fits = torch.maximum(ratio, 1.0 / ratio.clamp(min=1e-9)).amax(dim=2) < LARGEST_RATIO
+    row, anchor = torch.nonzero(fits, as_tuple=True)
+    centre = boxes[row, :2] / stride
+    cell = centre.floor()
+    beside = torch.where(centre - cell < 0.5, -1.0, 1.0)
+    none = torch.zeros_like(cell[:, 0])
+    shifts = torch.stack(
+        [
+            torch.stack([none, none], dim=1),
+            torch.stack([beside[:, 0], none], dim=1),
+            torch.stack([none, beside[:, 1]], dim=1),
+        ]
+    )
+    cells = (cell[None] + shifts).long().reshape(-1, 2)
+    row, anchor = row.repeat(3), anchor.repeat(3)
+    column, line = cells.unbind(dim=1)
+    inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+    row, anchor, column, line = row[inside], anchor[inside], column[inside], line[inside]
+    return Assignment(picture[row], anchor, line, column, boxes[row], classes[row])
+
+
+class YoloLoss:
+    """CIoU of boxes, binary cross entropy of objectness and classes, each a mean over what it is about.
+
+    The objectness asked of an answering cell is the CIoU of its box. Cells in ignored objects are asked nothing.
+    """
+
+    def __init__(self, network: YoloV5) -> None:
+        self._anchors = network.anchors
+        self._classes = network.classes
+
+    def __call__(self, outputs: list[Tensor], targets: Targets) -> tuple[Tensor, dict[str, float]]:
+        """The loss of outputs as `YoloV5` gives them, and its parts."""
+        device = outputs[0].device
+        box_loss, object_loss, class_loss = (torch.zeros((), device=device) for _ in range(3))
+        answers = 0
+        for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
+            raw = raw.float()
+            height, width = raw.shape[2:4]
+            found = assign(targets, self._anchors[scale], stride, height, width)
+            wanted = torch.zeros(raw.shape[:4], device=device)
+            count = len(found.classes)
+            if count:
+                answers += count
+                chosen = raw[found.picture, found.anchor, found.line, found.column]
+                share = chosen[:, :4].sigmoid()
+                cells = torch.stack([found.column, found.line], dim=1)
+                centre = (2.0 * share[:, :2] - 0.5 + cells) * stride
+                size = (2.0 * share[:, 2:]).square() * self._anchors[scale][found.anchor]
+                fit = complete_iou(torch.cat([centre, size], dim=1), found.boxes)
+                box_loss = box_loss + (1.0 - fit).sum()
+                wanted.index_put_((found.picture, found.anchor, found.line, found.column), fit.detach().clamp(min=0.0))
+                one_hot = torch.zeros((count, self._classes), device=device)
+                one_hot[torch.arange(count, device=device), found.classes] = 1.0
+                class_loss = class_loss + binary_cross_entropy_with_logits(chosen[:, 5:], one_hot, reduction="sum")
+            asked = self._asked(targets, height, width, stride, device) | (wanted > 0.0)
+            each = binary_cross_entropy_with_logits(raw[..., 4], wanted, reduction="none")
+            object_loss = object_loss + SCALE_WEIGHTS[scale] * (each * asked).mean()
+        share_of_answers = 1.0 / max(answers, 1)
+        parts = {
+            "box": BOX_WEIGHT * share_of_answers * box_loss,
+            "object": OBJECT_WEIGHT * object_loss,
+            "class": CLASS_WEIGHT * share_of_answers * class_loss,
+        }
+        return sum(parts.values(), torch.zeros((), device=device)), {k: float(v.detach()) for k, v in parts.items()}
+
+    def _asked(self, targets: Targets, height: int, width: int, stride: int, device: torch.device) -> Tensor:
+        """(B, A, H, W) cells that are not in an ignored object."""
+        centres = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
+        free = ~targets.in_ignored(centres).view(-1, 1, height, width)
+        return free.expand(-1, ANCHORS_PER_SCALE, -1, -1)

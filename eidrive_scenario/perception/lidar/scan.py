@@ -1,0 +1,101 @@
+"""What stands on the ground in one sweep of a LiDAR."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, Pattern
+from eidrive_scenario.perception.geometry.size_priors import LARGEST
+from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box
+from eidrive_scenario.perception.lidar.ground import CLEARANCE, ground_height
+from eidrive_scenario.sensing.readings import LidarReading
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NEARER = 0.5
+"""What ends this much before an object, beside it as the sensor sees it, hides a part of it [m]."""
+BESIDE = 1.6
+"""How many columns of rays beside its outermost point are looked at for that."""
+OVERHEAD = 0.5
+"""Points this much higher than the largest road user are above the road [m]."""
+
+
+class Scan:
+    """The points of a sweep without the ground, in the level frame of the sensor.
+
+    foot   height of the ground below the sensor [m]
+    keep   which places (N, 2) in the world count; all where None
+    """
+
+    def __init__(
+        self,
+        reading: LidarReading,
+        pattern: Pattern,
+        foot: float,
+        keep: Callable[[Array], NDArray[np.bool_]] | None = None,
+    ) -> None:
+        self.frame = LevelFrame.of(reading.pose)
+        self.pattern = pattern
+        points = self.frame.points(reading)
+        ground = ground_height(points, foot)
+        above = points[:, 2] - ground
+        standing = (above > CLEARANCE) & (above < LARGEST[2] + OVERHEAD)
+        if keep is not None:
+            standing[standing] = keep(self.frame.to_world(points[standing, :2]))
+        self.points = points[standing]
+        self._ground = ground[standing]
+        self._bearing = np.arctan2(self.points[:, 1], self.points[:, 0])
+        self._distance = np.hypot(self.points[:, 0], self.points[:, 1])
+
+    @property
+    def world(self) -> Array:
+        """(N, 3) the points in the world."""
+        return np.concatenate([self.frame.to_world(self.points[:, :2]), self.points[:, 2:3]], axis=1)
+
+    def fit(
+        self,
+        rows: Integers,
+        classes: Sequence[str],
+        heading: float | None = None,
+        heading_cost: Callable[[float], float] | None = None,
+    ) -> Fit | None:
+        """The box around these points, None where no road user is so large; headings as in `fit_box`."""
+        points = self.points[rows]
+        if math.hypot(*np.ptp(points[:, :2], axis=0).tolist()) > math.hypot(LARGEST[0], LARGEST[1]):
+            return None
+        return fit_box(
+            points,
+            sensor_height=self.frame.height,
+            ground=float(np.median(self._ground[rows])),
+            pattern=self.pattern,
+            classes=classes,
+            hidden=self._hidden(rows),
+            cut=self._cut(rows),
+            heading=heading,
+            heading_cost=heading_cost,
+        )
+
+    def _cut(self, rows: Integers) -> tuple[bool, bool]:
+        """Whether the left and the right end of these points lie at the border of the field of view."""
+        border = self.pattern.half_field - BESIDE * self.pattern.azimuth
+        if self.pattern.half_field >= math.pi:
+            return False, False
+        bearing = self._bearing[rows]
+        return bool(bearing.max() > border), bool(bearing.min() < -border)
+
+    def _hidden(self, rows: Integers) -> tuple[bool, bool]:
+        """Whether something nearer stands right beside the left and the right end of these points."""
+        turned = wrap_angle(self._bearing - float(self._bearing[rows[len(rows) // 2]]))
+        own = turned[rows]
+        flags = []
+        for end, sign in ((int(rows[np.argmax(own)]), 1.0), (int(rows[np.argmin(own)]), -1.0)):
+            past = sign * (turned - turned[end])
+            beside = (past > 1e-9) & (past <= BESIDE * self.pattern.azimuth)
+            flags.append(bool(np.any(self._distance[beside] < self._distance[end] - NEARER)))
+        return flags[0], flags[1]

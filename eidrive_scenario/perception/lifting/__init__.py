@@ -1,0 +1,1 @@
+"""Lifting of image detections to boxes in the world."""

@@ -1,0 +1,55 @@
+"""Settings of the tracker of a station."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, PositiveInt, model_validator
+
+from eidrive_scenario.perception.tracking.existence import BIRTH_DENSITY, DETECTION_PROBABILITY, LIFETIME
+from eidrive_scenario.settings import Settings
+
+
+class TrackerSettings(Settings):
+    """The property `tracker`: a kind, or a mapping with these.
+
+    kind      cv: constant velocity; ctrv: constant turn rate and speed; none
+    confirm   [n, m]: an object is reported once it was detected in n of m successive detections, and
+    confirm_existence   it exists with at least this probability: 0.5 is the likelier of the two hypotheses
+    delete_existence    probability of existence below which a track is deleted
+    coast     maximum time without a detection, after which a track is deleted whatever its existence [s]
+    gate      probability that a detection of an object is within its gate
+    detection_probability   that an object in full view is detected in a scan
+    birth_density       of new objects [1/m² per scan]
+    lifetime  mean time that an object remains [s]
+
+    The recursion of the probability of existence and the sources of its defaults are those of
+    `eidrive_scenario.perception.tracking.existence`.
+    """
+
+    kind: Literal["none", "cv", "ctrv"] = "cv"
+    confirm: tuple[PositiveInt, PositiveInt] = (2, 3)
+    confirm_existence: float = Field(default=0.5, ge=0.0, lt=1.0)
+    delete_existence: float = Field(default=0.05, ge=0.0, lt=1.0)
+    coast: float = Field(default=0.5, ge=0.0, le=1e4)
+    gate: float = Field(default=0.99, gt=0.0, lt=1.0)
+    detection_probability: float = Field(default=DETECTION_PROBABILITY, gt=0.0, lt=1.0)
+    birth_density: float = Field(default=BIRTH_DENSITY, gt=0.0, le=1e6)
+    lifetime: float = Field(default=LIFETIME, gt=0.0, le=1e6)
+
+    @model_validator(mode="after")
+    def _n_of_m(self) -> TrackerSettings:
+        if self.confirm[0] > self.confirm[1]:
+            raise ValueError(
+                f"{self.confirm[0]} of {self.confirm[1]} detections can never be; write [n, m] with n <= m"
+            )
+        if self.delete_existence > self.confirm_existence:
+            raise ValueError(
+                f"delete_existence {self.delete_existence:g} is above confirm_existence {self.confirm_existence:g}"
+            )
+        return self
+
+
+def tracker_setting(value: Any) -> Any:
+    """A tracker may be written as its kind alone; None leaves it to the detector."""
+    return {"kind": value} if isinstance(value, str) else value

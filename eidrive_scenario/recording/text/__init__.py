@@ -1,0 +1,1 @@
+"""Text output: run log, CSV, explanations of triggers."""

@@ -1,0 +1,194 @@
+"""Why an element of the storyboard started in a run, or why it did not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from eidrive_scenario.errors import Diagnostic, SettingError, suggestion
+from eidrive_scenario.openscenario.validation.storyboard_names import is_suffix
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.text.condition_text import describe_history
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.storyboard.storyboard import Storyboard
+from eidrive_scenario.storyboard.tree.elements import ActElement, StoryElement
+from eidrive_scenario.storyboard.tree.events import EventElement
+from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
+from eidrive_scenario.storyboard.tree.trigger_history import GroupHistory, TriggerHistory
+
+STORYBOARD = "storyboard"
+_SHOWN = 5
+
+
+class Explanation:
+    """An observer of one run that explains one element: an event or an act by its name, or with those above it.
+
+    "storyboard" asks why the run stopped by the storyboard's stop trigger, or why not.
+    """
+
+    def __init__(self, reference: str) -> None:
+        self.reference = reference
+        self._subjects: list[_Subject] = []
+
+    def watch(self, storyboard: Storyboard) -> None:
+        """Look on as its triggers are asked. Raises SettingError if the storyboard has no such element."""
+        if self.reference == STORYBOARD:
+            self._subjects = [_Subject(storyboard.root, None, storyboard.root.stop_leaf)]
+            return
+        named = list(_named(storyboard.root, None))
+        self._subjects = [
+            _Subject(element, act, element.start_leaf)
+            for element, act in named
+            if is_suffix(self.reference, element.record.path)
+        ]
+        if not self._subjects:
+            known = {element.name for element, _ in named} | {STORYBOARD}
+            raise SettingError(
+                Diagnostic(f"no event or act is named {self.reference!r}", suggestion(self.reference, known))
+            )
+
+    def observe(self, frame: Frame) -> None:
+        """Note what became of the element."""
+        for subject in self._subjects:
+            subject.observe(frame)
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+    def lines(self) -> list[str]:
+        """What there is to say, line by line."""
+        return [line for subject in self._subjects for line in subject.lines()]
+
+
+def _named(element: StoryElement, act: StoryElement | None) -> Iterator[tuple[StoryElement, StoryElement | None]]:
+    """All acts and events, each with the act around it."""
+    if isinstance(element, ActElement | EventElement):
+        yield element, act
+    inside = element if isinstance(element, ActElement) else act
+    for child in element.elements:
+        yield from _named(child, inside)
+
+
+class _Subject:
+    """One element, the act around it, and what its trigger saw."""
+
+    def __init__(self, element: StoryElement, act: StoryElement | None, leaf: WaitForTrigger | None) -> None:
+        self._element = element
+        self._around = _Subject(act, None, act.start_leaf) if act is not None else None
+        self._history = _history(leaf)
+        self._changes: list[StateChange] = []
+        self._now = 0.0
+        self._ends: list[tuple[float, str]] = []
+
+    def observe(self, frame: Frame) -> None:
+        """Note its changes, and those of the act around it."""
+        self._now = frame.view.time
+        path = "/".join(self._element.record.path)
+        self._changes += [change for change in frame.changes if change.path == path]
+        if self._around is not None:
+            self._around.observe(frame)
+
+    def lines(self) -> Iterator[str]:
+        """Its story, then what its trigger saw."""
+        element = self._element
+        if isinstance(element, ActElement | EventElement):
+            yield from self._starts()
+            word = "start"
+        else:
+            yield f"the run {self._how_it_ended()}"
+            word = "stop"
+        if self._history is None:
+            without = f"it has no {word} trigger"
+            starts = self._times(ElementTransition.START)
+            if element.kind == STORYBOARD or any(without not in change.why for change in starts[:_SHOWN]):
+                yield f"  {without}"
+            return
+        if not self._history.asked:
+            return
+        groups = self._history.groups
+        yield f"  its {word} trigger" + (", one of whose groups has to hold:" if len(groups) > 1 else ":")
+        for number, group in enumerate(groups, 1):
+            yield from _group_lines(group, f"group {number} of {len(groups)}" if len(groups) > 1 else "")
+
+    def _starts(self) -> Iterator[str]:
+        element = self._element
+        title = f"{element.kind} {element.name} ({'/'.join(element.record.path)})"
+        starts = self._times(ElementTransition.START)
+        skips = self._times(ElementTransition.SKIP)
+        if starts:
+            often = "" if len(starts) == 1 else f" {len(starts)} times"
+            yield f"{title} started{often}:"
+        else:
+            yield f"{title} never started"
+        yield from (f"  at {change.time:.2f} s: {change.why or 'with what is around it'}" for change in starts[:_SHOWN])
+        if skips:
+            yield f"  it was skipped {_times(len(skips))}, first at {skips[0].time:.2f} s: {skips[0].why}"
+        if not starts and not any(change.after is ElementState.STANDBY for change in self._changes):
+            yield from self._never_stood_by()
+        elif not starts:
+            yield f"  {self._wait()}"
+
+    def _never_stood_by(self) -> Iterator[str]:
+        """What is around it never ran: that is what has to be explained."""
+        if self._around is None:
+            yield f"  what is around it never ran (the run ended at {self._now:.2f} s)"
+            return
+        yield "  it never stood by, as the act around it did not run; so this is about the act:"
+        yield from (f"  {line}" for line in self._around.lines())
+
+    def _wait(self) -> str:
+        begin = next(change.time for change in self._changes if change.after is ElementState.STANDBY)
+        stop = next((change for change in self._changes if change.transition is ElementTransition.STOP), None)
+        if stop is None:
+            return f"it stood by from {begin:.2f} s to the end of the run at {self._now:.2f} s"
+        why = f" ({stop.why})" if stop.why else ""
+        return f"it stood by from {begin:.2f} s to {stop.time:.2f} s, when what is around it was stopped{why}"
+
+    def _how_it_ended(self) -> str:
+        last = self._changes[-1] if self._changes else None
+        if last is None or last.after is not ElementState.COMPLETE:
+            return f"was not ended by the storyboard; it lasted until {self._now:.2f} s"
+        how = "stopped" if last.transition is ElementTransition.STOP else "ended with its last story"
+        return f"{how} at {last.time:.2f} s" + (f": {last.why}" if last.why else "")
+
+    def _times(self, transition: ElementTransition) -> list[StateChange]:
+        return [change for change in self._changes if change.transition is transition]
+
+
+def _history(leaf: WaitForTrigger | None) -> TriggerHistory | None:
+    """What is known of a leaf's trigger; one trigger has one witness, whoever asks."""
+    if leaf is None:
+        return None
+    known = leaf.trigger.witness
+    return known if isinstance(known, TriggerHistory) else TriggerHistory(leaf.trigger)
+
+
+def _group_lines(group: GroupHistory, title: str) -> Iterator[str]:
+    indent = "    "
+    if title:
+        yield f"{indent}{title}: {_verdict(group)}"
+        indent += "  "
+    elif len(group.conditions) > 1:
+        yield f"{indent}{_verdict(group)}"
+    for condition in group.conditions:
+        monitor = condition.monitor
+        where = monitor.condition.element
+        yield f"{indent}{monitor.describe()}  [{monitor.name!r}, {where.source}:{where.line}]"
+        yield from (f"{indent}  {fact}" for fact in describe_history(condition))
+
+
+def _verdict(group: GroupHistory) -> str:
+    if group.held.count:
+        return f"it held at {group.held.first[0]:.2f} s"
+    total = len(group.conditions)
+    if total == 1:
+        return "it never held"
+    if all(condition.counted.count for condition in group.conditions):
+        return f"each condition counted as true at some time, but never all {total} at once"
+    if group.most <= 0:
+        return f"none of the {total} conditions ever counted as true"
+    missing = " and ".join(condition.monitor.describe() for condition in group.missing)
+    return f"{group.most} of {total} conditions at most, first at {group.most_at:.2f} s, without: {missing}"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -1,0 +1,1 @@
+"""Drawings of roads, scenes and measurements for pages and images."""

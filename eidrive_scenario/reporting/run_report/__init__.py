@@ -1,0 +1,1 @@
+"""The report over many runs: groups, statistics, one HTML page."""

@@ -1,0 +1,187 @@
+"""A storyboard as a picture: who does what when, and what waits for what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+
+from eidrive_scenario.files.atomic import create
+from eidrive_scenario.reporting.storyboard_diagram.boxes import BoxLine, Role, init_boxes, stop_lines, story_boxes
+from eidrive_scenario.reporting.storyboard_diagram.layout import (
+    GAP,
+    INIT_WIDTH,
+    LEADING,
+    PADDING,
+    TEXT,
+    TITLE,
+    Arrow,
+    DiagramLayout,
+    Placed,
+    TextLine,
+    layout_diagram,
+    sized,
+    text_lines,
+)
+from eidrive_scenario.storyboard.storyboard import Storyboard
+
+MARGIN = 28.0
+INK, MUTED, WIRE = "#1e293b", "#64748b", "#cbd5e1"
+ROLES = {Role.START: "#15803d", Role.STOP: "#b91c1c", Role.WHO: "#475569", Role.WHAT: "#475569"}
+KINDS = {
+    "init": ("Init", "#94a3b8"),
+    "story": ("Story", "#64748b"),
+    "act": ("Act", "#0369a1"),
+    "maneuverGroup": ("Maneuver group", "#0f766e"),
+    "maneuver": ("Maneuver", "#4d7c0f"),
+    "event": ("Event", "#b45309"),
+    "action": ("Action", "#7c3aed"),
+}
+ARROWS = ("#b45309", "#0369a1", "#be185d", "#4d7c0f", "#7c3aed", "#0f766e")
+
+
+def write_storyboard_picture(storyboard: Storyboard, out: Path) -> Path:
+    """Draw a storyboard into an SVG file. Raises SettingError if it cannot be written. Returns `out`."""
+    with create(out) as stream:
+        stream.write(storyboard_picture(storyboard).encode())
+    return out
+
+
+def storyboard_picture(storyboard: Storyboard) -> str:
+    """The SVG of a storyboard: Init on top, then a column for each level, arrows from what is waited for."""
+    stories = story_boxes(storyboard)
+    width = max(layout_diagram(stories, MARGIN, 0.0).width, MARGIN + 3 * INIT_WIDTH + 2 * GAP)
+    head, y = _head(storyboard, width)
+    init, y = _init(storyboard, y, width)
+    layout = layout_diagram(stories, MARGIN, y + 52.0)
+    parts = [*head, *init, *_columns(layout, y + 34.0)]
+    for story in layout.stories:
+        for placed in story.walk():
+            parts += [_wire(placed, child) for child in placed.children]
+    parts += [_arrow(arrow, ARROWS[number % len(ARROWS)]) for number, arrow in enumerate(layout.arrows)]
+    for story in layout.stories:
+        for placed in story.walk():
+            parts += _box(placed)
+    full, height = width + MARGIN, layout.height + MARGIN
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{full:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {full:.0f} {height:.0f}" font-family="Inter, Helvetica, Arial, sans-serif" '
+        f'font-size="{TEXT}" fill="{INK}"><title>{escape(storyboard.scenario.name)}</title>{_DEFINITIONS}'
+        f'<rect width="100%" height="100%" fill="#fff"/>{"".join(parts)}</svg>\n'
+    )
+
+
+_DEFINITIONS = (
+    "<style>.arrow:hover path{stroke-width:3}.arrow path{stroke-width:1.5}</style>"
+    '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto" '
+    'markerUnits="userSpaceOnUse"><path d="M0 0L8 4L0 8z" fill="context-stroke"/></marker></defs>'
+)
+
+
+def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
+    scenario = storyboard.scenario
+    version = ".".join(map(str, scenario.version))
+    count = "1 entity" if len(scenario.entities) == 1 else f"{len(scenario.entities)} entities"
+    parts = [
+        _text(MARGIN, MARGIN + 18, scenario.name, size=22, weight=700),
+        _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {count}", colour=MUTED),
+    ]
+    y = MARGIN + 60
+    first, *others = stop_lines(storyboard)
+    shown = [BoxLine(first.role, f"The run stops {first.lead}", first.text), *others]
+    for line in text_lines(shown, width - MARGIN):
+        parts.append(_line(MARGIN, y, line))
+        y += LEADING
+    return parts, y + 8
+
+
+def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], float]:
+    """Cards of what Init does, side by side in rows."""
+    boxes = init_boxes(storyboard)
+    if not boxes:
+        return [], y
+    parts = [_text(MARGIN, y + 12, "Init", size=TEXT, weight=700, colour=MUTED)]
+    columns = max(1, int((width - MARGIN + GAP) // (INIT_WIDTH + GAP)))
+    y += 22.0
+    for first in range(0, len(boxes), columns):
+        row = boxes[first : first + columns]
+        cards = [sized(box, MARGIN + n * (INIT_WIDTH + GAP), y, INIT_WIDTH) for n, box in enumerate(row)]
+        parts += [part for card in cards for part in _box(card)]
+        y += max(card.height for card in cards) + GAP
+    return parts, y
+
+
+def _columns(layout: DiagramLayout, y: float) -> Iterator[str]:
+    for kind, x in layout.columns.items():
+        yield _text(x, y, KINDS[kind][0], size=TEXT, weight=700, colour=KINDS[kind][1])
+
+
+def _box(placed: Placed) -> list[str]:
+    name, colour = KINDS[placed.box.kind]
+    x, y, width, height = placed.x, placed.y, placed.width, placed.height
+    where = " / ".join(placed.box.path)
+    parts = [
+        f"<g><title>{escape(f'{name}: {where}')}</title>",
+        f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="5" fill="{colour}" '
+        f'fill-opacity="0.07" stroke="{colour}" stroke-opacity="0.45"/>',
+        f'<path d="M{x + 1.5:.1f} {y + 4:.1f}v{height - 8:.1f}" stroke="{colour}" stroke-width="3"/>',
+    ]
+    base = y + PADDING + TITLE - 2
+    for number, title in enumerate(placed.title):
+        parts.append(_text(x + PADDING, base + number * LEADING, title, size=TITLE, weight=700))
+    if placed.box.remark:
+        parts.append(_text(x + width - PADDING, base, placed.box.remark, colour=colour, anchor="end"))
+    base += LEADING * len(placed.title) + 4
+    for number, line in enumerate(placed.lines):
+        parts.append(_line(x + PADDING, base + number * LEADING, line))
+    return [*parts, "</g>"]
+
+
+def _line(x: float, y: float, line: TextLine) -> str:
+    colour = ROLES[line.source.role]
+    text = _text(x + line.indent, y, line.text, weight=600 if line.source.role is Role.WHO else 400)
+    return (_text(x, y, line.lead, colour=colour, weight=600) if line.lead else "") + text
+
+
+def _wire(parent: Placed, child: Placed) -> str:
+    x0, x1 = parent.x + parent.width, child.x
+    y0, y1 = parent.middle, child.middle
+    bend = x0 + 12.0
+    if abs(y1 - y0) < 0.5:
+        way = f"M{x0:.1f} {y0:.1f}H{x1:.1f}"
+    else:
+        way = f"M{x0:.1f} {y0:.1f}H{bend - 5:.1f}q5 0 5 5V{y1 - 5:.1f}q0 5 5 5H{x1:.1f}"
+    return f'<path d="{way}" fill="none" stroke="{WIRE}" stroke-width="1.5"/>'
+
+
+def _arrow(arrow: Arrow, colour: str) -> str:
+    """Out of the source's lower left, along its lane, into the first line of the target's trigger."""
+    source, target = arrow.source, arrow.target
+    y0 = source.y + source.height - 9.0
+    y1 = target.middle + LEADING + 4.0 if target.lines else target.middle + 6.0
+    turn = 6.0 if y1 > y0 else -6.0
+    way = (
+        f"M{source.x:.1f} {y0:.1f}H{arrow.lane + 6:.1f}q-6 0 -6 {turn:.1f}V{y1 - turn:.1f}q0 {turn:.1f} 6 {turn:.1f}"
+        f"H{target.x:.1f}"
+    )
+    words = f"{target.box.title} waits for {source.box.title}"
+    return (
+        f'<g class="arrow"><title>{escape(words)}</title><path d="{way}" fill="none" stroke="{colour}" '
+        f'marker-end="url(#tip)"/><circle cx="{source.x:.1f}" cy="{y0:.1f}" r="2.6" fill="{colour}"/></g>'
+    )
+
+
+def _text(
+    x: float,
+    y: float,
+    text: str,
+    *,
+    size: float = TEXT,
+    weight: int = 400,
+    colour: str = INK,
+    anchor: str = "start",
+) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" font-weight="{weight}" fill="{colour}" '
+        f'text-anchor="{anchor}">{escape(text)}</text>'
+    )

@@ -1,0 +1,1 @@
+"""Poses on roads and the search for the lane at a point."""

@@ -1,0 +1,185 @@
+"""World coordinates to roads and lanes: nearest sample of a lane centre first, Newton's method on the road after."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from eidrive_scenario.roads.geometry.overlaps import Overlaps
+from eidrive_scenario.roads.geometry.tables import RoadTables
+from eidrive_scenario.roads.model.location import Array, Integers, LaneLocations
+
+SPACING = 4.0
+"""Distance between samples along a lane [m]."""
+NARROW = 1.0
+"""Lanes narrower than this are found by way of their neighbours [m]."""
+CANDIDATES = 12
+MANY = 1000
+"""More points than this are put in order first."""
+REACH = 30.0
+"""How far from a road a point may lie to be located on it [m]."""
+
+
+class Locator:
+    """Finds road and lane coordinates of points.
+
+    A point is taken to the road whose lane centre is nearest; where it turns out to lie on none of that road's lanes,
+    the roads of the next samples are tried and the one wins that the point lies on, or is nearest to.
+    """
+
+    def __init__(self, tables: RoadTables) -> None:
+        self._tables = tables
+        self._row, self._s = _samples(tables)
+        poses = tables.lane_poses(self._row, self._s, np.zeros_like(self._s))
+        self._road = tables.section_road[tables.lane_section[self._row]]
+        self.sample_points: Array = np.column_stack([poses.x, poses.y])
+        self._from_samples = tables.widest_lane + NARROW + SPACING
+        """No point on a road is further away from the nearest of its samples [m]."""
+        self._flat = cKDTree(self.sample_points)
+        self._solid = cKDTree(np.column_stack([poses.x, poses.y, poses.z])) if np.any(poses.z != 0.0) else None
+
+    def locate(self, x: Array, y: Array, z: Array | None, reach: float = REACH) -> LaneLocations:
+        """Road and lane coordinates of points (N,); without z, the nearest in plan view counts."""
+        solid = z is not None and self._solid is not None
+        tree = self._solid if solid and self._solid is not None else self._flat
+        points = np.column_stack([x, y, z]) if solid and z is not None else np.column_stack([x, y])
+        # What is far from all samples is out of reach of every road.
+        hopeless = np.inf if solid else reach + self._from_samples
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
+        if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
+            return self._located(tree, points, nearest, reach)
+        # Neighbours one after the other: tables are searched faster in order.
+        order = np.flatnonzero(distance < np.inf)
+        order = order[np.argsort(nearest[order])]
+        some = self._located(tree, points[order], nearest[order], reach)
+        found = LaneLocations(self._tables.ids, *_nowhere(len(points)))
+        for entry in fields(found)[1:]:
+            getattr(found, entry.name)[order] = getattr(some, entry.name)
+        return found
+
+    def _located(self, tree: cKDTree, points: Array, nearest: Integers, reach: float) -> LaneLocations:
+        """Points (N, 2), or (N, 3) where height counts, by the samples of `tree` that are nearest to them."""
+        x, y, z = points[:, 0], points[:, 1], points[:, 2] if points.shape[1] > 2 else None
+        road, s = self._road[nearest], self._s[nearest]
+        s, t, beyond = self._refine(road, s, x, y)
+        row, outside = self._tables.lane_beside(road, s, t)
+        outside = np.hypot(outside, beyond)
+        doubtful = np.flatnonzero(outside > 0.0)
+        if doubtful.size and len(self._s) > 1:
+            height = None if z is None else z[doubtful]
+            limit = outside[doubtful] + self._from_samples if z is None else np.full(len(doubtful), np.inf)
+            best = self._compare(tree, points[doubtful], x[doubtful], y[doubtful], height, limit)
+            road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
+        heading = self._tables.curves.at(road, s)[2]
+        far = outside > reach
+        centre, _ = self._tables.lane_t(row, s)
+        return LaneLocations(
+            roads=self._tables.ids,
+            road=np.where(far, -1, road),
+            lane=np.where(far, 0, self._tables.lane_id[row]),
+            s=s,
+            t=t,
+            offset=t - centre,
+            heading=heading,
+            outside=outside,
+        )
+
+    def overlapped_lanes(self, x: Array, y: Array, z: Array | None) -> tuple[Integers, Array, Integers]:
+        """Every lane beneath points (N,): its row, s on its road, and the point's number."""
+        found = self.locate(x, y, z)
+        on = np.flatnonzero((found.road >= 0) & (found.outside <= 0.0))
+        pair, other, guess = self._overlaps.beneath(found.road[on], x[on], y[on])
+        roads = np.concatenate([found.road[on], other])
+        guesses, points = np.concatenate([found.s[on], guess]), np.concatenate([on, on[pair]])
+        refined, t, beyond = self._refine(roads, guesses, x[points], y[points])
+        row, outside = self._tables.lane_beside(roads, refined, t)
+        hit = np.flatnonzero((beyond <= 0.0) & (outside <= 0.0))
+        return row[hit], refined[hit], points[hit]
+
+    @cached_property
+    def _overlaps(self) -> Overlaps:
+        return Overlaps(self._tables, self.sample_points, self._road, self._s, self._from_samples)
+
+    def _compare(
+        self, tree: cKDTree, points: Array, x: Array, y: Array, z: Array | None, limit: Array
+    ) -> tuple[Integers, Array, Array, Integers, Array]:
+        """The best of the roads of the nearest samples: the one whose surface is nearest.
+
+        limit  (N,) distance beyond which a sample's road cannot be nearer than what is known already [m]
+        """
+        k = min(CANDIDATES, len(self._s))
+        distance, nearest = (np.asarray(part) for part in tree.query(points, k=k))
+        nearest = nearest.reshape(len(points), k)
+        road = self._road[nearest]
+        first = np.ones_like(road, dtype=bool)
+        for k_th in range(1, k):
+            first[:, k_th] = ~np.any(road[:, :k_th] == road[:, k_th : k_th + 1], axis=1)
+        first[:, 1:] &= distance.reshape(len(points), k)[:, 1:] <= limit[:, None]
+        point, column = np.nonzero(first)
+        road, s = road[point, column], self._s[nearest[point, column]]
+        s, t, beyond = self._refine(road, s, x[point], y[point])
+        row, outside = self._tables.lane_beside(road, s, t)
+        outside = np.hypot(outside, beyond)
+        score = outside
+        if z is not None:
+            score = outside + np.abs(z[point] - self._tables.road_poses(road, s, t).z)
+        order = np.lexsort((column, score, point))
+        best = order[np.searchsorted(point[order], np.arange(len(points)))]
+        return road[best], s[best], t[best], row[best], outside[best]
+
+    def _refine(self, road: Integers, s: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """s, t and the distance beyond an end of the road, by Newton's method from a guess of s."""
+        curves, length = self._tables.curves, self._tables.length[road]
+        s, t, beyond = s.copy(), np.empty_like(s), np.zeros_like(s)
+        open_ = np.arange(len(s))
+        for _ in range(10):
+            px, py, h, curvature, speed = curves.at(road[open_], s[open_])
+            cos, sin = np.cos(h), np.sin(h)
+            dx, dy = x[open_] - px, y[open_] - py
+            along, left = cos * dx + sin * dy, cos * dy - sin * dx
+            t[open_] = left
+            if self._tables.banked:
+                ahead, level, _, _ = self._tables.lateral_axis(road[open_], s[open_])
+                t[open_] = left / level
+                along = along - t[open_] * ahead
+                stretch = self._tables.stretch_at(road[open_], s[open_], t[open_], curvature, speed)
+            else:
+                stretch = speed * (1.0 - curvature * left)
+            step = along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
+            moved = np.clip(s[open_] + step, 0.0, length[open_])
+            change = np.abs(moved - s[open_])
+            s[open_] = moved
+            at_end = (moved <= 0.0) | (moved >= length[open_])
+            beyond[open_] = np.where(at_end & (np.abs(along) > 1e-6), np.abs(along), 0.0)
+            open_ = open_[change > 1e-6]
+            if not open_.size:
+                break
+        return s, t, beyond
+
+
+def _nowhere(count: int) -> tuple[Integers, Integers, Array, Array, Array, Array, Array]:
+    """The columns of LaneLocations for places that no road is near."""
+    s, t, offset, heading = np.zeros((4, count))
+    return np.full(count, -1), np.zeros(count, dtype=np.int64), s, t, offset, heading, np.full(count, np.inf)
+
+
+def _samples(tables: RoadTables) -> tuple[Integers, Array]:
+    """Lane rows and s of the samples: along every lane that is not narrow, and along the widest of each section."""
+    lanes = np.flatnonzero(tables.lane_id != 0)
+    section = tables.lane_section[lanes]
+    length = tables.section_length[section]
+    width = np.max([tables.width.value(lanes, length * part) for part in (0.0, 0.5, 1.0)], axis=0)
+    widest = np.zeros(len(tables.section_start))
+    np.maximum.at(widest, section, width)
+    chosen = (width >= NARROW) | (width >= widest[section])
+    lanes, length, section = lanes[chosen], length[chosen], section[chosen]
+    counts = np.maximum(np.ceil(length / SPACING).astype(np.int64), 1) + 1
+    row = np.repeat(lanes, counts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    part = number / np.repeat(counts - 1, counts)
+    # The end of a section belongs to the next one: stay a little inside.
+    s = np.repeat(tables.section_start[section], counts) + np.repeat(np.maximum(length - 1e-6, 0.0), counts) * part
+    return row, s

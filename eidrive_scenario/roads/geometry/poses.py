@@ -1,0 +1,212 @@
+"""Road and lane coordinates to poses, one at a time: plain floats, as fast as Python goes.
+
+The t-axis is turned by heading, slope and superelevation, in this order (OpenDRIVE 1.8, 8.3): z-y'-x''. It lies in the
+inclined surface. Where a road climbs and is banked, the cross section is not vertical: it leans back by t·sin·sin.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from eidrive_scenario.errors import Diagnostic, suggestion
+from eidrive_scenario.roads.model.location import Pose, PositionError
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+
+BEYOND = 0.1
+"""How far beyond an end of a road a place may lie and still count as its end [m]."""
+LEAST_STRETCH = 0.05
+"""A lane inside the centre of a bend has no length to speak of, and no heading of its own: so many metres of path count
+per metre of s."""
+
+
+def road_pose_at(road: Road, s: float, t: float) -> Pose:
+    """The pose at road coordinates; its heading is that of the reference line. Raises PositionError."""
+    if not -BEYOND <= s <= road.length + BEYOND:
+        raise off_road(road, s)
+    x, y, h, _, _ = road.reference.at(s)
+    z, slope = road.elevation.value_and_slope(s)
+    pitch = -math.atan(slope) if slope else 0.0
+    if road.superelevation.is_zero:
+        return Pose(x - t * math.sin(h), y + t * math.cos(h), z, h, pitch, 0.0)
+    roll = road.superelevation.value(s)
+    sin, cos = math.sin(h), math.cos(h)
+    ahead, left, up = lateral_axis(slope, roll)
+    ahead, left = t * ahead, t * left
+    return Pose(x + ahead * cos - left * sin, y + ahead * sin + left * cos, z + t * up, h, pitch, roll)
+
+
+def lateral_axis(slope: float, roll: float) -> tuple[float, float, float]:
+    """Return the unit vector of the t-axis: ahead along the reference line, to its left, and up."""
+    steep = math.hypot(1.0, slope)
+    sin = math.sin(roll)
+    return -sin * slope / steep, math.cos(roll), sin / steep
+
+
+class Tangent(NamedTuple):
+    """A point of a lane on a banked road and the change of its place per metre of s.
+
+    The axes are those of the reference line seen from above: ahead, to the left, and up [m].
+    """
+
+    ahead: float
+    left: float
+    z: float
+    along: float
+    sideways: float
+    climb: float
+    roll: float
+
+
+def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: float, speed: float) -> Tangent:
+    """Return the place and tangent of a lane at t that changes by `sideways` per metre of s.
+
+    `curvature` and `speed` are those of the reference line at s.
+    """
+    z, slope, bend = road.elevation.to_second_order(s)
+    roll, twist = road.superelevation.value_and_slope(s)
+    sin, cos = math.sin(roll), math.cos(roll)
+    square = 1.0 + slope * slope
+    level = 1.0 / math.sqrt(square)
+    steep, steeper = slope * level, bend * level / square
+    rise = sideways * sin + t * cos * twist
+    ahead, left = -t * sin * steep, t * cos
+    along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
+    aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+    climb = slope + rise * level - t * sin * slope * steeper
+    along = max(along, LEAST_STRETCH)
+    # The surface's normal is the product of the tangent and the t-axis, which is (-sin·steep, cos, sin·level).
+    nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+    nz = along * cos + aside * sin * steep
+    left_z = nx * aside - ny * along
+    lean = math.atan2(left_z, nz * math.sqrt(along * along + aside * aside + climb * climb))
+    return Tangent(ahead, left, z + t * sin * level, along, aside, climb, lean)
+
+
+def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
+    """The pose at a lane's centre line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
+
+    A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raises PositionError.
+    """
+    section, lane = lane_at(road, lane_id, s)
+    t, sideways = lane_t(road, section, lane, s)
+    t += offset
+    x, y, h, curvature, speed = road.reference.at(s)
+    ahead, left, roll = 0.0, t, 0.0
+    if road.superelevation.is_zero:
+        z, climb = road.elevation.value_and_slope(s)
+        along = speed * (1.0 - curvature * t)
+        if along < LEAST_STRETCH:
+            along = LEAST_STRETCH
+        if sideways and climb:
+            length = math.sqrt(along * along + sideways * sideways + climb * climb)
+            roll = math.atan2(-climb * sideways, along * length)
+    else:
+        ahead, left, z, along, sideways, climb, roll = banked_tangent(road, s, t, sideways, curvature, speed)
+    if lane.heights:
+        z += lane_height(lane, s - section.s, offset)
+    sin, cos = math.sin(h), math.cos(h)
+    return Pose(
+        x + ahead * cos - left * sin,
+        y + ahead * sin + left * cos,
+        z,
+        h + math.atan2(sideways, along) if sideways else h,
+        -math.atan2(climb, math.hypot(along, sideways)) if climb else 0.0,
+        roll,
+    )
+
+
+def lane_height(lane: Lane, ds: float, offset: float) -> float:
+    """How much a lane is lifted above the road, `offset` off its centre line, ds behind its section's start [m]."""
+    record = None
+    for height in lane.heights:
+        if height.s_offset <= ds + 1e-9:
+            record = height
+    if record is None:
+        return 0.0
+    width = lane.width.value(ds)
+    share = min(max(0.5 + lane.side * offset / width, 0.0), 1.0) if width > 0.0 else 0.5
+    return record.inner + share * (record.outer - record.inner)
+
+
+def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
+    """t of a lane's centre line at s, and its derivative."""
+    t, slope = road.lane_offset.value_and_slope(s)
+    if lane.id == 0:
+        return t, slope
+    centre, centre_slope = lane.centre.value_and_slope(s - section.s)
+    return (t + centre, slope + centre_slope) if lane.id > 0 else (t - centre, slope - centre_slope)
+
+
+def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:
+    """The lane with this id at s. Raises PositionError if the road is shorter, or has no such lane there."""
+    if not -BEYOND <= s <= road.length + BEYOND:
+        raise off_road(road, s)
+    section = road.section_at(s)
+    lane = section.lanes.get(lane_id)
+    if lane is None:
+        known = ", ".join(str(number) for number in section.lanes)
+        raise PositionError(
+            Diagnostic(f"road {road.id!r} has no lane {lane_id} at s = {s:g} m", f"its lanes are {known}")
+        )
+    return section, lane
+
+
+def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, float]:
+    """The lane at road coordinates and the distance from the road's edge (0 on the road); beyond it, the last lane."""
+    section = road.section_at(s)
+    offset = t - road.lane_offset.value(s)
+    ds = s - section.s
+    side = 1 if offset > 0.0 else -1
+    best: Lane | None = None
+    lanes = list(section.lanes.values())
+    for lane in lanes if side < 0 else reversed(lanes):
+        if lane.side == side:
+            best = lane
+            if abs(offset) < lane.outer.value(ds):
+                return section, lane, 0.0
+    if best is not None:
+        return section, best, abs(offset) - best.outer.value(ds)
+    other = [lane for lane in section.lanes.values() if lane.side == -side]
+    nearest = min(other, key=lambda lane: abs(lane.id)) if other else section.lanes[0]
+    return section, nearest, abs(offset)
+
+
+def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, float]:
+    """Road coordinates s, t of a point, searched from a first guess, and how far it lies beyond an end of the road.
+
+    Newton's method on the distance to the reference line.
+    """
+    length = road.length
+    along = across = t = 0.0
+    banked = not road.superelevation.is_zero
+    for _ in range(12):
+        px, py, h, curvature, speed = road.reference.at(s)
+        cos, sin = math.cos(h), math.sin(h)
+        along, across = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)
+        t = across
+        if banked:
+            ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
+            t = across / left
+            along -= t * ahead
+            stretch = banked_tangent(road, s, t, 0.0, curvature, speed).along
+        else:
+            stretch = speed * (1.0 - curvature * across)
+        step = along / max(stretch, 0.2 * speed, 2e-4)
+        before, s = s, min(max(s + step, 0.0), length)
+        if abs(s - before) < 1e-7:
+            break
+    beyond = abs(along) if s <= 0.0 or s >= length else 0.0
+    return s, t, beyond if beyond > 1e-6 else 0.0
+
+
+def off_road(road: Road, s: float) -> PositionError:
+    """The error for a place beyond the ends of a road."""
+    return PositionError(
+        Diagnostic(f"s = {s:g} m is not on road {road.id!r}", f"the road runs from 0 to {road.length:g} m")
+    )
+
+
+def unknown_road(number: str, known: list[str]) -> PositionError:
+    """The error for a road that does not exist."""
+    return PositionError(Diagnostic(f"there is no road {number!r}", suggestion(number, known)))

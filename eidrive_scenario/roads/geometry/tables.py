@@ -1,0 +1,233 @@
+"""All roads of a network as flat arrays: road and lane coordinates to poses for any mixture of roads at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.roads.geometry.poses import BEYOND, LEAST_STRETCH, lane_height, off_road
+from eidrive_scenario.roads.model.curves import CurveTable
+from eidrive_scenario.roads.model.location import Array, Integers, LaneKey, Poses, PositionError
+from eidrive_scenario.roads.model.polynomials import PolynomialTable
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+
+
+class RoadTables:
+    """Roads by their index in `ids`; lane sections and lanes by running numbers over all roads.
+
+    The lanes of a section stand in the order 0, 1, 2, … -1, -2, …
+    """
+
+    def __init__(self, roads: Sequence[Road]) -> None:
+        self.roads = list(roads)
+        self.by_id = {road.id: road for road in roads}
+        self.ids = list(self.by_id)
+        self.index = {number: index for index, number in enumerate(self.ids)}
+        self.length = np.array([road.length for road in roads])
+        spans = [road.length for road in roads]
+        self.curves = CurveTable([road.reference for road in roads])
+        self.elevation = PolynomialTable([road.elevation for road in roads], spans)
+        self.superelevation = PolynomialTable([road.superelevation for road in roads], spans)
+        self.banked = not self.superelevation.is_zero
+        """Whether any road is superelevated."""
+        self.lane_offset = PolynomialTable([road.lane_offset for road in roads], spans)
+        self._index_sections()
+
+    def _index_sections(self) -> None:
+        owners = [(index, section) for index, road in enumerate(self.roads) for section in road.sections]
+        sections = [section for _, section in owners]
+        self.section_road = np.array([index for index, _ in owners], dtype=np.int64)
+        self.section_start = np.array([section.s for section in sections])
+        self.section_length = np.array([section.length for section in sections])
+        self.first_section = np.searchsorted(self.section_road, np.arange(len(self.roads)))
+        self._section_keys = self.curves.base[self.section_road] + self.section_start
+        ordered = [_inside_out(section) for section in sections]
+        counts = np.array([len(lanes) for lanes in ordered])
+        self.left_count = np.array([sum(1 for lane in lanes if lane.id > 0) for lanes in ordered])
+        self.right_count = counts - self.left_count - 1
+        self.first_lane = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        lanes = [lane for group in ordered for lane in group]
+        self.lanes = lanes
+        self._lifted = np.array([bool(lane.heights) for lane in lanes])
+        self.lane_section = np.repeat(np.arange(len(sections)), counts)
+        self.lane_id = np.array([lane.id for lane in lanes], dtype=np.int64)
+        self.lane_drivable = np.array([lane.drivable for lane in lanes])
+        spans = [section.length for section, group in zip(sections, ordered, strict=True) for _ in group]
+        self.centre = PolynomialTable([lane.centre for lane in lanes], spans)
+        self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
+        self.width = PolynomialTable([lane.width for lane in lanes], spans)
+
+    @cached_property
+    def widest_lane(self) -> float:
+        """The largest width of any lane, looked at its start, middle and end [m]."""
+        lanes = np.arange(len(self.lane_id))
+        length = self.section_length[self.lane_section]
+        widths = [self.width.value(lanes, length * part).max(initial=0.0) for part in (0.0, 0.5, 1.0)]
+        return float(max(widths))
+
+    def section_of(self, road: Integers, s: Array) -> Integers:
+        """Running number of the lane section at s (N,) of roads (N,)."""
+        keys = self.curves.base[road] + s
+        found: Integers = np.searchsorted(self._section_keys, keys, side="right") - 1
+        first: Integers = self.first_section[road]
+        return np.maximum(found, first)
+
+    def lane_row(self, road: Integers, s: Array, lane: Integers) -> Integers:
+        """Running number of lanes by their id (N,) at s (N,). Raises PositionError for one that does not exist."""
+        section = self.section_of(road, s)
+        left, right = self.left_count[section], self.right_count[section]
+        row = self.first_lane[section] + np.where(lane >= 0, np.minimum(lane, left), left + np.minimum(-lane, right))
+        wrong = self.lane_id[row] != lane
+        for n in np.flatnonzero(wrong):
+            # Lane ids with gaps are against the standard, but occur: look the lane up by its id.
+            end = self.first_lane[section[n]] + left[n] + right[n] + 1
+            near = np.flatnonzero(self.lane_id[self.first_lane[section[n]] : end] == lane[n])
+            if not near.size:
+                raise PositionError(
+                    Diagnostic(
+                        f"road {self.ids[road[n]]!r} has no lane {lane[n]} at s = {s[n]:g} m", "correct the lane"
+                    )
+                )
+            row[n] = self.first_lane[section[n]] + near[0]
+        return np.asarray(row, dtype=np.int64)
+
+    def row_of(self, key: LaneKey) -> int:
+        """Running number of the lane of a lane section. Raises KeyError if there is none."""
+        section = self.first_section[self.index[key.road]] + key.section
+        first = int(self.first_lane[section])
+        for row in range(first, first + int(self.left_count[section] + self.right_count[section]) + 1):
+            if self.lanes[row].id == key.lane:
+                return row
+        raise KeyError(key)
+
+    def check(self, road: Integers, s: Array) -> None:
+        """Raises PositionError for the first place beyond the ends of its road."""
+        wrong = np.flatnonzero((s < -BEYOND) | (s > self.length[road] + BEYOND))
+        if wrong.size:
+            first = wrong[0]
+            raise off_road(self.roads[road[first]], float(s[first]))
+
+    def road_poses(self, road: Integers, s: Array, t: Array) -> Poses:
+        """Poses at road coordinates (N,); headings of the reference lines."""
+        x, y, h, _, _ = self.curves.at(road, s)
+        z, slope = self.elevation.value_and_slope(road, s)
+        pitch = -np.arctan(slope)
+        sin, cos = np.sin(h), np.cos(h)
+        if not self.banked:
+            t = t + np.zeros_like(s)
+            return Poses(x - t * sin, y + t * cos, z + np.zeros_like(t), h, pitch, np.zeros_like(s))
+        ahead, left, up, roll = self.lateral_axis(road, s)
+        ahead, left = t * ahead, t * left
+        return Poses(x + ahead * cos - left * sin, y + ahead * sin + left * cos, z + t * up, h, pitch, roll)
+
+    def lateral_axis(self, road: Integers, s: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the unit vectors of the t-axes (ahead, left, up) and the superelevation [rad], each (N,)."""
+        slope = self.elevation.value_and_slope(road, s)[1]
+        roll = self.superelevation.value(road, s)
+        steep, sin = np.hypot(1.0, slope), np.sin(roll)
+        return -sin * slope / steep, np.cos(roll), sin / steep, roll
+
+    def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
+        """Poses at the centre lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
+        section = self.lane_section[row]
+        road = self.section_road[section]
+        t, sideways = self.lane_t(row, s)
+        t = t + offset
+        x, y, h, curvature, speed = self.curves.at(road, s)
+        if self.banked:
+            ahead, left, z, along, sideways, climb, roll = self._banked_tangent(road, s, t, sideways, curvature, speed)
+        else:
+            z, climb = self.elevation.value_and_slope(road, s)
+            ahead, left, along = np.zeros_like(t), t, np.maximum(speed * (1.0 - curvature * t), LEAST_STRETCH)
+            length = np.sqrt(along * along + sideways * sideways + climb * climb)
+            roll = np.arctan2(-climb * sideways, along * length) + 0.0
+        for n in np.flatnonzero(self._lifted[row]):
+            z[n] += lane_height(self.lanes[row[n]], float(s[n] - self.section_start[section[n]]), float(offset[n]))
+        sin, cos = np.sin(h), np.cos(h)
+        return Poses(
+            x + ahead * cos - left * sin,
+            y + ahead * sin + left * cos,
+            z,
+            h + np.arctan2(sideways, along),
+            -np.arctan2(climb, np.hypot(along, sideways)),
+            roll,
+        )
+
+    def _banked_tangent(
+        self, road: Integers, s: Array, t: Array, sideways: Array, curvature: Array, speed: Array
+    ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+        """`poses.banked_tangent` over arrays."""
+        z, slope, bend = self.elevation.to_second_order(road, s)
+        roll, twist = self.superelevation.value_and_slope(road, s)
+        sin, cos = np.sin(roll), np.cos(roll)
+        square = 1.0 + slope * slope
+        level = 1.0 / np.sqrt(square)
+        steep, steeper = slope * level, bend * level / square
+        rise = sideways * sin + t * cos * twist
+        ahead, left = -t * sin * steep, t * cos
+        along = speed * (1.0 - curvature * left) - rise * steep - t * sin * steeper
+        along = np.maximum(along, LEAST_STRETCH)
+        aside = sideways * cos - t * sin * twist + curvature * speed * ahead
+        climb = slope + rise * level - t * sin * slope * steeper
+        nx, ny = aside * sin * level - climb * cos, -climb * sin * steep - along * sin * level
+        nz = along * cos + aside * sin * steep
+        lean = np.arctan2(nx * aside - ny * along, nz * np.sqrt(along * along + aside * aside + climb * climb))
+        return ahead, left, z + t * sin * level, along, aside, climb, lean
+
+    def stretch_at(self, road: Integers, s: Array, t: Array, curvature: Array, speed: Array) -> Array:
+        """Return the metres ahead per metre of s at a constant t, (N,), on roads that may be banked."""
+        return self._banked_tangent(road, s, t, np.zeros_like(s), curvature, speed)[3]
+
+    def stretch(self, row: Integers, s: Array) -> Array:
+        """Metres of path per metre of s along lanes' centre lines, in plan view."""
+        t, slope = self.lane_t(row, s)
+        road = self.section_road[self.lane_section[row]]
+        curvature, speed = self.curves.bend(road, s)
+        return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
+
+    def lane_keys(self) -> Iterator[tuple[LaneKey, int]]:
+        """All lanes with their running numbers."""
+        for row, (section, lane) in enumerate(zip(self.lane_section.tolist(), self.lane_id.tolist(), strict=True)):
+            road = int(self.section_road[section])
+            yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
+
+    def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
+        """t of lanes' centre lines and its derivative."""
+        section = self.lane_section[row]
+        t, slope = self.lane_offset.value_and_slope(self.section_road[section], s)
+        centre, centre_slope = self.centre.value_and_slope(row, s - self.section_start[section])
+        side = np.sign(self.lane_id[row])
+        return t + side * centre, slope + side * centre_slope
+
+    def lane_beside(self, road: Integers, s: Array, t: Array) -> tuple[Integers, Array]:
+        """Running number of the lane at road coordinates, and the distance from the road's edge (0 on the road)."""
+        section = self.section_of(road, s)
+        ds = s - self.section_start[section]
+        offset = t - self.lane_offset.value(road, s)
+        left, right = self.left_count[section], self.right_count[section]
+        to_left = offset > 0.0
+        count = np.where(to_left, left, right)
+        first = self.first_lane[section] + np.where(to_left, 1, 1 + left)
+        reach = np.abs(offset)
+        row = np.where(count > 0, first, self.first_lane[section] + np.where(left + right > 0, 1, 0))
+        outside = np.where(count > 0, 0.0, reach)
+        open_ = np.flatnonzero(count > 0)
+        for k in range(int(count.max(initial=0))):
+            row[open_] = first[open_] + k
+            over = reach[open_] - self.outer.value(row[open_], ds[open_])
+            last = k + 1 >= count[open_]
+            outside[open_[last]] = np.maximum(over[last], 0.0)
+            open_ = open_[(over >= 0.0) & ~last]
+            if not open_.size:
+                break
+        return row, outside
+
+
+def _inside_out(section: LaneSection) -> list[Lane]:
+    lanes = list(section.lanes.values())
+    left = sorted((lane for lane in lanes if lane.id > 0), key=lambda lane: lane.id)
+    right = sorted((lane for lane in lanes if lane.id < 0), key=lambda lane: -lane.id)
+    return [section.lanes[0], *left, *right]

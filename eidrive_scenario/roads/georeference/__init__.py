@@ -1,0 +1,1 @@
+"""Geodetic reference of a road map."""

@@ -1,0 +1,318 @@
+"""The plan view of a road: lines, arcs, spirals (clothoids) and cubic curves, one after the other.
+
+A poly3 becomes a chain of short cubic curves over arc length when it is read, so that three kinds remain: curves of
+constant curvature (closed form), spirals (Fresnel integrals) and parametric cubics.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import fresnel
+
+from eidrive_scenario.roads.model.location import Array, Integers
+from eidrive_scenario.roads.model.polynomials import spread
+
+FLAT_PHASE = 1e7
+"""Above this phase k²/(2c) a spiral is an arc to less than a millimetre, and Fresnel integrals lose their digits."""
+
+
+MOST_CUBICS = 20_000
+"""Cubics that stand for one poly3; those of a longer one than so many metres are longer than a metre."""
+
+
+class CurvePoint(NamedTuple):
+    """A point of a reference line: x, y [m], heading [rad], curvature [1/m], metres of path per metre of s."""
+
+    x: float
+    y: float
+    h: float
+    curvature: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Curve(ABC):
+    """One geometry of a plan view: starts at x, y with heading h, runs from `s` over `length` [m]."""
+
+    s: float
+    x: float
+    y: float
+    h: float
+    length: float
+    cos: float = field(init=False, repr=False)
+    sin: float = field(init=False, repr=False)
+    line: int | None = field(default=None, kw_only=True, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cos", math.cos(self.h))
+        object.__setattr__(self, "sin", math.sin(self.h))
+
+    @abstractmethod
+    def at(self, ds: float) -> CurvePoint:
+        """The point `ds` metres behind the start."""
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        """Curvature and metres of path per metre of s there: `at` without the place."""
+        point = self.at(ds)
+        return point.curvature, point.speed
+
+
+@dataclass(frozen=True)
+class Arc(Curve):
+    """Constant curvature [1/m], positive to the left; a line has 0."""
+
+    curvature: float = 0.0
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        return self.curvature, 1.0
+
+    def at(self, ds: float) -> CurvePoint:
+        half = 0.5 * self.curvature * ds
+        if abs(half) < 1e-9:
+            u, v = ds, ds * half
+        else:
+            chord = ds * math.sin(half) / half
+            u, v = chord * math.cos(half), chord * math.sin(half)
+        x = self.x + self.cos * u - self.sin * v
+        return CurvePoint(x, self.y + self.sin * u + self.cos * v, self.h + 2.0 * half, self.curvature, 1.0)
+
+
+@dataclass(frozen=True)
+class Spiral(Curve):
+    """A clothoid: the curvature grows by `rate` [1/m²] from `curvature` [1/m].
+
+    With v = (ds + k/c)·√(|c|/π) the integrals of cos and sin of the heading are Fresnel integrals C(v), S(v)
+    (Abramowitz and Stegun 7.3).
+    """
+
+    curvature: float = 0.0
+    rate: float = 0.0
+    scale: float = field(init=False, repr=False)
+    phase: float = field(init=False, repr=False)
+    origin: tuple[float, float] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "scale", math.sqrt(abs(self.rate) / math.pi))
+        object.__setattr__(self, "phase", -self.curvature * self.curvature / (2.0 * self.rate))
+        sine, cosine = fresnel(self.curvature / self.rate * self.scale)
+        object.__setattr__(self, "origin", (float(cosine), float(sine)))
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        return self.curvature + self.rate * ds, 1.0
+
+    def at(self, ds: float) -> CurvePoint:
+        sine, cosine = fresnel((ds + self.curvature / self.rate) * self.scale)
+        along = (float(cosine) - self.origin[0]) / self.scale
+        across = math.copysign(1.0, self.rate) * (float(sine) - self.origin[1]) / self.scale
+        angle = self.h + self.phase
+        cos, sin = math.cos(angle), math.sin(angle)
+        return CurvePoint(
+            self.x + cos * along - sin * across,
+            self.y + sin * along + cos * across,
+            self.h + ds * (self.curvature + 0.5 * self.rate * ds),
+            self.curvature + self.rate * ds,
+            1.0,
+        )
+
+
+@dataclass(frozen=True)
+class Cubic(Curve):
+    """u(p) and v(p) cubic in the local frame of the start, p = ds·pace."""
+
+    u: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 0.0)
+    v: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    pace: float = 1.0
+
+    def bend(self, ds: float) -> tuple[float, float]:
+        p = ds * self.pace
+        _, u1, u2, u3 = self.u
+        _, v1, v2, v3 = self.v
+        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+        ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
+        norm = math.hypot(du, dv)
+        return (du * ddv - dv * ddu) / norm**3 if norm else 0.0, norm * self.pace
+
+    def at(self, ds: float) -> CurvePoint:
+        p = ds * self.pace
+        u0, u1, u2, u3 = self.u
+        v0, v1, v2, v3 = self.v
+        u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
+        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+        ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
+        norm = math.hypot(du, dv)
+        return CurvePoint(
+            self.x + self.cos * u - self.sin * v,
+            self.y + self.sin * u + self.cos * v,
+            self.h + math.atan2(dv, du),
+            (du * ddv - dv * ddu) / norm**3 if norm else 0.0,
+            norm * self.pace,
+        )
+
+
+def spiral(
+    s: float, x: float, y: float, h: float, length: float, start: float, end: float, line: int | None = None
+) -> Curve:
+    """The curve whose curvature runs linearly from `start` to `end` [1/m]; an arc where it hardly changes."""
+    rate = (end - start) / length
+    if rate == 0.0 or max(start * start, end * end) / (2.0 * abs(rate)) > FLAT_PHASE:
+        return Arc(s, x, y, h, length, 0.5 * (start + end), line=line)
+    return Spiral(s, x, y, h, length, start, rate, line=line)
+
+
+def poly3(
+    s: float, x: float, y: float, h: float, length: float, v: tuple[float, float, float, float], line: int | None = None
+) -> list[Cubic]:
+    """The curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
+
+    The arc length is integrated by Gauss-Legendre quadrature; each cubic meets the curve's points and tangents at both
+    of its ends (Hermite), so the error falls with the fourth power of its length and stays far below a millimetre.
+    """
+    a, b, c, d = v
+
+    def slope(u: Array) -> Array:
+        return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
+
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    count = min(max(math.ceil(length), 4), MOST_CUBICS)
+    edges = np.linspace(0.0, length, count * 4 + 1)
+    half = 0.5 * np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    speed = np.sqrt(1.0 + slope(middle[:, None] + half[:, None] * nodes) ** 2)
+    arc = np.concatenate([[0.0], np.cumsum(half * (speed @ weights))])
+    knots = np.linspace(0.0, length, count + 1)
+    u = np.interp(knots, arc, edges)
+    for _ in range(3):
+        cell = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, len(half) - 1)
+        reach = 0.5 * (u - edges[cell])
+        inner = np.sqrt(1.0 + slope(edges[cell, None] + reach[:, None] * (nodes + 1.0)) ** 2)
+        u = u - (arc[cell] + reach * (inner @ weights) - knots) / np.sqrt(1.0 + slope(u) ** 2)
+    rise = slope(u)
+    du = 1.0 / np.sqrt(1.0 + rise**2)
+    step = length / count
+    ends_u, ends_v = (u, du), (a + u * (b + u * (c + u * d)), rise * du)
+    cubics = []
+    for i in range(count):
+        along, across = _hermite(*ends_u, i, step), _hermite(*ends_v, i, step)
+        cubics.append(Cubic(s + float(knots[i]), x, y, h, step, along, across, line=line))
+    return cubics
+
+
+def _hermite(value: Array, slope: Array, i: int, step: float) -> tuple[float, float, float, float]:
+    """Coefficients of the cubic with the given values and slopes at knots i and i + 1, `step` apart."""
+    rise = (value[i + 1] - value[i]) / step
+    c = (3.0 * rise - 2.0 * slope[i] - slope[i + 1]) / step
+    d = (slope[i] + slope[i + 1] - 2.0 * rise) / (step * step)
+    return float(value[i]), float(slope[i]), float(c), float(d)
+
+
+class ReferenceLine:
+    """The curves of a road's plan view in the order of s."""
+
+    __slots__ = ("curves", "length", "starts")
+
+    def __init__(self, curves: Sequence[Curve], length: float) -> None:
+        self.curves = list(curves)
+        self.starts = [curve.s for curve in self.curves]
+        self.length = length
+
+    def at(self, s: float) -> CurvePoint:
+        """The point at s [m]; the first and last curve go on beyond the ends."""
+        curve = self.curves[bisect_right(self.starts, s, 1) - 1]
+        return curve.at(s - curve.s)
+
+    def ahead(self, s: float, direction: int) -> tuple[Curve, float]:
+        """The curve on which one goes on from s, with s growing (+1) or falling (-1), and to which s it holds [m]."""
+        starts = self.starts
+        index = bisect_right(starts, s, 1) - 1
+        if direction > 0:
+            return self.curves[index], starts[index + 1] if index + 1 < len(starts) else math.inf
+        while index > 0 and starts[index] >= s:
+            index -= 1
+        return self.curves[index], starts[index] if index > 0 else -math.inf
+
+    def bend(self, s: float) -> tuple[float, float]:
+        """Curvature [1/m] and metres of path per metre of s at s [m]."""
+        curve = self.curves[bisect_right(self.starts, s, 1) - 1]
+        return curve.bend(s - curve.s)
+
+
+class CurveTable:
+    """The reference lines of many roads, evaluated together: line number i over [base[i], base[i] + length + 1)."""
+
+    def __init__(self, lines: Sequence[ReferenceLine]) -> None:
+        self.base: Array = spread([line.length for line in lines])
+        # A curve that starts beyond its own road would shadow the next one's: it is never reached.
+        reached = [[curve for curve in line.curves if curve.s <= line.length] or line.curves[:1] for line in lines]
+        curves = [curve for group in reached for curve in group]
+        owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
+        self._starts = np.array([curve.s for curve in curves])
+        first = np.diff(owner, prepend=-1) > 0
+        self._keys = self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0))
+        self._x, self._y, self._h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
+        self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)
+        self._curvature = np.array([getattr(curve, "curvature", 0.0) for curve in curves])
+        self._rate = np.array([getattr(curve, "rate", 0.0) for curve in curves])
+        self._cubic = np.array(
+            [(*curve.u, *curve.v, curve.pace) if isinstance(curve, Cubic) else (0.0,) * 9 for curve in curves]
+        ).reshape(-1, 9)
+
+    def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """x, y, heading, curvature and metres of path per metre of s at s (N,) of lines (N,)."""
+        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        ds = s - self._starts[curve]
+        kind = self._kind[curve]
+        curvature = self._curvature[curve]
+        half = 0.5 * curvature * ds
+        chord = ds * np.sinc(half / np.pi)
+        u, v = chord * np.cos(half), chord * np.sin(half)
+        turn, speed = 2.0 * half, np.ones_like(ds)
+        for number, evaluate in ((1, self._spirals), (2, self._cubics)):
+            mask = kind == number
+            if mask.any():
+                u[mask], v[mask], turn[mask], curvature[mask], speed[mask] = evaluate(curve[mask], ds[mask])
+        h = self._h[curve]
+        cos, sin = np.cos(h), np.sin(h)
+        return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
+
+    def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
+        """Curvature and metres of path per metre of s at s (N,) of lines (N,): `at` without the places."""
+        curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
+        ds = s - self._starts[curve]
+        curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
+        mask = self._kind[curve] == 2
+        if mask.any():
+            _, _, _, curvature[mask], speed[mask] = self._cubics(curve[mask], ds[mask])
+        return curvature, speed
+
+    def _spirals(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
+        k, rate = self._curvature[curve], self._rate[curve]
+        scale = np.sqrt(np.abs(rate) / np.pi)
+        shift = k / rate
+        sine, cosine = fresnel(np.stack([shift, ds + shift]) * scale)
+        along, across = (cosine[1] - cosine[0]) / scale, np.sign(rate) * (sine[1] - sine[0]) / scale
+        phase = -0.5 * k * shift
+        cos, sin = np.cos(phase), np.sin(phase)
+        turn = ds * (k + 0.5 * rate * ds)
+        return cos * along - sin * across, sin * along + cos * across, turn, k + rate * ds, np.ones_like(ds)
+
+    def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
+        u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
+        p = ds * pace
+        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+        ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
+        norm = np.hypot(du, dv)
+        bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > 0.0)
+        u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
+        return u, v, np.arctan2(dv, du), bend, norm * pace
+
+
+def _kind(curve: Curve) -> int:
+    return 2 if isinstance(curve, Cubic) else 1 if isinstance(curve, Spiral) else 0

@@ -1,0 +1,165 @@
+"""Piecewise cubic polynomials a + b·ds + c·ds² + d·ds³, the form of all profiles in OpenDRIVE."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
+import numpy as np
+
+from eidrive_scenario.roads.model.location import Array, Integers
+
+Piece = tuple[float, float, float, float, float]
+"""Start s of the piece and its coefficients a, b, c, d; ds counts from that start."""
+ROUNDING = 1e-6
+"""A first piece that starts no later than this holds from 0 on [m]."""
+
+
+class Polynomials:
+    """A function of s on [0, ∞): each piece holds up to the start of the next; 0 before the first."""
+
+    __slots__ = ("_constant", "pieces", "starts")
+
+    def __init__(self, pieces: Iterable[Piece] = ()) -> None:
+        ordered = sorted(pieces, key=lambda piece: piece[0])
+        if ordered and 0.0 < ordered[0][0] <= ROUNDING:
+            ordered[0] = (0.0, *ordered[0][1:])
+        if not ordered or ordered[0][0] > 0.0:
+            ordered.insert(0, (0.0, 0.0, 0.0, 0.0, 0.0))
+        self.pieces: list[Piece] = ordered
+        self.starts = [piece[0] for piece in ordered]
+        single = len(ordered) == 1 and ordered[0][2:] == (0.0, 0.0, 0.0)
+        self._constant: float | None = ordered[0][1] if single else None
+
+    @classmethod
+    def constant(cls, value: float) -> Polynomials:
+        """The function that is `value` everywhere."""
+        return cls([(0.0, value, 0.0, 0.0, 0.0)])
+
+    @property
+    def is_zero(self) -> bool:
+        """True for the function that is 0 everywhere."""
+        return self._constant == 0.0
+
+    @property
+    def is_constant(self) -> bool:
+        """True for a function of a single, constant piece."""
+        return self._constant is not None
+
+    def value(self, s: float) -> float:
+        """The function at s."""
+        if self._constant is not None:
+            return self._constant
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
+        ds = s - start
+        return a + ds * (b + ds * (c + ds * d))
+
+    def value_and_slope(self, s: float) -> tuple[float, float]:
+        """The function and its derivative at s."""
+        if self._constant is not None:
+            return self._constant, 0.0
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
+        ds = s - start
+        return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+
+    def to_second_order(self, s: float) -> tuple[float, float, float]:
+        """Return the function and its first two derivatives at s."""
+        value, slope, half_bend, _ = self.coefficients_at(s)
+        return value, slope, 2.0 * half_bend
+
+    def coefficients_at(self, s: float) -> tuple[float, float, float, float]:
+        """The coefficients of the function as seen from s: of the same polynomial with ds counted from s."""
+        start, a, b, c, d = self.pieces[bisect_right(self.starts, s, 1) - 1]
+        ds = s - start
+        return (
+            a + ds * (b + ds * (c + ds * d)),
+            b + ds * (2.0 * c + 3.0 * ds * d),
+            c + 3.0 * ds * d,
+            d,
+        )
+
+    def shifted(self, origin: float) -> Polynomials:
+        """The same function with s counted from `origin`; what lies before it is dropped."""
+        first = (0.0, *self.coefficients_at(origin))
+        return Polynomials([first, *((p[0] - origin, *p[1:]) for p in self.pieces if p[0] > origin)])
+
+
+def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
+    """The sum of factor times function, exactly, over the union of their pieces."""
+    starts = sorted({start for _, function in terms for start in function.starts})
+    pieces: list[Piece] = []
+    for start in starts:
+        a = b = c = d = 0.0
+        for factor, function in terms:
+            pa, pb, pc, pd = function.coefficients_at(start)
+            a, b, c, d = a + factor * pa, b + factor * pb, c + factor * pc, d + factor * pd
+        if pieces and (c, d) == pieces[-1][3:] == (0.0, 0.0) and b == pieces[-1][2] == 0.0 and a == pieces[-1][1]:
+            continue
+        pieces.append((start, a, b, c, d))
+    return Polynomials(pieces)
+
+
+class PolynomialTable:
+    """Many `Polynomials`, each over its own span of s, evaluated together.
+
+    Function number i owns the stretch [base[i], base[i] + span[i] + 1) of one common axis, so that a single binary
+    search finds the piece for any mixture of functions.
+    """
+
+    def __init__(self, functions: Sequence[Polynomials], spans: Sequence[float]) -> None:
+        self.base: Array = spread(spans)
+        counts = [len(function.pieces) for function in functions]
+        pieces = np.array([piece for function in functions for piece in function.pieces], dtype=np.float64)
+        pieces = pieces.reshape(-1, 5)
+        # A piece that starts beyond its own function's span would shadow the next function: it is never reached.
+        limit = np.repeat(np.asarray(spans, dtype=np.float64), counts) if counts else np.empty(0)
+        owner = np.repeat(np.arange(len(functions)), counts)
+        reached = pieces[:, 0] <= limit
+        pieces, owner = pieces[reached], owner[reached]
+        self._starts = pieces[:, 0]
+        self._keys = self.base[owner] + np.maximum(pieces[:, 0], 0.0)
+        self._a, self._b, self._c, self._d = (np.ascontiguousarray(column) for column in pieces[:, 1:].T)
+        self._constant = bool(np.all(pieces[:, 2:] == 0.0))
+        self._single = len(pieces) == len(functions)
+
+    def _piece(self, function: Integers, s: Array) -> Integers:
+        if self._single:
+            return function
+        found: Integers = np.searchsorted(self._keys, self.base[function] + s, side="right") - 1
+        return found
+
+    def value(self, function: Integers, s: Array) -> Array:
+        """The functions number `function` (N,) at s (N,)."""
+        piece = self._piece(function, s)
+        if self._constant:
+            return self._a[piece]
+        ds = s - self._starts[piece]
+        return np.asarray(self._a[piece] + ds * (self._b[piece] + ds * (self._c[piece] + ds * self._d[piece])))
+
+    def value_and_slope(self, function: Integers, s: Array) -> tuple[Array, Array]:
+        """The functions and their derivatives."""
+        piece = self._piece(function, s)
+        if self._constant:
+            return self._a[piece], np.zeros(piece.shape)
+        ds = s - self._starts[piece]
+        b, c, d = self._b[piece], self._c[piece], self._d[piece]
+        return self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+
+    def to_second_order(self, function: Integers, s: Array) -> tuple[Array, Array, Array]:
+        """Return the functions and their first two derivatives."""
+        piece = self._piece(function, s)
+        ds = s - self._starts[piece]
+        b, c, d = self._b[piece], self._c[piece], self._d[piece]
+        value, slope = self._a[piece] + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + 3.0 * ds * d)
+        return value, slope, 2.0 * c + 6.0 * ds * d
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether all functions are 0 everywhere."""
+        return self._constant and not self._a.any()
+
+
+def spread(spans: Sequence[float]) -> Array:
+    """Where each of several stretches begins on a common axis, one metre apart."""
+    return np.fromiter(accumulate((span + 1.0 for span in spans), initial=0.0), dtype=np.float64)[:-1]

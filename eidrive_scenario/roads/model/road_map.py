@@ -1,0 +1,311 @@
+"""What an OpenDRIVE file says, as plain data: roads, lanes, junctions, signals, objects.
+
+Names follow ASAM OpenDRIVE 1.6 to 1.8; lengths in metres, angles in radians, speeds in m/s.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+from eidrive_scenario.roads.model.curves import ReferenceLine
+from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.polynomials import Polynomials
+
+Contact = Literal["start", "end"]
+
+DRIVABLE = frozenset(
+    (
+        *("driving", "bidirectional", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane"),
+        *("mwyEntry", "mwyExit", "HOV", "bus", "taxi", "special1", "special2", "special3"),
+    )
+)
+"""Lane types on which cars drive."""
+
+
+@dataclass(frozen=True)
+class Header:
+    """The file's header; `geo_reference` is its projection text (PROJ), empty where there is none.
+
+    offset  where the file's origin lies in the projection's plane: x, y, z [m], and its turn [rad]
+    """
+
+    name: str = ""
+    revision: tuple[int, int] = (1, 4)
+    vendor: str = ""
+    date: str = ""
+    geo_reference: str = ""
+    offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RoadMarkLine:
+    """One line of a road mark with its own pattern."""
+
+    length: float
+    space: float
+    t_offset: float
+    s_offset: float
+    width: float
+
+
+@dataclass(frozen=True)
+class RoadMark:
+    """The marking on a lane's outer edge from s_offset on (counted from the lane section's start)."""
+
+    s_offset: float
+    type: str
+    weight: str
+    color: str
+    width: float
+    lane_change: str
+    lines: tuple[RoadMarkLine, ...] = ()
+
+
+@dataclass(frozen=True)
+class LaneHeight:
+    """Lift of a lane's inner and outer edge above the road from s_offset on."""
+
+    s_offset: float
+    inner: float
+    outer: float
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A lane of a lane section.
+
+    width   as a function of ds from the start of the section
+    inner, outer  distance of the two edges from lane 0, at least 0, in the direction of the lane's side
+    """
+
+    id: int
+    type: str
+    width: Polynomials
+    inner: Polynomials
+    outer: Polynomials
+    centre: Polynomials
+    predecessors: tuple[int, ...] = ()
+    successors: tuple[int, ...] = ()
+    level: bool = False
+    direction: str = "standard"
+    road_marks: tuple[RoadMark, ...] = ()
+    heights: tuple[LaneHeight, ...] = ()
+    speeds: tuple[tuple[float, float], ...] = ()
+    """(s_offset, limit [m/s]) in the order of s_offset."""
+    width_from: float = 0.0
+    """The s_offset from which on the file gives a width; inf where it gives none. Before it, the width is 0."""
+    line: int | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def side(self) -> int:
+        """+1 left of lane 0, -1 right of it, 0 for lane 0."""
+        return (self.id > 0) - (self.id < 0)
+
+    @property
+    def drivable(self) -> bool:
+        """True where cars drive."""
+        return self.type in DRIVABLE
+
+
+@dataclass(frozen=True)
+class LaneSection:
+    """A stretch of road with the same lanes: from s over `length`; lanes by id, from the leftmost to the rightmost."""
+
+    index: int
+    s: float
+    length: float
+    lanes: Mapping[int, Lane]
+
+    @property
+    def end(self) -> float:
+        """Where the section ends."""
+        return self.s + self.length
+
+
+@dataclass(frozen=True)
+class RoadLink:
+    """What a road continues in."""
+
+    element_type: Literal["road", "junction"]
+    element_id: str
+    contact: Contact | None = None
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class RoadType:
+    """The kind of road from s on, with its speed limit [m/s]; None where none is given, inf for no limit."""
+
+    s: float
+    type: str
+    speed: float | None = None
+
+
+@dataclass(frozen=True)
+class Road:
+    """A road: its reference line, profiles and lane sections."""
+
+    id: str
+    name: str
+    length: float
+    rule: Literal["RHT", "LHT"]
+    junction_id: str | None
+    reference: ReferenceLine
+    elevation: Polynomials
+    superelevation: Polynomials
+    lane_offset: Polynomials
+    sections: tuple[LaneSection, ...]
+    predecessor: RoadLink | None = None
+    successor: RoadLink | None = None
+    types: tuple[RoadType, ...] = ()
+    line: int | None = None
+    section_starts: tuple[float, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def directions(self) -> Mapping[int, int]:
+        """By lane id, +1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
+        found = {0: 1}
+        for section in self.sections:
+            for number, lane in section.lanes.items():
+                usual = -1 if (number > 0) == (self.rule == "RHT") else 1
+                found.setdefault(number, -usual if lane.direction == "reversed" else usual)
+        return found
+
+    def section_at(self, s: float) -> LaneSection:
+        """The lane section at s."""
+        return self.sections[bisect_right(self.section_starts, s, 1) - 1]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A way through a junction; `connecting_road` is the linked road itself in a direct junction."""
+
+    id: str
+    incoming_road: str
+    connecting_road: str
+    contact: Contact
+    lane_links: tuple[tuple[int, int], ...]
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Junction:
+    """Where roads meet. type  default, direct or virtual."""
+
+    id: str
+    name: str
+    type: str
+    connections: tuple[Connection, ...]
+    controllers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SignalPlace:
+    """A signal, or a reference to it, along a road.
+
+    orientation  '+' valid for traffic in the direction of s, '-' against it, 'none' for both
+    validity     ranges of lane ids, empty for all lanes
+    """
+
+    road: str
+    s: float
+    t: float
+    orientation: str
+    validity: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A traffic sign (dynamic False) or light (dynamic True); `references` are further roads that obey it."""
+
+    id: str
+    name: str
+    type: str
+    subtype: str
+    country: str
+    value: float | None
+    unit: str
+    text: str
+    dynamic: bool
+    place: SignalPlace
+    z_offset: float
+    h_offset: float
+    width: float
+    height: float
+    references: tuple[SignalPlace, ...] = ()
+
+
+@dataclass(frozen=True)
+class SignalController:
+    """Signals that switch together."""
+
+    id: str
+    name: str
+    signals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner of an object's outline: (s, t, dz) on the road, or (u, v, z) in the object's own frame."""
+
+    on_road: bool
+    x: float
+    y: float
+    z: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """How an object repeats along the road; distance 0 means without gaps."""
+
+    s: float
+    length: float
+    distance: float
+    t: tuple[float, float]
+    width: tuple[float, float]
+    height: tuple[float, float]
+    z_offset: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class RoadObject:
+    """Something that stands at a road: a barrier, pole, tree, building, crosswalk, parking space."""
+
+    id: str
+    name: str
+    type: str
+    subtype: str
+    road: str
+    s: float
+    t: float
+    z_offset: float
+    heading: float
+    pitch: float
+    roll: float
+    orientation: str
+    length: float
+    width: float
+    height: float
+    radius: float
+    outlines: tuple[tuple[Corner, ...], ...] = ()
+    repeats: tuple[Repeat, ...] = ()
+
+
+@dataclass(frozen=True)
+class RoadMap:
+    """A whole file."""
+
+    source: str
+    header: Header
+    roads: Mapping[str, Road]
+    junctions: Mapping[str, Junction]
+    signals: Mapping[str, Signal]
+    controllers: Mapping[str, SignalController]
+    objects: tuple[RoadObject, ...]
+    map_warnings: tuple[MapWarning, ...] = ()
+    """What the file has against the standard, and is read all the same."""

@@ -1,0 +1,89 @@
+"""What the state of a traffic light means for its lamps.
+
+The standard leaves the text of a state to the tools. Understood are lists of lamps from top to bottom, as esmini has
+them ("on;off;off"), colours ("red", "redYellow", CARLA's "GREEN", tier4's "green solidOn circle"), and the semantic
+states of the standard's user guide ("go", "caution", "stop").
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+from eidrive_scenario.roads.model.road_map import Signal
+
+ON, OFF, FLASHING = "on", "off", "flashing"
+RED, YELLOW, GREEN = "red", "yellow", "green"
+
+FLASHES_PER_SECOND = 1.0
+"""Of a flashing lamp, lit for the first half of each period."""
+
+USUAL = (RED, YELLOW, GREEN)
+"""The lamps of a light of which nothing else is known, from top to bottom."""
+_COLOURS: Mapping[int, tuple[str, ...]] = {1: (YELLOW,), 2: (RED, GREEN), 3: USUAL}
+"""The lamps of a light with so many of them."""
+_TYPES: Mapping[str, tuple[str, ...]] = {"1000002": (RED, GREEN), "1000009": (RED, YELLOW), "1000013": (RED, GREEN)}
+"""Types of OpenDRIVE's own catalogue with other lamps than red, yellow and green."""
+
+_MODES = {"on": ON, "off": OFF, "flashing": FLASHING, "blinking": FLASHING, "true": ON, "false": OFF}
+_WORDS = {
+    **{"red": RED, "stop": RED, "halt": RED},
+    **{"yellow": YELLOW, "amber": YELLOW, "orange": YELLOW, "caution": YELLOW, "attention": YELLOW, "warning": YELLOW},
+    **{"green": GREEN, "go": GREEN, "walk": GREEN},
+}
+_FLASHES = frozenset({"flashing", "flash", "blinking", "blink"})
+
+
+def lamp_colours(signal: Signal) -> tuple[str, ...]:
+    """The lamps of a traffic light, from top to bottom; none for a sign."""
+    return _TYPES.get(signal.type, USUAL) if signal.dynamic else ()
+
+
+@lru_cache(maxsize=1024)
+def lamps(state: str, colours: tuple[str, ...] = USUAL) -> tuple[tuple[str, str], ...]:
+    """Colour and mode (on, off, flashing) of each lamp in a state, from top to bottom.
+
+    A state that lists another number of lamps than the light is known to have is believed. A state that is not
+    understood leaves the lamps dark.
+    """
+    modes = _listed(state)
+    if modes is not None and (len(modes) > 1 or len(colours) == 1):
+        if len(modes) != len(colours):
+            colours = _COLOURS.get(len(modes), (*USUAL, *[GREEN] * len(modes))[: len(modes)])
+        return tuple(zip(colours, modes, strict=True))
+    lit = _named(state)
+    return tuple((colour, lit.get(colour, OFF)) for colour in colours)
+
+
+def lit(state: str, colours: tuple[str, ...], time: float) -> tuple[bool, ...]:
+    """Which lamps shine at `time` [s], from top to bottom."""
+    bright = (time * FLASHES_PER_SECOND + 1e-9) % 1.0 < 0.5
+    return tuple(mode == ON or (mode == FLASHING and bright) for _, mode in lamps(state, colours))
+
+
+def must_stop(state: str, colours: tuple[str, ...] = USUAL) -> bool:
+    """Whether a light in this state tells traffic to stop: red, or yellow alone, unless the yellow flashes."""
+    shown = dict(lamps(state, colours))
+    red, yellow, green = (shown.get(colour, OFF) for colour in (RED, YELLOW, GREEN))
+    return red != OFF or (yellow == ON and green == OFF)
+
+
+def _listed(state: str) -> list[str] | None:
+    """The modes of a list of lamps, None if the state is no such list."""
+    words = [word.strip().lower() for word in re.split("[;,]", state)]
+    return [_MODES[word] for word in words] if all(word in _MODES for word in words) else None
+
+
+def _named(state: str) -> dict[str, str]:
+    """The lamps that a state in words lights, with their mode."""
+    found: dict[str, str] = {}
+    for part in re.split("[;,]", state):
+        words = [word.lower() for word in re.findall("[A-Z]+(?![a-z])|[A-Z]?[a-z]+", part)]
+        if "off" in words:
+            continue
+        flashes = not _FLASHES.isdisjoint(words)
+        colours: Sequence[str] = [_WORDS[word] for word in words if word in _WORDS]
+        for colour in colours or ([YELLOW] if flashes else []):
+            found[colour] = FLASHING if flashes else ON
+    return found

@@ -1,0 +1,1 @@
+"""Motion along lanes, lane graph, routes and distances."""

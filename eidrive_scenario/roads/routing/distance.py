@@ -1,0 +1,87 @@
+"""Distances in road coordinates between places on connected roads."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from eidrive_scenario.roads.model.location import LaneLocation
+from eidrive_scenario.roads.model.road_map import Road
+from eidrive_scenario.roads.routing.costs import JUNCTION_COST
+from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.movement import driving_direction
+
+Chain = Literal["shortest", "fastest", "leastIntersections"]
+"""Which chain of roads a distance is measured along."""
+
+
+class RoadDistances:
+    """Shortest ways from road to road along reference lines (Dijkstra), remembered per road and direction."""
+
+    def __init__(self, roads: Mapping[str, Road], links: LaneLinks, speed: Callable[[str], float]) -> None:
+        """`speed` is the one with which a road counts where the fastest chain is asked for [m/s]."""
+        self._roads = roads
+        self._links = links
+        self._speed = speed
+        self._found: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
+
+    def between(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float] | None:
+        """How far b lies ahead of a (behind where negative) and to its left, seen in the traffic direction of a's lane.
+
+        Along the reference lines of the chain of roads that `by` asks for [m]. None where no chain of roads joins them.
+        """
+        found = self.placed(a, b, by)
+        return None if found is None else found[:2]
+
+    def placed(self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest") -> tuple[float, float, int] | None:
+        """Return `between`, and +1 where the s of both roads runs the same way along the chain, else -1."""
+        direction = driving_direction(self._roads[a.road], a.lane)
+        if a.road == b.road:
+            return (b.s - a.s) * direction, (b.t - a.t) * direction, 1
+        options = []
+        for sense in (1, -1):
+            way = self._from(a.road, direction * sense, by).get(b.road)
+            if way is not None:
+                cost, gap, entered = way
+                rest = b.s if entered > 0 else self._roads[b.road].length - b.s
+                left = self._roads[a.road].length - a.s if direction * sense > 0 else a.s
+                across = b.t * entered * sense - a.t * direction
+                cost += left * self._per_metre(a.road, by) + rest * self._per_metre(b.road, by)
+                options.append((cost, left + gap + rest, sense, across, entered * direction * sense))
+        if not options:
+            return None
+        _, span, sense, across, same = min(options, key=lambda option: option[0])
+        return span * sense, across, same
+
+    def _per_metre(self, road: str, by: Chain) -> float:
+        return 1.0 / self._speed(road) if by == "fastest" else 1.0
+
+    def _entering(self, before: str, road: str, by: Chain) -> float:
+        junction = self._roads[road].junction_id
+        enters = junction is not None and junction != self._roads[before].junction_id
+        return JUNCTION_COST if by == "leastIntersections" and enters else 0.0
+
+    def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
+        """For each road reached by leaving `road` in `direction`: cost and metres between, and direction entered."""
+        known = self._found.get((road, direction, by))
+        if known is not None:
+            return known
+        reached: dict[str, tuple[float, float, int]] = {}
+        done: set[tuple[str, int]] = set()
+        first = self._links.beyond_road(road, direction)
+        queue = [(self._entering(road, number, by), 0.0, number, way) for number, way in first]
+        heapq.heapify(queue)
+        while queue:
+            cost, gap, number, way = heapq.heappop(queue)
+            if (number, way) in done:
+                continue
+            done.add((number, way))
+            reached.setdefault(number, (cost, gap, way))
+            length = self._roads[number].length
+            cost += length * self._per_metre(number, by)
+            for other, onward in self._links.beyond_road(number, way):
+                if (other, onward) not in done:
+                    heapq.heappush(queue, (cost + self._entering(number, other, by), gap + length, other, onward))
+        self._found[road, direction, by] = reached
+        return reached

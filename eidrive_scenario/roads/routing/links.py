@@ -1,0 +1,131 @@
+"""Which lane goes on in which: within a road, from road to road, and through junctions.
+
+Links are kept both ways: a file may state them at either end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from eidrive_scenario.roads.model.location import LaneKey
+from eidrive_scenario.roads.model.road_map import Connection, Contact, Junction, LaneSection, Road, RoadLink, RoadMap
+
+
+class LaneEnd(NamedTuple):
+    """An end of a lane of a lane section; side +1 is where s ends, -1 where it starts."""
+
+    lane: LaneKey
+    side: int
+
+
+class RoadEnd(NamedTuple):
+    """An end of a road; side +1 is where s ends, -1 where it starts."""
+
+    road: str
+    side: int
+
+
+class LaneLinks:
+    """The links between lane ends, and between road ends."""
+
+    def __init__(self, road_map: RoadMap) -> None:
+        self._roads: Mapping[str, Road] = road_map.roads
+        self._lanes: dict[LaneEnd, dict[LaneEnd, None]] = {}
+        self._ends: dict[RoadEnd, dict[RoadEnd, None]] = {}
+        for road in road_map.roads.values():
+            self._link_sections(road)
+        for junction in road_map.junctions.values():
+            for connection in junction.connections:
+                self._link_connection(junction, connection)
+        for road in road_map.roads.values():
+            self._link_road(road, road.predecessor, -1)
+            self._link_road(road, road.successor, 1)
+
+    def beyond(self, lane: LaneKey, direction: int) -> Iterator[tuple[LaneKey, int]]:
+        """The lanes reached by leaving a lane in `direction` (+1 growing s), with the direction in which they begin."""
+        for other in self._lanes.get(LaneEnd(lane, direction), ()):
+            yield other.lane, -other.side
+
+    def beyond_road(self, road: str, direction: int) -> Iterator[tuple[str, int]]:
+        """The roads reached by leaving a road in `direction`, with the direction in which they begin."""
+        for other in self._ends.get(RoadEnd(road, direction), ()):
+            yield other.road, -other.side
+
+    def between_roads(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
+        """Ends of lanes of different roads that are linked, each pair once."""
+        for one, others in self._lanes.items():
+            for other in others:
+                if one.lane.road < other.lane.road:
+                    yield one, other
+
+    def _join(self, one: LaneEnd, other: LaneEnd) -> None:
+        self._lanes.setdefault(one, {})[other] = None
+        self._lanes.setdefault(other, {})[one] = None
+
+    def _link_sections(self, road: Road) -> None:
+        for before, after in zip(road.sections, road.sections[1:], strict=False):
+            pairs = [(n, m) for n, lane in before.lanes.items() for m in lane.successors if m in after.lanes]
+            pairs += [(n, m) for m, lane in after.lanes.items() for n in lane.predecessors if n in before.lanes]
+            for n, m in pairs or [(n, n) for n in before.lanes if n in after.lanes]:
+                one, other = LaneKey(road.id, before.index, n), LaneKey(road.id, after.index, m)
+                self._join(LaneEnd(one, 1), LaneEnd(other, -1))
+
+    def _link_road(self, road: Road, link: RoadLink | None, side: int) -> None:
+        if link is None or link.element_type != "road" or not road.sections:
+            return
+        other = self._roads[link.element_id]
+        if not other.sections:
+            return
+        contact = link.contact or _nearest_end(road, side, other)
+        other_side = 1 if contact == "end" else -1
+        self._join_roads(RoadEnd(road.id, side), RoadEnd(other.id, other_side))
+        section, facing = end_section(road, side), end_section(other, other_side)
+        for number, lane in section.lanes.items():
+            for target in lane.successors if side > 0 else lane.predecessors:
+                if target in facing.lanes:
+                    one, two = LaneKey(road.id, section.index, number), LaneKey(other.id, facing.index, target)
+                    self._join(LaneEnd(one, side), LaneEnd(two, other_side))
+
+    def _link_connection(self, junction: Junction, connection: Connection) -> None:
+        incoming, connecting = self._roads[connection.incoming_road], self._roads[connection.connecting_road]
+        if not incoming.sections or not connecting.sections:
+            return
+        other_side = 1 if connection.contact == "end" else -1
+        side = side_at(incoming, junction, connecting, connection.contact)
+        self._join_roads(RoadEnd(incoming.id, side), RoadEnd(connecting.id, other_side))
+        section, facing = end_section(incoming, side), end_section(connecting, other_side)
+        links = connection.lane_links or tuple((n, n) for n in section.lanes if n in facing.lanes)
+        for number, target in links:
+            if number in section.lanes and target in facing.lanes:
+                one, two = LaneKey(incoming.id, section.index, number), LaneKey(connecting.id, facing.index, target)
+                self._join(LaneEnd(one, side), LaneEnd(two, other_side))
+
+    def _join_roads(self, one: RoadEnd, other: RoadEnd) -> None:
+        self._ends.setdefault(one, {})[other] = None
+        self._ends.setdefault(other, {})[one] = None
+
+
+def end_section(road: Road, side: int) -> LaneSection:
+    """The lane section at an end of a road: side +1 is where s ends."""
+    return road.sections[-1 if side > 0 else 0]
+
+
+def side_at(incoming: Road, junction: Junction, connecting: Road, contact: Contact) -> int:
+    """The end of the incoming road that lies at the junction."""
+    sides = [
+        side
+        for side, link in ((-1, incoming.predecessor), (1, incoming.successor))
+        if link is not None and link.element_type == "junction" and link.element_id == junction.id
+    ]
+    if len(sides) == 1:
+        return sides[0]
+    return 1 if _nearest_end(connecting, 1 if contact == "end" else -1, incoming) == "end" else -1
+
+
+def _nearest_end(road: Road, side: int, other: Road) -> Contact:
+    """The end of `other` that lies nearest to an end of `road`."""
+    x, y, *_ = road.reference.at(road.length if side > 0 else 0.0)
+    start, end = other.reference.at(0.0), other.reference.at(other.length)
+    return "start" if math.hypot(start.x - x, start.y - y) <= math.hypot(end.x - x, end.y - y) else "end"

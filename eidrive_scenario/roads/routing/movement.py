@@ -1,0 +1,241 @@
+"""Along a lane by a distance: through lane sections, links and junctions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from eidrive_scenario.roads.geometry.poses import LEAST_STRETCH, lane_at, lane_t
+from eidrive_scenario.roads.model.curves import Arc
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+from eidrive_scenario.roads.routing.links import LaneLinks
+
+STRIDE = 2.0
+"""Longest step of the integration along a curved lane [m]."""
+LOOK_AHEAD = 30.0
+"""How far ahead the direction of a branch is judged where it is not a junction's connecting road [m]."""
+
+
+class Branch(NamedTuple):
+    """A way on at a fork.
+
+    direction  +1 if it is entered in the direction of its s, -1 against it
+    turn       change of heading to its end, left positive, in (-π, π] [rad]
+    """
+
+    lane: LaneKey
+    direction: int
+    turn: float
+
+
+BranchSelector = Callable[[Sequence[Branch]], Branch]
+
+
+class BranchGuide(Protocol):
+    """Selects branches along a planned route; `Route` implements it."""
+
+    def visit(self, road: str, visit: int) -> int:
+        """Return the number of the visit of the route at which it enters the road `road`, from `visit` on."""
+        ...
+
+    def pick(self, branches: Sequence[Branch], road: str, visit: int) -> Branch | None:
+        """Return the branch on the route, or None if the route contains none of them."""
+        ...
+
+
+def driving_direction(road: Road, lane_id: int) -> int:
+    """+1 where traffic of the lane drives in the direction of s, -1 where against it; +1 for lane 0."""
+    known = road.directions.get(lane_id)
+    if known is not None:
+        return known
+    return -1 if (lane_id > 0) == (road.rule == "RHT") else 1
+
+
+class Movement:
+    """Moves lane locations over one road network."""
+
+    def __init__(self, roads: Mapping[str, Road], links: LaneLinks) -> None:
+        self._roads = roads
+        self._links = links
+
+    def advance(
+        self,
+        location: LaneLocation,
+        distance: float,
+        route: BranchGuide | None = None,
+        choose: BranchSelector | None = None,
+        visit: int = 0,
+        to_end: bool = False,
+    ) -> LaneLocation | None:
+        """The place `distance` metres further in the lane's driving direction (back where negative), or None.
+
+        The distance is measured on the path, at the location's offset. Where the lane forks, the route decides, else
+        `choose`, else the straightest way on is taken. None says that the lane ends; with `to_end` the result is the
+        place where it does.
+        """
+        road = self._roads[location.road]
+        section, lane = lane_at(road, location.lane, location.s)
+        direction = driving_direction(road, lane.id)
+        with_traffic = distance >= 0.0
+        if not with_traffic:
+            direction = -direction
+        remaining, s, offset = abs(distance), min(max(location.s, 0.0), road.length), location.offset
+        if not with_traffic or direction < 0:
+            section, lane = _section_behind(road, section, lane, s, direction)
+        while True:
+            s, remaining = _along(road, section, lane, s, offset, direction, remaining)
+            inside = section.index == len(road.sections) - 1 if direction > 0 else True
+            if remaining <= 0.0 and (inside or s < section.end):
+                break
+            following = self._next(road, section, lane, direction, with_traffic, offset, route, choose, visit)
+            if following is None and (remaining <= 0.0 or to_end):
+                if not inside:
+                    s = math.nextafter(s, section.s)  # where the section ends, the next one begins, without this lane
+                break
+            if following is None:
+                return None
+            key, heading_on, shift = following
+            if heading_on != direction:
+                offset = -offset
+            offset += shift
+            direction = heading_on
+            if route is not None and key.road != road.id:
+                visit = route.visit(key.road, visit)
+            road = self._roads[key.road]
+            section = road.sections[key.section]
+            lane = section.lanes[key.lane]
+            s = section.s if direction > 0 else section.end
+        t, _ = lane_t(road, section, lane, s)
+        return LaneLocation(road.id, lane.id, s, offset, t + offset)
+
+    def _next(
+        self,
+        road: Road,
+        section: LaneSection,
+        lane: Lane,
+        direction: int,
+        with_traffic: bool,
+        offset: float,
+        route: BranchGuide | None,
+        choose: BranchSelector | None,
+        visit: int,
+    ) -> tuple[LaneKey, int, float] | None:
+        key = LaneKey(road.id, section.index, lane.id)
+        found = self.branches(key, direction, with_traffic)
+        if not found:
+            beside = self._beside_end(road, section, lane, direction, offset)
+            return None if beside is None else (beside[0], direction, beside[1])
+        if len(found) == 1:
+            return found[0].lane, found[0].direction, 0.0
+        chosen: Branch | None = None
+        if route is not None:
+            chosen = route.pick(found, road.id, visit)
+        if chosen is None and choose is not None:
+            chosen = choose(found)
+        if chosen is None:
+            chosen = min(found, key=lambda branch: abs(branch.turn))
+        return chosen.lane, chosen.direction, 0.0
+
+    def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
+        """The ways on from a lane's end, in the order of the file; those with the traffic if there are any."""
+        found = list(self._links.beyond(key, direction))
+        wanted = 1 if with_traffic else -1
+        along = [(k, d) for k, d in found if driving_direction(self._roads[k.road], k.lane) * d == wanted]
+        found = along or found
+        if len(found) == 1:
+            return [Branch(*found[0], 0.0)]
+        road = self._roads[key.road]
+        start = road.reference.at(road.length if direction > 0 else 0.0).h + (0.0 if direction > 0 else math.pi)
+        return [Branch(k, d, _wrap(self._exit_heading(k, d) - start)) for k, d in found]
+
+    def _exit_heading(self, key: LaneKey, direction: int) -> float:
+        road = self._roads[key.road]
+        ahead = road.length if road.junction_id is not None else min(road.length, LOOK_AHEAD)
+        return road.reference.at(ahead).h if direction > 0 else road.reference.at(road.length - ahead).h + math.pi
+
+    def _beside_end(
+        self, road: Road, section: LaneSection, lane: Lane, direction: int, offset: float
+    ) -> tuple[LaneKey, float] | None:
+        """Where a lane ends while its road goes on: the nearest lane of the same direction, and the shift of offset."""
+        index = section.index + direction
+        if not 0 <= index < len(road.sections):
+            return None
+        other = road.sections[index]
+        s = section.end if direction > 0 else section.s
+        here = lane_t(road, section, lane, s)[0]
+        choices = [
+            (abs(lane_t(road, other, candidate, s)[0] - here), number)
+            for number, candidate in other.lanes.items()
+            if candidate.side == lane.side and candidate.drivable == lane.drivable
+        ]
+        if not choices:
+            return None
+        number = min(choices)[1]
+        return LaneKey(road.id, index, number), here - lane_t(road, other, other.lanes[number], s)[0]
+
+
+def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, direction: int) -> tuple[LaneSection, Lane]:
+    """The section that lies before s where one moves against s and stands on a section's very start."""
+    if direction < 0 and s == section.s and section.index > 0:
+        before = road.sections[section.index - 1]
+        for number in lane.predecessors or (lane.id,):
+            if number in before.lanes:
+                return before, before.lanes[number]
+    return section, lane
+
+
+def _along(
+    road: Road, section: LaneSection, lane: Lane, s: float, offset: float, direction: int, remaining: float
+) -> tuple[float, float]:
+    """s after `remaining` metres of path or at the section's end, and the metres that are left (0 if none).
+
+    On a line or arc, where the lane keeps its distance from it, exact; elsewhere by the midpoint rule.
+    """
+    end = section.end if direction > 0 else section.s
+    if section.index == len(road.sections) - 1 and direction > 0:
+        end = road.length
+    steady = road.lane_offset.is_constant and (lane.id == 0 or lane.centre.is_constant)
+    while remaining > 0.0:
+        room = (end - s) * direction
+        if room <= 0.0:
+            return end, remaining
+        curve, limit = road.reference.ahead(s, direction)
+        reach = min(room, (limit - s) * direction)
+        if steady and isinstance(curve, Arc):
+            stretch = 1.0
+            if curve.curvature:
+                t = lane_t(road, section, lane, s)[0] + offset
+                stretch = max(1.0 - curve.curvature * t, LEAST_STRETCH)
+            ds = remaining / stretch
+        else:
+            stretch = _stretch(road, section, lane, s, offset)
+            ds = min(remaining, STRIDE) / stretch
+            if ds < reach or stretch != 1.0:
+                stretch = _stretch(road, section, lane, s + 0.5 * direction * min(ds, reach), offset)
+                ds = min(remaining, STRIDE) / stretch
+        if ds < reach:
+            s += direction * ds
+            remaining -= ds * stretch
+            if remaining < 1e-12:
+                return s, 0.0
+        else:
+            s = end if reach == room else limit
+            remaining -= reach * stretch
+            if remaining <= 1e-12:
+                return s, 0.0
+    return s, 0.0
+
+
+def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
+    """Metres of path at an offset from a lane's centre per metre of s; in banked bends as if they were level."""
+    t, slope = lane_t(road, section, lane, s)
+    curvature, speed = road.reference.bend(s)
+    across = speed * (1.0 - curvature * (t + offset))
+    stretch = math.hypot(across, slope) if slope else across
+    return stretch if stretch > LEAST_STRETCH else LEAST_STRETCH
+
+
+def _wrap(angle: float) -> float:
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -1,0 +1,296 @@
+"""A route: the lanes from place to place, its length and its course."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
+from typing import TypeVar
+
+import numpy as np
+
+from eidrive_scenario.roads.geometry.poses import lane_pose_at, lane_t
+from eidrive_scenario.roads.geometry.tables import RoadTables
+from eidrive_scenario.roads.model.location import Array, LaneKey, LaneLocation, Pose
+from eidrive_scenario.roads.model.road_map import Road
+from eidrive_scenario.roads.routing.movement import Branch, driving_direction
+
+GRAIN = 0.25
+"""Distance between the points by which a route's course is kept [m]."""
+LANE_CHANGE_LENGTH = 40.0
+"""Metres over which a lane change stretches where its section has room for it."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of a route within one lane section: from s to s_end, from one lane into another (mostly the same)."""
+
+    road: str
+    section: int
+    lane: int
+    lane_end: int
+    s: float
+    s_end: float
+
+    @property
+    def direction(self) -> int:
+        """+1 along growing s, -1 against it."""
+        return 1 if self.s_end >= self.s else -1
+
+
+@dataclass(frozen=True)
+class Route:
+    """The way from `start` to `end` over `lanes`; distances along it count from the start [m].
+
+    A closed route ends where it starts, and is followed again and again; `lap` is the closed route to which this one
+    leads.
+    """
+
+    tables: RoadTables = field(repr=False)
+    lanes: tuple[LaneKey, ...]
+    start: LaneLocation
+    end: LaneLocation
+    closed: bool = False
+    lap: Route | None = field(default=None, repr=False)
+
+    @property
+    def roads(self) -> Mapping[str, Road]:
+        """The roads of the network by their ids."""
+        return self.tables.by_id
+
+    @property
+    def onward(self) -> Route | None:
+        """What follows where it ends: the lap to which it leads, or a closed route itself."""
+        return self if self.closed else self.lap
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """The stretches of the route, one for each lane section that it crosses."""
+        groups: list[list[LaneKey]] = []
+        for key in self.lanes:
+            if groups and groups[-1][-1][:2] == key[:2] and groups[-1][-1] != key:
+                groups[-1].append(key)
+            else:
+                groups.append([key])
+        legs = []
+        for number, group in enumerate(groups):
+            road = self.roads[group[0].road]
+            section = road.sections[group[0].section]
+            s, s_end = section.s, section.end
+            if driving_direction(road, group[0].lane) < 0:
+                s, s_end = s_end, s
+            if number == 0:
+                s = self.start.s
+            if number == len(groups) - 1:
+                s_end = self.end.s
+            legs.append(Leg(road.id, section.index, group[0].lane, group[-1].lane, s, s_end))
+        return tuple(legs)
+
+    @property
+    def length(self) -> float:
+        """Metres from start to end along the lanes' centre lines."""
+        return float(self._course[1][-1])
+
+    def polyline(self, spacing: float = 1.0) -> Array:
+        """(M, 3) points of the lanes' centre lines from start to end, at most `spacing` apart [m].
+
+        Where a broken map has lanes jump, there are no more points than the lanes have in themselves.
+        """
+        most = math.ceil(2.0 * len(self._course[1]) * max(GRAIN / spacing, 1.0))
+        count = min(max(math.ceil(self.length / spacing), 1), most) + 1
+        return self.points_at(np.linspace(0.0, self.length, count))
+
+    def points_at(self, distance: Array) -> Array:
+        """(M, 3) points at distances (M,) along the route."""
+        points, along, _, _ = self._course
+        return np.column_stack([np.interp(distance, along, points[:, axis]) for axis in range(3)])
+
+    def location_at(self, distance: float) -> LaneLocation:
+        """The place at a distance along the route, on its centre line."""
+        _, along, owner, places = self._course
+        index = min(max(bisect_right(along, distance) - 1, 0), len(along) - 2)
+        leg = self.legs[int(owner[index + 1])]
+        before = index if owner[index] == owner[index + 1] else index + 1
+        span = along[index + 1] - along[before]
+        part = (distance - along[before]) / span if span > 0.0 else 0.0
+        s = float(places[before] + (places[index + 1] - places[before]) * min(max(part, 0.0), 1.0))
+        road = self.roads[leg.road]
+        section = road.sections[leg.section]
+        t = self._t(leg, s)
+        lane = min((leg.lane, leg.lane_end), key=lambda n: abs(lane_t(road, section, section.lanes[n], s)[0] - t))
+        return LaneLocation(leg.road, lane, s, t - lane_t(road, section, section.lanes[lane], s)[0], t)
+
+    def pose_at(self, distance: float) -> Pose:
+        """The pose at a distance along the route, heading in the direction of travel."""
+        place = self.location_at(distance)
+        pose = lane_pose_at(self.roads[place.road], place.lane, place.s, place.offset)
+        x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
+        if x[0] == x[1] and y[0] == y[1]:
+            return pose
+        heading = math.atan2(y[1] - y[0], x[1] - x[0])
+        return pose.turned(_wrap(heading - pose.h))
+
+    def s_along(self, location: LaneLocation) -> float | None:
+        """The distance along the route at which it passes a place's road and s, None where it does not."""
+        _, along, owner, places = self._course
+        for number, leg in enumerate(self.legs):
+            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
+            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+                mine = np.flatnonzero(owner == number)
+                order = places[mine] * leg.direction
+                return float(np.interp(location.s * leg.direction, order, along[mine]))
+        return None
+
+    def distance(self, a: LaneLocation, b: LaneLocation) -> tuple[float, float] | None:
+        """How far b lies ahead of a and to its left along the route's reference lines, None if it misses one of them.
+
+        Seen in the driving direction of a's lane. Round a closed route the nearer way counts.
+        """
+        here, there = self._passes(a), self._passes(b)
+        if here is None or there is None:
+            return None
+        sense = here[1] * driving_direction(self.roads[a.road], a.lane)
+        along = there[0] - here[0]
+        if self.closed:
+            total = sum(abs(leg.s_end - leg.s) for leg in self.legs)
+            along = (along + 0.5 * total) % total - 0.5 * total
+        return along * sense, (b.t * there[1] - a.t * here[1]) * sense
+
+    def _passes(self, location: LaneLocation) -> tuple[float, int] | None:
+        """Where the route (or its lap, after it) passes a place: metres of reference line, and in which direction."""
+        done = 0.0
+        for leg in self.legs:
+            low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
+            if leg.road == location.road and low - 1e-6 <= location.s <= high + 1e-6:
+                return done + abs(location.s - leg.s), leg.direction
+            done += high - low
+        onward = None if self.lap is None else self.lap._passes(location)
+        return None if onward is None else (done + onward[0], onward[1])
+
+    def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
+        """The distance along the route that is nearest to a point, and how far left of the route the point lies [m].
+
+        `near` narrows the search to `window` metres around a distance known before.
+        """
+        points, along, _, _ = self._course
+        low, high = 0, len(along) - 1
+        if near is not None:
+            low = max(bisect_right(along, near - window) - 1, 0)
+            high = min(bisect_right(along, near + window), high)
+        part = points[low : high + 1]
+        index = low + int(np.argmin((part[:, 0] - x) ** 2 + (part[:, 1] - y) ** 2))
+        best = (math.inf, 0.0, 0.0)
+        for i in (index - 1, index):
+            if low <= i < high:
+                (ax, ay), (bx, by) = points[i, :2], points[i + 1, :2]
+                dx, dy = bx - ax, by - ay
+                norm = math.hypot(dx, dy)
+                if norm == 0.0:
+                    continue
+                part_of = min(max(((x - ax) * dx + (y - ay) * dy) / norm**2, 0.0), 1.0)
+                gap = math.hypot(x - ax - part_of * dx, y - ay - part_of * dy)
+                left = ((y - ay) * dx - (x - ax) * dy) / norm
+                place = float(along[i] + part_of * (along[i + 1] - along[i]))
+                best = min(best, (gap, place, left))
+        return best[1], float(best[2])
+
+    def pick(self, branches: Sequence[Branch], road: str, visit: int = 0) -> Branch | None:
+        """The branch that the route takes where it leaves a road; None if it takes none of them.
+
+        `visit` is the number of the road among those of the route, as `visit` gives it: a route may come by twice.
+        """
+        for number in self._later(visit):
+            if self._visits[number][0] == road and (following := self.passes(number + 1)) is not None:
+                lanes = self._visits[(number + 1) % len(self._visits)][1]
+                there = [branch for branch in branches if branch.lane.road == following]
+                if there:
+                    return next((branch for branch in there if branch.lane in lanes), there[0])
+        for exact in (True, False):
+            for name, lanes in self._visits:
+                for branch in branches:
+                    if branch.lane in lanes or (not exact and branch.lane.road == name):
+                        return branch
+        return None if self.lap is None else self.lap.pick(branches, road)
+
+    def visit(self, road: str, visit: int = 0) -> int:
+        """Which road of the route that is, counted from 0, for who came by the one numbered `visit` before."""
+        return next((number for number in self._later(visit) if self._visits[number][0] == road), visit)
+
+    def passes(self, visit: int) -> str | None:
+        """The road of a visit, None beyond the route's end."""
+        if self.closed:
+            visit %= len(self._visits)
+        return self._visits[visit][0] if visit < len(self._visits) else None
+
+    def _later(self, visit: int) -> Iterator[int]:
+        """The roads from a visit on, and on a closed route those before it after all others."""
+        yield from range(visit, len(self._visits))
+        if self.closed:
+            yield from range(min(visit, len(self._visits)))
+
+    @cached_property
+    def _visits(self) -> list[tuple[str, frozenset[LaneKey]]]:
+        """The roads in the order in which the route comes by, each with its lanes there."""
+        return [(road, frozenset(keys)) for road, keys in groupby(self.lanes, key=lambda key: key.road)]
+
+    def _t(self, leg: Leg, s: float) -> float:
+        """t of the route's course on a leg; a lane change eases in and out with no jump of curvature."""
+        road = self.roads[leg.road]
+        section = road.sections[leg.section]
+        t = lane_t(road, section, section.lanes[leg.lane], s)[0]
+        if leg.lane == leg.lane_end:
+            return t
+        span = min(abs(leg.s_end - leg.s), LANE_CHANGE_LENGTH)
+        part = min(abs(s - leg.s) / span, 1.0) if span > 0.0 else 1.0
+        return t + smoothstep(part) * (lane_t(road, section, section.lanes[leg.lane_end], s)[0] - t)
+
+    @cached_property
+    def _course(self) -> tuple[Array, Array, Array, Array]:
+        """Points (M, 3), distances along (M,), the leg of each (M,) and its s (M,)."""
+        legs, tables = self.legs, self.tables
+        ways = np.array([abs(leg.s_end - leg.s) for leg in legs])
+        counts = np.maximum(np.ceil(ways / GRAIN), 1.0).astype(np.int64) + 1
+        owner = np.repeat(np.arange(len(legs)), counts)
+        s = np.concatenate([np.linspace(leg.s, leg.s_end, count) for leg, count in zip(legs, counts, strict=True)])
+        row, row_end = (
+            np.array(
+                [tables.row_of(LaneKey(leg.road, leg.section, lane)) for leg, lane in zip(legs, lanes, strict=True)]
+            )
+            for lanes in ([leg.lane for leg in legs], [leg.lane_end for leg in legs])
+        )
+        t = tables.lane_t(row[owner], s)[0]
+        changes = np.flatnonzero((row != row_end)[owner])
+        if changes.size:
+            leg_of = owner[changes]
+            span = np.minimum(ways, LANE_CHANGE_LENGTH)[leg_of]
+            begin = np.array([leg.s for leg in legs])[leg_of]
+            part = np.divide(np.abs(s[changes] - begin), span, out=np.ones_like(span), where=span > 0.0)
+            t_end = tables.lane_t(row_end[leg_of], s[changes])[0]
+            t[changes] += smoothstep(np.minimum(part, 1.0)) * (t_end - t[changes])
+        road = tables.section_road[tables.lane_section[row]]
+        points = np.column_stack(tables.road_poses(road[owner], s, t)[:3])
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        return points, along, owner.astype(np.float64), s
+
+
+Share = TypeVar("Share", float, Array)
+
+
+def smoothstep(part: Share) -> Share:
+    """How much of a lane change is done at a share of its length: no jump of curvature at either end."""
+    return part**3 * (10.0 + part * (6.0 * part - 15.0))
+
+
+def concatenate_routes(routes: Sequence[Route]) -> Route:
+    """Several routes, each beginning where the one before ends, as one."""
+    lanes = list(routes[0].lanes)
+    for route in routes[1:]:
+        lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
+    return Route(routes[0].tables, tuple(lanes), routes[0].start, routes[-1].end)
+
+
+def _wrap(angle: float) -> float:
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)

@@ -1,0 +1,271 @@
+"""Attribution of errors to extensions: which one was running when an exception arose, for whom, and at which line.
+
+The stack of the exception shows it: the frame of an extension's method has the extension as its first argument, and the
+frames around it belong to the station, action or condition that called it. Runs without errors take no extra time.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import sys
+import traceback
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+
+from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.errors import ExtensionError, ExtensionPlace, InputError, InvalidResult, WallLimitError
+from eidrive_scenario.evaluation.criterion import Criterion
+from eidrive_scenario.registry import is_built_in, registration, third_party_files
+from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
+from eidrive_scenario.storyboard.context.condition import Condition
+from eidrive_scenario.storyboard.context.controller_model import ControllerModel
+from eidrive_scenario.wall_limit import LimitReached, current_limit
+from eidrive_scenario.world.actor import ActorSpec
+
+_ABSENT = object()
+_CONTROL_FLOW = ("_pytest", "asyncio")
+"""Packages whose exceptions end a test or task on purpose, wherever they are raised."""
+
+
+class _Call(NamedTuple):
+    """A frame of a stack with the line that it executes."""
+
+    frame: FrameType
+    line: int
+
+    @property
+    def subject(self) -> Any:
+        """The first argument: the object or class of a method."""
+        code = self.frame.f_code
+        return self.frame.f_locals.get(code.co_varnames[0], _ABSENT) if code.co_argcount else _ABSENT
+
+    @property
+    def file(self) -> str:
+        return self.frame.f_code.co_filename
+
+    @property
+    def function(self) -> str:
+        return self.frame.f_code.co_name
+
+
+def report_extension(error: BaseException, *, time: float | None = None, observers: Collection[object] = ()) -> None:
+    """Raise ExtensionError from `error` if an extension raised it; return otherwise.
+
+    time       simulated time [s]; None before the run
+    observers  of the run: those that are no part of this project count as extensions
+
+    Raises WallLimitError instead if the wall limit of the run was reached. Errors of the input, interruptions by the
+    user and errors that are attributed already are left as they are.
+    """
+    if isinstance(error, InputError | KeyboardInterrupt | ExtensionError | WallLimitError):
+        return
+    calls = list(_calls(error.__traceback__))
+    if isinstance(error, LimitReached):
+        limit = current_limit()
+        seconds = 0.0 if limit is None else limit.seconds
+        if limit is not None:
+            limit.armed = False
+        raise _wall_limit_error(calls, seconds, time, observers) from error
+    if isinstance(error, InvalidResult):
+        raise ExtensionError(_place_of_method(error, calls, time), str(error)) from error.__cause__
+    place = extension_place(calls, time=time, observers=observers)
+    if place is None or type(error).__module__.partition(".")[0] in _CONTROL_FLOW:
+        return
+    raise ExtensionError(place, _problem(error, calls, place)) from error
+
+
+Result = TypeVar("Result")
+Parameters = ParamSpec("Parameters")
+
+
+class Attributed(Protocol):
+    """An object whose methods call extensions."""
+
+    def attribute(self, error: BaseException) -> None:
+        """Raise ExtensionError if an extension raised the error; return otherwise."""
+
+
+Caller = TypeVar("Caller", bound=Attributed)
+
+
+def attributed(
+    method: Callable[Concatenate[Caller, Parameters], Result],
+) -> Callable[Concatenate[Caller, Parameters], Result]:
+    """Let a method raise ExtensionError where an extension that it calls raises an exception."""
+
+    @functools.wraps(method)
+    def call(self: Caller, *given: Parameters.args, **named: Parameters.kwargs) -> Result:
+        try:
+            return method(self, *given, **named)
+        except BaseException as error:
+            self.attribute(error)
+            raise
+
+    return cast("Callable[Concatenate[Caller, Parameters], Result]", call)
+
+
+def wall_limit_error(
+    frame: FrameType | None, limit: float, *, time: float | None = None, observers: Collection[object] = ()
+) -> WallLimitError:
+    """Return the error of a run that executes this frame when its limit of wall time [s] is reached."""
+    calls = [_Call(one, line) for one, line in traceback.walk_stack(frame)][::-1]
+    return _wall_limit_error(calls, limit, time, observers)
+
+
+def extension_place(
+    calls: Sequence[Any], time: float | None = None, observers: Collection[object] = ()
+) -> ExtensionPlace | None:
+    """Return which extension runs in a stack, outermost call first: a third party's before one of this project."""
+    found: list[tuple[int, tuple[str, str, str]]] = []
+    for row, call in enumerate(calls):
+        subject = call.subject
+        if any(subject is observer for observer in observers) and not is_built_in(type(subject)):
+            found.append((row, ("observer", type(subject).__name__, "")))
+        elif subject is not _ABSENT and (known := _registration(subject)) is not None:
+            found.append((row, known))
+    third_party = [entry for entry in found if not _is_ours(calls[entry[0]].subject)] or _by_file(calls)
+    if not third_party and not found:
+        return None
+    row, (kind, name, value) = (third_party or found)[0]
+    at = _innermost_own(calls, row)
+    if at is None:
+        file, line = _definition(calls[row].subject)
+        return ExtensionPlace(kind, name, value, _for_whom(calls), time, file, line, calls[row].function)
+    return ExtensionPlace(kind, name, value, _for_whom(calls), time, at.file, at.line, at.function)
+
+
+def _wall_limit_error(
+    calls: Sequence[_Call], limit: float, time: float | None, observers: Collection[object]
+) -> WallLimitError:
+    calls = [call for call in calls if Path(call.file).name not in ("wall_limit.py", "threading.py")]
+    place = extension_place(calls, time, observers)
+    last = calls[-1] if calls else None
+    where = "" if last is None else f"{last.file}:{last.line} in {last.function}"
+    return WallLimitError(limit, place, time, where)
+
+
+def traceback_from_extension(error: ExtensionError) -> str:
+    """Return the traceback of the exception that an extension raised, from the extension's own frames on."""
+    cause = error.__cause__
+    if cause is None:
+        return ""
+    entries = traceback.extract_tb(cause.__traceback__)
+    first = next((row for row, entry in enumerate(entries) if entry.filename == error.place.file), 0)
+    shown = traceback.format_list(entries[first:]) + traceback.format_exception_only(type(cause), cause)
+    return "".join(shown)
+
+
+def _calls(trace: TracebackType | None) -> Iterator[_Call]:
+    for frame, line in traceback.walk_tb(trace):
+        yield _Call(frame, line)
+
+
+def _registration(subject: Any) -> tuple[str, str, str] | None:
+    return registration(subject if isinstance(subject, type) else type(subject))
+
+
+def _is_ours(subject: Any) -> bool:
+    return is_built_in(subject if isinstance(subject, type) else type(subject))
+
+
+def _by_file(calls: Sequence[_Call]) -> list[tuple[int, tuple[str, str, str]]]:
+    """Frames of functions without an object, such as static methods, in the modules of third parties."""
+    files = third_party_files()
+    found = []
+    for row, call in enumerate(calls):
+        if classes := files.get(call.file):
+            owner = call.frame.f_code.co_qualname.rpartition(".")[0]
+            found.append((row, classes.get(owner) or next(iter(classes.values()))))
+    return found
+
+
+def _innermost_own(calls: Sequence[_Call], row: int) -> _Call | None:
+    """The last call within the extension's own package, from its first frame on."""
+    subject = calls[row].subject
+    if calls[row].file in third_party_files():
+        own = _files_of(str(calls[row].frame.f_globals.get("__name__")))
+    else:
+        own = _files_of((subject if isinstance(subject, type) else type(subject)).__module__)
+    return next((call for call in reversed(calls[row:]) if _is_within(call, own)), None)
+
+
+def _definition(subject: Any) -> tuple[str, int | None]:
+    """File and line of the class of an extension, or of one of its methods."""
+    definition = subject if isinstance(subject, type) or inspect.isroutine(subject) else type(subject)
+    try:
+        return inspect.getsourcefile(definition) or "", inspect.getsourcelines(definition)[1]
+    except (OSError, TypeError):
+        return "", None
+
+
+def _files_of(module: str) -> tuple[str, ...]:
+    """The file of a module, or the folder of its topmost package."""
+    top = sys.modules.get(module.partition(".")[0])
+    paths = [*getattr(top, "__path__", ())]
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return tuple(str(Path(path)) + "/" for path in paths) or ((str(file),) if file else ())
+
+
+def _is_within(call: _Call, own: tuple[str, ...]) -> bool:
+    return any(call.file == path or (path.endswith("/") and call.file.startswith(path)) for path in own)
+
+
+def _for_whom(calls: Sequence[_Call]) -> str:
+    """For whom the extension was called, as the frames of the stack tell: the innermost that does."""
+    for call in reversed(calls):
+        subject = call.subject
+        if isinstance(subject, Agent):
+            return f"station {subject.name!r}"
+        if isinstance(subject, ControllerModel) and hasattr(subject, "actor"):
+            return f"actor {subject.actor.name!r}"
+        if isinstance(subject, ActionBehaviour):
+            return _of_action(subject)
+        if isinstance(subject, Condition) and hasattr(subject, "element"):
+            return f"{subject.element.source}:{subject.element.line}"
+        if isinstance(subject, Criterion):
+            return _of_criterion(subject)
+        for value in call.frame.f_locals.values() if call.frame.f_code.co_name == "build_agent" else ():
+            if isinstance(value, ActorSpec):
+                return f"station {value.name!r}"
+    return ""
+
+
+def _of_action(action: ActionBehaviour) -> str:
+    element = getattr(action, "action", None)
+    where = f"{element.source}:{element.line}" if element is not None else ""
+    actor = getattr(action, "actor_name", None)
+    return f"actor {actor!r}, {where}" if actor is not None else where
+
+
+def _of_criterion(criterion: Criterion) -> str:
+    """The name that a criterion has in the run, if it is not that of its class."""
+    name = getattr(criterion, "name", None)
+    return f"verdict {name!r}" if isinstance(name, str) and name != getattr(type(criterion), "name", None) else ""
+
+
+def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float | None) -> ExtensionPlace:
+    """The definition of the method that returned something invalid."""
+    extension = error.extension
+    kind, name, value = _registration(extension) or ("extension", type(extension).__name__, "")
+    whom = _for_whom(calls) if not isinstance(extension, ActionBehaviour) else _of_action(extension)
+    if not whom and isinstance(extension, Condition):
+        whom = f"{extension.element.source}:{extension.element.line}"
+    if not whom and isinstance(extension, Criterion):
+        whom = _of_criterion(extension)
+    method = getattr(extension, error.method, None)
+    file, line = _definition(method if inspect.isroutine(method) else extension)
+    return ExtensionPlace(kind, name, value, whom, time, file, line, error.method)
+
+
+def _problem(error: BaseException, calls: Sequence[_Call], place: ExtensionPlace) -> str:
+    """The exception in a line, and where it was raised if that is not the extension's own code."""
+    text = "".join(traceback.format_exception_only(type(error), error)).strip()
+    if isinstance(error, SystemExit):
+        text = f"SystemExit: {error.code!r} (an extension cannot end the process)"
+    last = calls[-1]
+    if (last.file, last.line) != (place.file, place.line):
+        text += f" (raised at {last.file}:{last.line})"
+    return text

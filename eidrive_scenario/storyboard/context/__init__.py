@@ -1,0 +1,1 @@
+"""Interfaces of actions, conditions and controller models, and the runtime context passed to them."""

@@ -1,0 +1,1 @@
+"""Motion of actors along lanes, routes and trajectories."""

@@ -1,0 +1,149 @@
+"""What the storyboard knows of one entity: who drives it, how it moves, and what it has done so far."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.requests import Goal
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.kinematics.motion import Motion
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress
+from eidrive_scenario.world.view import ActorState, WorldView
+
+STANDSTILL = 1e-3
+"""An actor slower than this stands [m/s]."""
+
+Entity = model.Vehicle | model.Pedestrian | model.MiscObject
+
+
+def is_agent_controller(controller: model.Controller) -> bool:
+    """True for a controller that says `module=eidrive` in its properties."""
+    properties = controller.properties.property if controller.properties is not None else ()
+    return any(entry.name == "module" and entry.value == "eidrive" for entry in properties)
+
+
+class Actor:
+    """One entity of the scenario.
+
+    Who drives: an eidrive controller from the start, until it is deactivated in either domain; the storyboard's
+    scripted motion in all other cases.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        entity: Entity,
+        controllers: tuple[model.Controller, ...],
+        roads: RoadNetwork | None,
+    ) -> None:
+        self.name = name
+        self.entity = entity
+        self._controllers: tuple[model.Controller, ...] = ()
+        self._has_ours = False
+        self.motion = Motion(roads)
+        self.present = False
+        for controller in controllers:
+            self.assign(controller)
+        self.lateral = self.longitudinal = self._has_ours
+        """Whether its own controller is active in the domain."""
+        self.goal: Goal | None = None
+        self.progress: TrajectoryProgress | None = None
+        """How far it is along the trajectory that it follows."""
+        self.trailer: str | None = None
+        """What it draws."""
+        self.traveled = 0.0
+        """Distance covered in the world, jumps left out [m]."""
+        self.standing_since: float | None = None
+        self.end_of_road_since: float | None = None
+        self.off_road_since: float | None = None
+        """Kept up only where somebody wants it."""
+        self.off_road_wanted = False
+        self._last: tuple[float, float] | None = None
+        self._seen: ActorState | None = None
+        self._found: LaneLocation | None = None
+        self._found_at = -1
+
+    @property
+    def controllers(self) -> tuple[model.Controller, ...]:
+        """Those that were assigned to it."""
+        return self._controllers
+
+    def assign(self, controller: model.Controller) -> None:
+        """Give it one more controller."""
+        self._controllers = (*self._controllers, controller)
+        self._has_ours = self._has_ours or is_agent_controller(controller)
+
+    @property
+    def trajectory(self) -> TrajectoryCurve | None:
+        """What it is following."""
+        return None if self.progress is None else self.progress.layout
+
+    @property
+    def driven(self) -> bool:
+        """True where its own controller drives it."""
+        return self.lateral and self.longitudinal and self._has_ours
+
+    def limits(self) -> tuple[float, float, float]:
+        """Largest speed [m/s], acceleration and deceleration [m/s²]; infinite where the entity states none."""
+        if isinstance(self.entity, model.Vehicle):
+            performance = self.entity.performance
+            return performance.max_speed, performance.max_acceleration, performance.max_deceleration
+        return math.inf, math.inf, math.inf
+
+    def observe(self, view: WorldView, row: int) -> None:
+        """Keep the histories up to date with a new view."""
+        state = view.states[row]
+        if state is self._seen and not self.motion.teleported and not self.motion.end_of_road:
+            return  # it rests, and has done so before
+        self._seen = state
+        x, y, speed = state.x, state.y, state.speed
+        if self._last is not None and not self.motion.teleported:
+            self.traveled += math.hypot(x - self._last[0], y - self._last[1])
+        self._last = (x, y)
+        self.motion.teleported = False
+        if abs(speed) >= STANDSTILL:
+            self.standing_since = None
+        elif self.standing_since is None:
+            self.standing_since = view.time
+        if not self.motion.end_of_road:
+            self.end_of_road_since = None
+        elif self.end_of_road_since is None:
+            self.end_of_road_since = view.time
+        if self.driven:
+            self.motion.pose = pose_of(view, row)
+            self.motion.speed = speed
+
+    def update_off_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
+        """Keep up since when it is off the road with its reference point. Lanes `none` are no road."""
+        here = None if roads is None else self.location(roads, view.tick)
+        if roads is not None and here is not None and _on_road(roads, here):
+            self.off_road_since = None
+        elif self.off_road_since is None:
+            self.off_road_since = view.time
+
+    def enter_world(self) -> None:
+        """It enters the world: what has gone on there begins anew."""
+        self.present = True
+        self.standing_since = self.off_road_since = self.end_of_road_since = None
+
+    def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
+        """Its place on the road: the lane below it, None where no road is near. Looked up once per tick."""
+        if self._found_at != tick:
+            pose = self.motion.pose
+            self._found = roads.locate_at(pose.x, pose.y, self.motion.location or self._found)
+            self._found_at = tick
+        return self._found
+
+    def invalidate_location(self) -> None:
+        """It has just been moved: look its place up anew."""
+        self._found_at = -2
+
+
+def pose_of(view: WorldView, row: int) -> Pose:
+    """The pose of one row of a view."""
+    return Pose(*view.states[row][:6])
+
+
+def _on_road(roads: RoadNetwork, here: LaneLocation) -> bool:
+    return roads.lane_type(here.road, here.lane, here.s) != "none" and roads.on_road(here)

@@ -1,0 +1,117 @@
+"""Trailers: what is hitched to a vehicle rolls after its hitch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from eidrive_scenario.errors import Diagnostic, ScenarioError
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import Pose
+from eidrive_scenario.storyboard.kinematics.actor import Actor
+
+AT_PLACE = 0.5
+"""A vehicle that is further from its known place on the road does not follow the road [m]."""
+
+
+def declared_trailer(entity: model.Element) -> str | None:
+    """The name of what an entity draws from the start, None where it draws nothing."""
+    if not isinstance(entity, model.Vehicle) or entity.trailer is None:
+        return None
+    if entity.trailer.trailer is not None:
+        return entity.trailer.trailer.name
+    return entity.trailer.trailer_ref.entity_ref or None if entity.trailer.trailer_ref is not None else None
+
+
+def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
+    """Drawing and drawn actors, from the front of each train to its end; each is drawn by one, the first that does."""
+    drawn = {actor.trailer for actor in actors.values() if actor.trailer is not None}
+    if not drawn:
+        return
+    hitched: set[str] = set()
+    for name, front in actors.items():
+        actor = front
+        while name not in drawn and actor.trailer is not None and actor.trailer not in hitched:
+            back = actors.get(actor.trailer)
+            if back is None:
+                break
+            hitched.add(back.name)
+            yield actor, back
+            actor = back
+
+
+def check_acyclic(actors: Mapping[str, Actor]) -> None:
+    """Raises ScenarioError for those that draw themselves, directly or over others."""
+    problems = []
+    for name, actor in actors.items():
+        train: list[str] = []
+        while actor.trailer is not None and actor.trailer in actors and actor.trailer not in train:
+            train.append(actor.trailer)
+            actor = actors[actor.trailer]
+        if name in train:
+            where = actors[name].entity
+            problems.append(Diagnostic(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
+    if problems:
+        raise ScenarioError(problems)
+
+
+def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:
+    """Where the back one stands once the front one is at its place.
+
+    The coupler is at the hitch, and the trailer's axle follows the hitch like a wheel on a rod, as a single-track model
+    without slip has it: at the reference point, with several axles where `bar` ends. `straight` puts it in line. Where
+    one of them is on a slope or bank, the back one lies in the road's surface.
+    """
+    pose = front.motion.pose
+    hitch, reach = _hitch(front), _coupler(back)
+    x, y = pose.x + hitch * math.cos(pose.h), pose.y + hitch * math.sin(pose.h)
+    before = back.motion.pose
+    behind = bar(back.entity, reach) - reach
+    rolling_x, rolling_y = before.x, before.y
+    if behind:
+        rolling_x, rolling_y = before.x - behind * math.cos(before.h), before.y - behind * math.sin(before.h)
+    heading = pose.h if straight else math.atan2(y - rolling_y, x - rolling_x)
+    x, y = x - reach * math.cos(heading), y - reach * math.sin(heading)
+    if pose.p == pose.r == 0.0 and before.p == before.r == 0.0:
+        return Pose(x, y, pose.z, heading, 0.0, 0.0)
+    return _in_the_surface(front, x, y, heading)
+
+
+def _in_the_surface(front: Actor, x: float, y: float, heading: float) -> Pose:
+    """Return the pose on the road below, as high above it as the front one is; without a road, in the plane of that."""
+    roads, here, pose = front.motion.roads, front.motion.location, front.motion.pose
+    if roads is not None and here is not None:
+        below, there = roads.lane_pose_at(*here[:4]), roads.locate_at(x, y, here)
+        if there is not None and math.hypot(below.x - pose.x, below.y - pose.y) < AT_PLACE:
+            ground = roads.lane_pose_at(*there[:4])
+            _, p, r = ground.turned(wrap_angle(heading - ground.h))[3:]
+            return Pose(x, y, pose.z + ground.z - below.z, heading, p, r)
+    ahead = (x - pose.x) * math.cos(pose.h) + (y - pose.y) * math.sin(pose.h)
+    return Pose(x, y, pose.z - ahead * math.tan(pose.p), heading, pose.p, pose.r)
+
+
+def bar(entity: model.Element, reach: float) -> float:
+    """How far behind its coupler a trailer rolls as on a single axle [m]; with one, `reach`, at the reference point.
+
+    The coupler lets it turn, so that the side forces of its fixed axles, of slips in proportion to how each moves
+    sideways, have no moment about the coupler: at distances d behind it, that is Σd² / Σd.
+    """
+    if not isinstance(entity, model.Vehicle) or not entity.axles.additional_axle:
+        return reach
+    extra = [axle.position_x for axle in entity.axles.additional_axle if axle.max_steering == 0.0]
+    distances = [reach - x for x in (entity.axles.rear_axle.position_x, *extra)]
+    total = sum(distances)
+    return sum(d * d for d in distances) / total if total > 0.0 else reach
+
+
+def _hitch(actor: Actor) -> float:
+    entity = actor.entity
+    return entity.trailer_hitch.dx if isinstance(entity, model.Vehicle) and entity.trailer_hitch is not None else 0.0
+
+
+def _coupler(actor: Actor) -> float:
+    entity = actor.entity
+    return (
+        entity.trailer_coupler.dx if isinstance(entity, model.Vehicle) and entity.trailer_coupler is not None else 0.0
+    )

@@ -1,0 +1,1 @@
+"""Resolution of OpenSCENARIO positions and distances."""

@@ -1,0 +1,275 @@
+"""Distances between entities and to positions, as conditions and actions of the standard measure them."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.geometry import box_distance
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
+
+Box = tuple[float, float, float, float, float, float, float]
+"""x y z of the centre, length, width, height [m], yaw [rad]"""
+
+INSTANT = 1e-3
+"""A time in which nobody's motion along a road changes [s]."""
+
+CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
+    model.RoutingAlgorithm.FASTEST: "fastest",
+    model.RoutingAlgorithm.LEAST_INTERSECTIONS: "leastIntersections",
+}
+"""The ways that an algorithm chooses, where it is not the shortest."""
+
+
+def entity_box(context: RuntimeContext, name: str) -> Box:
+    """The bounding box of an actor where it stands now."""
+    pose = context.pose(name)
+    bounds = context.actors[name].entity.bounding_box
+    centre, size = bounds.center, bounds.dimensions
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    return (
+        pose.x + centre.x * cos - centre.y * sin,
+        pose.y + centre.x * sin + centre.y * cos,
+        pose.z + centre.z,
+        size.length,
+        size.width,
+        size.height,
+        pose.h,
+    )
+
+
+def resolve_distance_type(kind: model.RelativeDistanceType | None) -> str:
+    """longitudinal, lateral or euclidianDistance, which is what a missing word means."""
+    if kind is None or kind is model.RelativeDistanceType.CARTESIAN_DISTANCE:
+        return "euclidianDistance"
+    return str(kind.value)
+
+
+def resolve_coordinate_system(system: model.CoordinateSystem | None) -> str:
+    """entity (also where none is said), lane, road, trajectory or world."""
+    return "entity" if system is None else str(system.value)
+
+
+def distance(
+    context: RuntimeContext,
+    a: str,
+    b: str | ResolvedPosition,
+    *,
+    frame: str,
+    kind: str,
+    freespace: bool,
+    algorithm: model.RoutingAlgorithm | None = None,
+) -> float:
+    """How far `b` (an actor or a place) is from actor `a` [m]; NaN where the frame gives none between them.
+
+    The straight distance is that in space. Longitudinal distances are positive ahead, lateral ones to the left, both as
+    `a` looks; free space is at least 0 in amount, and 0 where the two overlap along that axis. In the frames of lane
+    and road the algorithm says which way of several is measured. In that of the trajectory `a` looks along the one that
+    it follows; without one ahead.
+    """
+    if kind == "euclidianDistance":
+        return _straight(context, a, b, freespace)
+    here = ResolvedPosition(context.pose(a), context.location(a) if frame in ("lane", "road") else None)
+    along, across = _offsets(context, a, here, b, frame, algorithm)
+    value = along if kind == "longitudinal" else across
+    if not freespace or math.isnan(value):
+        return value
+    return _between(context, a, b, frame, kind, value)
+
+
+def same_way(context: RuntimeContext, a: str, b: str, frame: str) -> float:
+    """Return +1.0 where actor `b` points the way that `a` does, -1.0 where it comes towards it or away from it.
+
+    In the frames of lane and road that is along the road between them, else by their headings.
+    """
+    turn = context.pose(b).h - context.pose(a).h
+    if frame in ("lane", "road") and context.roads is not None:
+        here, there = context.location(a), context.location(b)
+        runs = None if here is None or there is None else context.roads.orientation(here, there)
+        if runs is not None and here is not None and there is not None:
+            lines = [context.roads.road_pose_at(place.road, place.s).h for place in (here, there)]
+            turn += lines[0] - lines[1] + (0.0 if runs > 0 else math.pi)
+    return 1.0 if math.cos(turn) >= 0.0 else -1.0
+
+
+def closing_speed(
+    context: RuntimeContext,
+    a: str,
+    b: str | ResolvedPosition,
+    *,
+    frame: str,
+    kind: str,
+    algorithm: model.RoutingAlgorithm | None = None,
+) -> float:
+    """How fast actor `a` and `b` come nearer [m/s], by the frame and kind in which their distance is measured.
+
+    NaN where the frame gives no distance. Both keep their velocities of this view, along roads and trajectories too; a
+    place does not move.
+    """
+    mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
+    here, there = ResolvedPosition(context.pose(a), context.location(a)), _place(context, b)
+    if kind == "euclidianDistance":
+        apart = math.dist(here.pose[:3], there.pose[:3])
+        ways = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
+        return sum((b - a) * (v - w) for a, b, v, w in ways) / apart if apart > 0.0 else 0.0
+    axis = 0 if kind == "longitudinal" else 1
+    now = _offsets(context, a, here, there, frame, algorithm)[axis]
+    moved = _moved(context, here, mine), _moved(context, there, theirs)
+    then = _offsets(context, a, *moved, frame, algorithm)[axis]
+    return math.copysign(1.0, now) * (now - then) / INSTANT
+
+
+def _velocity(context: RuntimeContext, name: str) -> tuple[float, float, float]:
+    x, y, z = context.view.velocity[context.view.row(name)].tolist()
+    return x, y, z
+
+
+def _moved(context: RuntimeContext, place: ResolvedPosition, velocity: tuple[float, float, float]) -> ResolvedPosition:
+    """Where somebody is an instant later."""
+    x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
+    location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
+    return ResolvedPosition(place.pose._replace(x=x, y=y), location)
+
+
+def _place(context: RuntimeContext, target: str | ResolvedPosition) -> ResolvedPosition:
+    return ResolvedPosition(_pose(context, target), _location(context, target))
+
+
+def _straight(context: RuntimeContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
+    if not freespace:
+        return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
+    if isinstance(b, str):
+        return box_distance(entity_box(context, a), entity_box(context, b))
+    point: Box = (b.pose.x, b.pose.y, b.pose.z, 0.0, 0.0, 0.0, 0.0)
+    return box_distance(entity_box(context, a), point)
+
+
+def _offsets(
+    context: RuntimeContext,
+    a: str,
+    mine: ResolvedPosition,
+    b: str | ResolvedPosition,
+    frame: str,
+    algorithm: model.RoutingAlgorithm | None,
+) -> tuple[float, float]:
+    """How far `b` is ahead and to the left of actor `a`, where that stands at `mine` [m]."""
+    here, there = mine.pose, _pose(context, b)
+    if frame in ("lane", "road") and context.roads is not None:
+        start, end = mine.location, _location(context, b)
+        if start is None or end is None:
+            return math.nan, math.nan
+        if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:
+            route = context.actors[a].motion.route
+            found = None if route is None else context.roads.distance(start, end, route=route)
+        else:
+            found = context.roads.distance(start, end, CHAINS.get(algorithm, "shortest"))
+        if found is None:
+            return math.nan, math.nan
+        lane = context.roads.pose(start)
+        sign = 1.0 if math.cos(here.h - lane.h) >= 0.0 else -1.0
+        return found[0] * sign, found[1] * sign
+    if frame == "world":
+        return there.x - here.x, there.y - here.y
+    progress = context.actors[a].progress if frame == "trajectory" else None
+    if progress is not None:
+        return _along(progress, progress.at(context.view.tick), here, there)
+    dx, dy = there.x - here.x, there.y - here.y
+    cos, sin = math.cos(here.h), math.sin(here.h)
+    return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose) -> tuple[float, float]:
+    """How much further along a trajectory and to its left a place is; the shorter way round on a closed one.
+
+    `here` is at the actor's own station or next to it: the trajectory may come by the same place again.
+    """
+    trajectory = progress.layout
+    origin, tangent = trajectory.extended(station), trajectory.tangent(station)
+    dx, dy, cos, sin = here.x - origin.x, here.y - origin.y, math.cos(tangent), math.sin(tangent)
+    s, t = station + dx * cos + dy * sin, dy * cos - dx * sin
+    other_s, other_t = trajectory.project(there.x, there.y, s)
+    along = other_s - s
+    if trajectory.closed and trajectory.length > 0.0:
+        along = math.remainder(along, trajectory.length)
+    return along * progress.way, (other_t - t) * progress.way
+
+
+def _between(context: RuntimeContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float) -> float:
+    """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
+    axis = _axis(context, a, frame)
+    mine = _reach(context, a, axis, frame, kind)
+    if isinstance(b, str):
+        like = axis if frame in ("entity", "world") else _axis(context, b, frame, like=axis)
+        theirs = _reach(context, b, like, frame, kind)
+    else:
+        theirs = (0.0, 0.0)
+    if value + theirs[0] > mine[1]:
+        return value + theirs[0] - mine[1]
+    if value + theirs[1] < mine[0]:
+        return value + theirs[1] - mine[0]
+    return 0.0
+
+
+def _axis(context: RuntimeContext, name: str, frame: str, like: float | None = None) -> float:
+    """Heading of the longitudinal axis at an actor; turned round where it would point against `like`."""
+    if frame == "world":
+        return 0.0
+    heading = context.pose(name).h
+    if frame in ("lane", "road") and context.roads is not None:
+        here = context.location(name)
+        if here is not None:
+            lane = context.roads.pose(here).h
+            heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
+    if like is not None and math.cos(heading - like) < 0.0:
+        heading += math.pi
+    return heading
+
+
+def _reach(context: RuntimeContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
+    """How far the box of an actor reaches from its reference point along an axis or the road: least and most [m]."""
+    if frame in ("lane", "road") and context.roads is not None:
+        here = context.location(name)
+        if here is not None and context.roads.curvature(here.road, here.s) != 0.0:
+            return _reach_along(context, context.roads, name, here, axis, kind)
+    bounds = context.actors[name].entity.bounding_box
+    turn = context.pose(name).h - axis
+    cos, sin = math.cos(turn), math.sin(turn)
+    x, y = bounds.center.x, bounds.center.y
+    length, width = 0.5 * bounds.dimensions.length, 0.5 * bounds.dimensions.width
+    if kind == "longitudinal":
+        centre, half = x * cos - y * sin, abs(length * cos) + abs(width * sin)
+    else:
+        centre, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
+    return centre - half, centre + half
+
+
+def _reach_along(
+    context: RuntimeContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
+) -> tuple[float, float]:
+    """The reach along a road that bends: from corner to corner of the box in road coordinates."""
+    x, y, _, length, width, _, yaw = entity_box(context, name)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
+    reached = []
+    for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
+        dx, dy = along * length, across * width
+        corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
+        found = None if corner is None else roads.distance(here, corner)
+        if found is not None:
+            reached.append(sign * found[0 if kind == "longitudinal" else 1])
+    return min(reached, default=0.0), max(reached, default=0.0)
+
+
+def _pose(context: RuntimeContext, target: str | ResolvedPosition) -> Pose:
+    return context.pose(target) if isinstance(target, str) else target.pose
+
+
+def _location(context: RuntimeContext, target: str | ResolvedPosition) -> LaneLocation | None:
+    if isinstance(target, str):
+        return context.location(target)
+    if target.location is None and context.roads is not None:
+        return context.roads.locate_at(target.pose.x, target.pose.y)
+    return target.location

@@ -1,0 +1,154 @@
+"""Positions in road and lane coordinates, absolute or relative to an entity on a road."""
+
+from __future__ import annotations
+
+import math
+
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.openscenario import model
+from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.positions.orientations import oriented
+from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of
+
+
+def road_position(frame: model.RoadPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+    """Resolve a RoadPosition. Raise ScenarioError if the road does not exist."""
+    roads = roads_of(frame, context)
+    return in_road(roads, frame.road_id, _on_road(frame, context, roads), frame.t, frame.orientation)
+
+
+def relative_road_position(
+    frame: model.RelativeRoadPosition, context: RuntimeContext, actor: str | None
+) -> ResolvedPosition:
+    """Resolve a position that lies `ds` along the reference line from an entity and `dt` to its left."""
+    roads, origin = roads_of(frame, context), road_origin(frame, context)
+    here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
+    if here is None:
+        raise position_error(frame, f"leads {frame.ds:g} m from {frame.entity_ref}, beyond the end of the road")
+    return in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
+
+
+def lane_position(frame: model.LanePosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+    """Resolve a LanePosition. Raise ScenarioError if the road or lane does not exist there."""
+    roads = roads_of(frame, context)
+    s = _on_road(frame, context, roads)
+    lane = lane_id(frame, frame.lane_id)
+    known = roads.lane_ids(frame.road_id, s)
+    if lane not in known and lane != 0:
+        shown = ", ".join(str(number) for number in known)
+        raise position_error(
+            frame, f"names lane {lane} of road {frame.road_id!r} at s = {s:g}", f"its lanes there: {shown}"
+        )
+    return in_lane(roads, frame.road_id, lane, s, frame.offset or 0.0, frame.orientation)
+
+
+def relative_lane_position(
+    frame: model.RelativeLanePosition, context: RuntimeContext, actor: str | None
+) -> ResolvedPosition:
+    """Resolve a position relative to the lane of an entity.
+
+    `ds` runs along the reference line, `dsLane` along the lane as the entity faces; lanes count to its left.
+    """
+    roads, origin = roads_of(frame, context), road_origin(frame, context)
+    route = context.actors[frame.entity_ref].motion.route
+    ahead = facing(context, frame.entity_ref, origin)
+    if frame.ds_lane is not None:
+        there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead, route=route)
+    else:
+        there = along_reference(roads, origin, frame.ds or 0.0, route)
+    if there is None:
+        raise position_error(frame, f"lies beyond the end of the road of {frame.entity_ref}")
+    sign = ahead * roads.driving_direction(there.road, there.lane)
+    lane = count_lanes(there.lane, frame.d_lane * sign)
+    if lane not in roads.lane_ids(there.road, there.s):
+        raise position_error(
+            frame, f"names lane {lane} of road {there.road!r}, which it does not have at s = {there.s:.1f}"
+        )
+    place = in_lane(roads, there.road, lane, there.s, frame.offset or 0.0, frame.orientation)
+    if frame.orientation is None and ahead < 0:
+        return place._replace(pose=place.pose.turned(math.pi))
+    return place
+
+
+def along_reference(
+    roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
+) -> LaneLocation | None:
+    """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset.
+
+    At forks the route decides. A lane that the road does not have at its end is replaced by that at the same t.
+    """
+    road = roads.roads[here.road]
+    s = here.s + ds
+    if 0.0 <= s <= road.length:
+        return here._replace(s=s)
+    rest = s - road.length if s > road.length else s
+    edge = here._replace(s=road.length if s > road.length else 0.0)
+    if here.lane not in roads.lane_ids(here.road, edge.s):
+        edge = roads.road_location(here.road, edge.s, here.t)
+    return roads.advance(edge, rest * roads.driving_direction(here.road, here.lane), route=route)
+
+
+def count_lanes(lane: int, steps: int) -> int:
+    """The lane `steps` to the left (towards larger ids) of a lane; lane 0 is no lane and does not count."""
+    target = lane + steps
+    if steps and (target == 0 or (target > 0) != (lane > 0)):
+        target += 1 if steps > 0 else -1
+    return target
+
+
+def facing(context: RuntimeContext, name: str, here: LaneLocation) -> int:
+    """+1 where an actor points along the driving direction of its lane, -1 where against it."""
+    if context.roads is None:
+        return 1
+    lane = context.roads.lane_pose_at(here.road, here.lane, here.s, here.offset).h
+    along = math.cos(context.pose(name).h - lane) * context.roads.driving_direction(here.road, here.lane)
+    return 1 if along >= 0.0 else -1
+
+
+def in_lane(
+    roads: RoadNetwork, road: str, lane: int, s: float, offset: float, orientation: model.Orientation | None
+) -> ResolvedPosition:
+    """Return the place at lane coordinates; an orientation counts from the lane."""
+    here = roads.location(road, lane, s, offset)
+    return ResolvedPosition(oriented(orientation, roads.pose(here)), here)
+
+
+def in_road(
+    roads: RoadNetwork, road: str, s: float, t: float, orientation: model.Orientation | None, lane: int | None = None
+) -> ResolvedPosition:
+    """Return the place at road coordinates, related to `lane` or else to the lane there.
+
+    An orientation counts from the reference line; without one the place points along the lane's driving direction.
+    """
+    here = roads.road_location(road, s, t)
+    if lane is not None:
+        here = roads.location(road, lane, s, t - roads.location(road, lane, s).t)
+    surface = roads.road_pose_at(road, s, t)
+    along = orientation is not None or roads.driving_direction(road, here.lane) > 0
+    return ResolvedPosition(oriented(orientation, surface if along else surface.turned(math.pi)), here)
+
+
+def _on_road(frame: model.RoadPosition | model.LanePosition, context: RuntimeContext, roads: RoadNetwork) -> float:
+    """The position's s; one that lies beyond an end of its road means that end, with a warning."""
+    road, s = frame.road_id, frame.s
+    if road not in roads.roads:
+        shown = ", ".join(sorted(roads.roads)[:12])
+        raise position_error(frame, f"names road {road!r}, which the road network does not have", f"it has {shown}")
+    length = roads.roads[road].length
+    on_road = min(max(s, 0.0), length)
+    if abs(on_road - s) > 1e-3:
+        message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
+        problem = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
+        if problem not in context.warnings:
+            context.warnings.append(problem)
+    return on_road
+
+
+def lane_id(frame: model.Element, text: str) -> int:
+    """Return a lane id as a number. Raise ScenarioError if it is none."""
+    try:
+        return int(text)
+    except ValueError:
+        raise position_error(frame, f"says laneId {text!r}", "give a whole number") from None

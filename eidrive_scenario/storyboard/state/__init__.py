@@ -1,0 +1,1 @@
+"""State of the storyboard that actions and conditions share."""

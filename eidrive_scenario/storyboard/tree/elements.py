@@ -1,0 +1,248 @@
+"""State machines of the storyboard elements: storyboard, story, act, maneuver group, maneuver, event, action.
+
+`tick_tree` executes one tick:
+
+1. Actions that the last step completed end, and with them, bottom up, the elements whose children are complete.
+2. `evaluate_triggers` stops and starts elements, top down.
+3. `update_children` lets each running action decide on the next step, once per tick. Actions that only set a value end.
+
+Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
+simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1). An element starts at most once in a tick, which bounds the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.state.element_states import ElementRecord
+from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition
+from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
+
+EMPTY = "it has no start trigger"
+
+
+class StoryElement(Composite):
+    """An element with children: it starts by its trigger or with its parent, and ends when all its children have.
+
+    `limit` is the maximumExecutionCount: having ended before it is reached, the element stands by again.
+    """
+
+    kind = ""
+
+    def __init__(
+        self,
+        context: RuntimeContext,
+        path: tuple[str, ...],
+        children: Sequence[StoryElement] = (),
+        *,
+        start: WaitForTrigger | None = None,
+        stop: WaitForTrigger | None = None,
+        limit: int = 1,
+    ) -> None:
+        self.start_leaf, self.stop_leaf = start, stop
+        leaves: list[Behaviour] = [leaf for leaf in (start, stop) if leaf is not None]
+        super().__init__(path[-1], [*leaves, *children])
+        self.context = context
+        self.elements = tuple(children)
+        self.limit = limit
+        self.executions = 0
+        self._tried_at: int | None = None
+        """The tick in which it last started or was skipped."""
+        self.record: ElementRecord = context.progress.register(self.kind, path)
+
+    @property
+    def state(self) -> ElementState | None:
+        """None while those above it do not run."""
+        return self.record.state
+
+    def enter_standby(self) -> None:
+        """Wait for the start trigger; the parent has begun to run. What may never be executed is complete."""
+        self.executions = 0
+        self._arm()
+        if self.limit < 1:
+            self._change(ElementTransition.SKIP, ElementState.COMPLETE, "its maximumExecutionCount is 0")
+
+    def evaluate_triggers(self) -> None:
+        """First phase of a turn: stop, start, and let the children do the same.
+
+        A stop trigger is asked from the tick after the start on, that of the storyboard from the first tick.
+        """
+        record = self.record
+        if record.state is ElementState.COMPLETE:
+            return
+        tried = self._tried_at == self.context.progress.tick
+        if (
+            record.state is ElementState.RUNNING
+            and not tried
+            and self.stop_leaf is not None
+            and self.stop_leaf.is_fired()
+        ):
+            self.stop_element(self.stop_leaf.trigger.why)
+            return
+        if (
+            record.state is ElementState.STANDBY
+            and not tried
+            and (self.start_leaf is None or self.start_leaf.is_fired())
+        ):
+            self.start(EMPTY if self.start_leaf is None else self.start_leaf.trigger.why)
+        if record.state is ElementState.RUNNING:
+            for element in self.elements:
+                if element.record.state is not ElementState.COMPLETE:
+                    element.evaluate_triggers()
+
+    def start(self, why: str = "") -> None:
+        """standby -> running; the children stand by, or start where they have no trigger."""
+        self._tried_at = self.context.progress.tick
+        self.executions += 1
+        self._change(ElementTransition.START, ElementState.RUNNING, why)
+        for element in self.elements:
+            element.enter_standby()
+
+    def stop_element(self, why: str = "") -> None:
+        """Stop at once, with all that is below."""
+        for element in self.elements:
+            if element.state in (ElementState.STANDBY, ElementState.RUNNING):
+                element.stop_element(why)
+        self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
+        self.stop(Status.INVALID)
+
+    def end(self) -> None:
+        """running -> complete, or standby where it may be executed again."""
+        if self.executions < self.limit:
+            self._change(ElementTransition.END, ElementState.STANDBY)
+            self._arm()
+        else:
+            self._change(ElementTransition.END, ElementState.COMPLETE)
+
+    def complete_finished(self) -> None:
+        """What the last step brought to its goal ends."""
+        if self.state is ElementState.RUNNING:
+            for element in self.elements:
+                element.complete_finished()
+            self.complete_if_done()
+
+    def update_children(self) -> None:
+        """Second phase of a turn: the running children decide; all of them complete, so is this one."""
+        self.status = Status.RUNNING
+        if self.record.state is ElementState.RUNNING:
+            for element in self.elements:
+                if element.record.state is ElementState.RUNNING:
+                    element.update_children()
+            self.complete_if_done()
+        if self.record.state is ElementState.COMPLETE:
+            self.status = Status.SUCCESS
+
+    def tick(self) -> Iterator[Behaviour]:
+        """`update_children` as py_trees asks for it."""
+        self.update_children()
+        yield self
+
+    def complete_if_done(self) -> None:
+        """End if all children are complete; what has none has no end of its own, and runs until it is stopped."""
+        if self.record.state is not ElementState.RUNNING or not self.elements:
+            return
+        for element in self.elements:
+            if element.record.state is not ElementState.COMPLETE:
+                return
+        self.end()
+
+    def _arm(self) -> None:
+        for leaf in (self.start_leaf, self.stop_leaf):
+            if leaf is not None:
+                leaf.stop(Status.INVALID)
+        self._change(None, ElementState.STANDBY)
+
+    def _change(self, transition: ElementTransition | None, after: ElementState, why: str = "") -> None:
+        self.context.progress.change(self.record, transition, after, why)
+
+
+class StoryboardElement(StoryElement):
+    """The root. It ends by its stop trigger; the stories' end is its own only where it has none."""
+
+    kind = "storyboard"
+
+    def tick_tree(self, init: Behaviour | None = None) -> None:
+        """One tick of the whole tree, and of the actions that Init left running."""
+        progress = self.context.progress
+        if self.state is None:
+            self.enter_standby()
+            self.start()
+            self._tried_at = None
+        if self.context.completes_this_step:
+            self.context.completes_this_step = False
+            self.complete_finished()
+        seen = -1
+        while seen != len(progress.changes):
+            seen = len(progress.changes)
+            self.evaluate_triggers()
+            if self.state is not ElementState.RUNNING:
+                return
+            if init is not None:
+                init.tick_once()
+                init = None
+            self.update_children()
+            if seen == len(progress.changes):
+                waiting, self.context.pending_actions = self.context.pending_actions, []
+                for action in waiting:
+                    action.abort()
+
+    def complete_if_done(self) -> None:
+        """End with the last story, if nothing else would end the storyboard."""
+        if self.stop_leaf is None:
+            super().complete_if_done()
+
+
+class StoryNode(StoryElement):
+    """A Story."""
+
+    kind = "story"
+
+
+@dataclass
+class TriggeringEntities:
+    """Those who fulfilled the start trigger of an act: actors in its groups that select them (1.3.1, 7.3.1)."""
+
+    names: tuple[str, ...] = ()
+
+
+class ActElement(StoryElement):
+    """An Act."""
+
+    kind = "act"
+
+    def __init__(
+        self,
+        context: RuntimeContext,
+        path: tuple[str, ...],
+        groups: Sequence[ManeuverGroupElement],
+        *,
+        start: WaitForTrigger | None = None,
+        stop: WaitForTrigger | None = None,
+        triggering: TriggeringEntities | None = None,
+    ) -> None:
+        super().__init__(context, path, groups, start=start, stop=stop)
+        self._triggering = triggering or TriggeringEntities()
+
+    def start(self, why: str = "") -> None:
+        """standby -> running; whoever triggered it acts in it."""
+        if self.start_leaf is not None:
+            self._triggering.names = self.start_leaf.trigger.triggering
+        super().start(why)
+
+
+class ManeuverGroupElement(StoryElement):
+    """A ManeuverGroup: actors for the maneuvers below."""
+
+    kind = "maneuverGroup"
+
+
+class ManeuverElement(StoryElement):
+    """A Maneuver: events that know each other's priorities."""
+
+    kind = "maneuver"

@@ -1,0 +1,1 @@
+"""Sites, sources and sinks of background traffic."""

@@ -1,0 +1,137 @@
+"""Areas in which traffic is kept: polygons, and ranges of roads from cursor to cursor."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.geometry import points_in_polygon
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.location import PositionError
+from eidrive_scenario.traffic.lanes import TrafficLanes
+from eidrive_scenario.traffic.spawning.sites import Covers, Flags, SpawnSites
+
+START, END = "start", "end"
+
+
+class RoadTerminal(NamedTuple):
+    """One end of a road."""
+
+    road: str
+    end: str
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """A cross-section of a road; s is None for the road's start or end [m], lanes () for all of them."""
+
+    road: str
+    s: float | None = None
+    lanes: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a road from `low` to `high` [m]; lanes () for all of them."""
+
+    road: str
+    low: float
+    high: float
+    lanes: tuple[int, ...] = ()
+
+
+def polygon(corners: Sequence[tuple[float, float]]) -> Covers:
+    """Which places lie in a polygon."""
+    outline = np.array(corners)
+    return lambda sites: points_in_polygon(np.column_stack([sites.x, sites.y]), outline)
+
+
+def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers:
+    """Which places lie on one of several stretches of road."""
+
+    def covers(sites: SpawnSites) -> Flags:
+        found = np.zeros(len(sites), dtype=bool)
+        s, road, number = lanes.s(sites.row, sites.progress), lanes.road[sites.row], lanes.tables.lane_id[sites.row]
+        for stretch in stretches:
+            here = (road == lanes.tables.index[stretch.road]) & (s >= stretch.low) & (s <= stretch.high)
+            found |= here & np.isin(number, stretch.lanes) if stretch.lanes else here
+        return found
+
+    return covers
+
+
+def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | None = None) -> list[Stretch]:
+    """The stretches of a range from its first cursor over the others to its last one.
+
+    A cursor's lanes count up to the next cursor. Between cursors on different roads the range follows the shortest
+    chain of linked roads, with all their lanes. `length` cuts the range off, counted from the first cursor [m].
+    Raises PositionError for roads that do not exist or are not linked.
+    """
+    ends = _links(roads)
+    parts: list[tuple[Stretch, bool]] = []
+    for number, (one, two) in enumerate(pairwise(cursors)):
+        first, last = roads.road(one.road).length, roads.road(two.road).length
+        here = one.s if one.s is not None else 0.0 if number == 0 else first
+        there = two.s if two.s is not None else last
+        if one.road == two.road:
+            parts.append((Stretch(one.road, min(here, there), max(here, there), one.lanes), there >= here))
+            continue
+        chain = _chain(ends, one.road, two.road)
+        leaving, *between, entering = chain
+        forward = leaving.end == END
+        parts.append((Stretch(one.road, here if forward else 0.0, first if forward else here, one.lanes), forward))
+        for entry in between[::2]:
+            whole = roads.road(entry.road).length
+            parts.append((Stretch(entry.road, 0.0, whole), entry.end == START))
+        forward = entering.end == START
+        if two.s is None and number == len(cursors) - 2 and not forward:
+            there = 0.0
+        parts.append((Stretch(two.road, 0.0 if forward else there, there if forward else last, two.lanes), forward))
+    return _cut(parts, length)
+
+
+def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[Stretch]:
+    found, left = [], np.inf if length is None else length
+    for stretch, forward in parts:
+        span = min(stretch.high - stretch.low, left)
+        low = stretch.low if forward else stretch.high - span
+        found.append(Stretch(stretch.road, low, low + span, stretch.lanes))
+        left -= span
+        if left <= 0.0:
+            break
+    return found
+
+
+def _links(roads: RoadNetwork) -> Mapping[RoadTerminal, list[RoadTerminal]]:
+    """Which ends of roads meet, as the lanes are linked."""
+    found: dict[RoadTerminal, list[RoadTerminal]] = {}
+    for one, two, edge in roads.graph.edges(data=True):
+        if edge["kind"] == "successor" and one.road != two.road:
+            leaving = RoadTerminal(one.road, END if roads.driving_direction(one.road, one.lane) > 0 else START)
+            entering = RoadTerminal(two.road, START if roads.driving_direction(two.road, two.lane) > 0 else END)
+            for a, b in ((leaving, entering), (entering, leaving)):
+                if b not in found.setdefault(a, []):
+                    found[a].append(b)
+    return found
+
+
+def _chain(ends: Mapping[RoadTerminal, list[RoadTerminal]], start: str, goal: str) -> list[RoadTerminal]:
+    """Ends of roads from where `start` is left to where `goal` is entered; roads between come in pairs of ends."""
+    queue = deque([[RoadTerminal(start, END)], [RoadTerminal(start, START)]])
+    seen = {RoadTerminal(start, END), RoadTerminal(start, START)}
+    while queue:
+        chain = queue.popleft()
+        for entry in ends.get(chain[-1], ()):
+            if entry.road == goal:
+                return [*chain, entry]
+            if entry not in seen:
+                other = RoadTerminal(entry.road, START if entry.end == END else END)
+                seen |= {entry, other}
+                queue.append([*chain, entry, other])
+    raise PositionError(Diagnostic(f"no roads lead from road {start!r} to road {goal!r}", "correct the road cursors"))

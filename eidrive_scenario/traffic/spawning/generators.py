@@ -1,0 +1,323 @@
+"""The instances of background traffic that a scenario starts: swarms, sources, sinks and areas."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
+from eidrive_scenario.traffic.spawning.sites import Covers, SpawnAreas, SpawnSites
+from eidrive_scenario.world.actor import ActorSpec
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RETRY = 0.5
+"""Where no place was free, the next attempt is made so much later [s]."""
+RIM = 0.8
+"""From this share of the ellipse's axes outwards a swarm is replenished."""
+
+
+@dataclass(frozen=True)
+class CentralObject:
+    """The entity around which a swarm is: place [m], heading [rad] and speed along it [m/s]."""
+
+    x: float
+    y: float
+    heading: float
+    speed: float
+
+
+class GeneratorContext(Protocol):
+    """The background traffic that a generator adds cars to and removes cars from.
+
+    seed, time, dt  seed of the run, current simulated time [s] and time step [s]
+    ground          lanes, sidewalks and crossings on which participants may start
+    """
+
+    seed: int
+    time: float
+    dt: float
+    ground: SpawnAreas
+    centre: Callable[[str], CentralObject | None]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all cars of the background traffic."""
+        ...
+
+    def spec(self, name: str) -> ActorSpec:
+        """Return the specification of a car."""
+        ...
+
+    def positions(self, names: list[str]) -> tuple[Array, Array]:
+        """Return x and y of cars [m]."""
+        ...
+
+    def sites(self, names: list[str]) -> SpawnSites:
+        """Return the sites on lanes at which cars are."""
+        ...
+
+    def starting_speed(self, sites: SpawnSites, participant: Participant) -> Array:
+        """Return the usual speed at each site (K,) [m/s]."""
+        ...
+
+    def spawn(
+        self,
+        instance: TrafficGenerator,
+        participant: Participant,
+        sites: SpawnSites,
+        speed: Array,
+        rng: np.random.Generator,
+        given_speed: float | None,
+    ) -> bool:
+        """Add a participant at a free site. Return False if no site is free."""
+        ...
+
+    def despawn(self, name: str) -> None:
+        """Remove a car."""
+        ...
+
+
+@dataclass
+class TrafficGenerator(ABC):
+    """Traffic of one name, from the start of its action until it is stopped.
+
+    name    trafficName, or what stands for it;  key  tells it from others of that name
+    """
+
+    name: str
+    key: int
+    active: bool = field(default=True, init=False)
+    members: dict[str, None] = field(default_factory=dict, init=False)
+    """The cars that it made and that are still there, in the order in which they came."""
+    _draws: int = field(default=0, init=False)
+
+    @abstractmethod
+    def step(self, traffic: GeneratorContext) -> None:
+        """Bring in and take out cars at this instant."""
+
+    @abstractmethod
+    def is_due(self, traffic: GeneratorContext) -> bool:
+        """Whether it may bring in a car now."""
+
+    def rng(self, traffic: GeneratorContext) -> np.random.Generator:
+        """The random numbers of the next attempt to bring in a car."""
+        self._draws += 1
+        return generator(traffic.seed, "traffic", self.name, self.key, self._draws)
+
+
+@dataclass
+class Swarm(TrafficGenerator):
+    """Traffic around an entity, between a circle and an ellipse, both `offset` ahead of it along its x axis [m].
+
+    The whole ring is filled once; what leaves the ellipse is taken out and replaced near its rim, where cars drive
+    inwards as seen from the entity.
+
+    speeds      range of the speeds at the start [m/s], None for the speed limit
+    same, opposite  shares of the directions of travel relative to the entity, None for any
+    front, rear, left, right  shares of the sectors around the entity, None for any
+    """
+
+    centre: str
+    inner: float
+    major: float
+    minor: float
+    offset: float
+    count: int
+    mixture: TrafficMix
+    speeds: tuple[float, float] | None = None
+    directions: tuple[float, float] | None = None
+    sectors: tuple[float, float, float, float] | None = None
+    _filled: bool = field(default=False, init=False)
+    _again: float = field(default=0.0, init=False)
+
+    def is_due(self, traffic: GeneratorContext) -> bool:
+        """While cars are missing."""
+        return len(self.members) < self.count and traffic.time >= self._again - 1e-9
+
+    def step(self, traffic: GeneratorContext) -> None:
+        """Take out who has left, fill up."""
+        centre = traffic.centre(self.centre)
+        if centre is None:
+            return
+        if self.members:
+            names = list(self.members)
+            x, y = traffic.positions(names)
+            _, share = self._place(centre, x, y)
+            for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
+                traffic.despawn(name)
+        failures = 0
+        while self.is_due(traffic) and failures < (1 if self._filled else 5):
+            if not self._bring_one(traffic, centre):
+                failures += 1
+        if failures:
+            self._again = traffic.time + RETRY
+        self._filled = True
+
+    def _place(self, centre: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
+        """Distance from the middle [m], and the share of the ellipse's axes at which places lie."""
+        cos, sin = math.cos(centre.heading), math.sin(centre.heading)
+        dx, dy = x - centre.x - self.offset * cos, y - centre.y - self.offset * sin
+        ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
+        return np.hypot(ahead, left), np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
+
+    def _bring_one(self, traffic: GeneratorContext, centre: CentralObject) -> bool:
+        rng = self.rng(traffic)
+        participant = self.mixture.draw(rng)
+        sites = traffic.ground.for_body(participant)
+        distance, share = self._place(centre, sites.x, sites.y)
+        fit = (distance >= self.inner) & (share <= 1.0)
+        fit &= self._direction(rng, centre, sites) & self._sector(rng, centre, sites)
+        speed = traffic.starting_speed(sites, participant)
+        if self.speeds is not None:
+            speed = np.full(len(sites), rng.uniform(*self.speeds))
+        choices = [fit]
+        if self._filled:
+            vx = speed * np.cos(sites.heading) - centre.speed * math.cos(centre.heading)
+            vy = speed * np.sin(sites.heading) - centre.speed * math.sin(centre.heading)
+            inwards = (sites.x - centre.x) * vx + (sites.y - centre.y) * vy < 0.0
+            rim = fit & (share >= RIM)
+            choices = [rim & inwards, rim, fit]
+        given = None if self.speeds is None else float(speed[0]) if len(speed) else None
+        return any(
+            traffic.spawn(self, participant, sites.subset(choice), speed[choice], rng, given)
+            for choice in choices
+            if choice.any()
+        )
+
+    def _direction(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
+        if self.directions is None:
+            return np.ones(len(sites), dtype=bool)
+        same, opposite = self.directions
+        with_it: Flags = np.cos(sites.heading - centre.heading) >= 0.0
+        return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
+
+    def _sector(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
+        """Quarters of the plane around the entity, 90° each."""
+        if self.sectors is None:
+            return np.ones(len(sites), dtype=bool)
+        bearing = np.arctan2(sites.y - centre.y, sites.x - centre.x) - centre.heading
+        quarter = np.round(bearing / (math.pi / 2)).astype(np.int64) % 4
+        front, rear, left, right = self.sectors
+        shares = np.cumsum([front, left, rear, right])
+        return np.asarray(quarter == np.searchsorted(shares, rng.uniform(0.0, shares[-1]), side="right"))
+
+
+@dataclass
+class Source(TrafficGenerator):
+    """Cars appear at an even rate [1/s] at one of the places around a position; who finds none free waits.
+
+    speed  at the start [m/s], None for the speed limit
+    """
+
+    place: tuple[float, float]
+    sites: Callable[[Participant], SpawnSites]
+    rate: float
+    mixture: TrafficMix
+    speed: float | None
+    started: float
+    _made: int = field(default=0, init=False)
+    _waiting: Participant | None = field(default=None, init=False)
+
+    def is_due(self, traffic: GeneratorContext) -> bool:
+        """When the next one is due."""
+        return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - 1e-9
+
+    def step(self, traffic: GeneratorContext) -> None:
+        """Bring in who is due; the same one tries again as long as there is no place."""
+        while self.is_due(traffic):
+            rng = self.rng(traffic)
+            participant = self._waiting or self.mixture.draw(rng)
+            sites = self.sites(participant)
+            speed = traffic.starting_speed(sites, participant)
+            if self.speed is not None:
+                speed = np.full(len(sites), self.speed)
+            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, self.speed):
+                self._waiting = participant
+                return
+            self._waiting = None
+            self._made += 1
+
+
+@dataclass
+class Sink(TrafficGenerator):
+    """Cars of background traffic disappear within a radius [m] around a position, at most at a rate [1/s].
+
+    categories  whom it takes, None for all
+    """
+
+    place: tuple[float, float]
+    radius: float
+    rate: float
+    categories: frozenset[str] | None
+    _next: float = field(default=-math.inf, init=False)
+
+    def is_due(self, traffic: GeneratorContext) -> bool:
+        """It never brings in anybody."""
+        return False
+
+    def step(self, traffic: GeneratorContext) -> None:
+        """Take out who is there, the nearest first, as many as the rate allows by now."""
+        if self.rate <= 0.0:
+            return
+        names = [name for name in traffic.names if self._takes(traffic, name)]
+        if not names:
+            return
+        x, y = traffic.positions(names)
+        distance = np.hypot(x - self.place[0], y - self.place[1])
+        for n in np.argsort(distance, kind="stable").tolist():
+            if distance[n] > self.radius or self._next > traffic.time + 1e-9:
+                return
+            traffic.despawn(names[n])
+            # What was not used while nobody came is not saved up.
+            self._next = max(self._next, traffic.time - traffic.dt) + 1.0 / self.rate
+
+    def _takes(self, traffic: GeneratorContext, name: str) -> bool:
+        return self.categories is None or traffic.spec(name).category in self.categories
+
+
+@dataclass
+class Area(TrafficGenerator):
+    """A number of participants in an area: brought in once, or kept there.
+
+    covers  which of some places lie in the area
+    """
+
+    count: int
+    continuous: bool
+    mixture: TrafficMix
+    covers: Covers
+    _again: float = field(default=0.0, init=False)
+
+    def is_due(self, traffic: GeneratorContext) -> bool:
+        """While participants are missing."""
+        return len(self.members) < self.count and traffic.time >= self._again - 1e-9
+
+    def step(self, traffic: GeneratorContext) -> None:
+        """Take out who has left, fill up; done with it where it is not continuous."""
+        if self.members:
+            names = list(self.members)
+            outside = ~self.covers(traffic.sites(names))
+            for name in [names[n] for n in np.flatnonzero(outside)]:
+                traffic.despawn(name)
+        failures = 0
+        while self.is_due(traffic) and failures < 5:
+            rng = self.rng(traffic)
+            participant = self.mixture.draw(rng)
+            sites = traffic.ground.for_body(participant)
+            sites = sites.subset(self.covers(sites))
+            speed = traffic.starting_speed(sites, participant)
+            if not len(sites) or not traffic.spawn(self, participant, sites, speed, rng, None):
+                failures += 1
+        if failures:
+            self._again = traffic.time + RETRY
+        if not self.continuous:
+            self.active = False

@@ -1,0 +1,174 @@
+"""Where traffic may appear: places along lanes, and whether they are free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.geometry import overlap
+from eidrive_scenario.roads import LaneLocation
+from eidrive_scenario.traffic.cars import PLANNED
+from eidrive_scenario.traffic.fleet import Fleet
+from eidrive_scenario.traffic.idm import Drivers
+from eidrive_scenario.traffic.lanes import TrafficLanes
+from eidrive_scenario.traffic.leaders import FOREIGN, find_followers, find_leaders
+from eidrive_scenario.traffic.spawning.bodies import Participant
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+SPACING = 5.0
+"""Distance between the places along a lane [m]."""
+WIDEST = 2.55
+"""No more than the widest vehicle that roads are made for needs to fit into a lane [m]; Directive 96/53/EC."""
+REACH = 30.0
+"""A position further away from every lane than this is the position of no traffic [m]."""
+AIR = 0.5
+"""Between the box of who appears and all others [m]."""
+
+
+@dataclass(frozen=True)
+class SpawnSites:
+    """Places (K,) along lanes: row and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
+
+    row: Integers
+    progress: Array
+    x: Array
+    y: Array
+    heading: Array
+    width: Array
+
+    @classmethod
+    def along(cls, lanes: TrafficLanes, rows: Integers) -> SpawnSites:
+        """Places at an even distance along lanes."""
+        counts = np.maximum(np.floor(lanes.length[rows] / SPACING).astype(np.int64), 1)
+        row = np.repeat(rows, counts)
+        number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return cls.at(lanes, row, (number + 0.5) * lanes.length[row] / np.repeat(counts, counts))
+
+    @classmethod
+    def at(cls, lanes: TrafficLanes, row: Integers, progress: Array) -> SpawnSites:
+        """Given places (K,)."""
+        poses = lanes.tables.lane_poses(row, lanes.s(row, progress), np.zeros(len(row)))
+        heading = poses.h + np.where(lanes.direction[row] > 0, 0.0, np.pi)
+        return cls(row, progress, poses.x, poses.y, heading, lanes.width(row, progress))
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def subset(self, which: Integers | Flags) -> SpawnSites:
+        """A part of them."""
+        return SpawnSites(
+            self.row[which],
+            self.progress[which],
+            self.x[which],
+            self.y[which],
+            self.heading[which],
+            self.width[which],
+        )
+
+    def concatenate(self, other: SpawnSites) -> SpawnSites:
+        """These and others."""
+        return SpawnSites(
+            np.concatenate([self.row, other.row]),
+            np.concatenate([self.progress, other.progress]),
+            np.concatenate([self.x, other.x]),
+            np.concatenate([self.y, other.y]),
+            np.concatenate([self.heading, other.heading]),
+            np.concatenate([self.width, other.width]),
+        )
+
+
+Covers = Callable[[SpawnSites], Flags]
+"""Which of some places belong to an area."""
+
+
+class SpawnAreas:
+    """The places of one road network, for those who drive and those who walk."""
+
+    def __init__(self, lanes: TrafficLanes) -> None:
+        self._lanes = lanes
+
+    @cached_property
+    def driving(self) -> SpawnSites:
+        """For vehicles; none on lanes that end."""
+        lanes = self._lanes
+        fit = lanes.tables.lane_drivable & ~lanes.in_junction & np.isinf(lanes.ends_at)
+        return SpawnSites.along(lanes, np.flatnonzero(fit))
+
+    @cached_property
+    def walking(self) -> SpawnSites:
+        """For pedestrians."""
+        return SpawnSites.along(self._lanes, np.flatnonzero(self._lanes.walkable & ~self._lanes.in_junction))
+
+    def for_body(self, participant: Participant) -> SpawnSites:
+        """The places where this one fits."""
+        return self.walking if participant.walks else self.driving
+
+
+def sites_within_radius(
+    lanes: TrafficLanes, sites: SpawnSites, x: float, y: float, radius: float, location: LaneLocation | None
+) -> SpawnSites:
+    """The places within a radius of a point [m], and the point's own place on its lane, if it lies on one of theirs.
+
+    Where that is none at all, the nearest place that is no further away than a point may lie from its road.
+    """
+    distance = np.hypot(sites.x - x, sites.y - y)
+    found = sites.subset(distance <= radius)
+    if location is not None:
+        row, progress = lanes.of(location)
+        if np.any(sites.row == row):
+            here = SpawnSites.at(lanes, np.array([row]), np.array([progress]))
+            return found.concatenate(here)
+    if not len(found) and len(sites) and distance.min() <= REACH:
+        return sites.subset(np.array([int(np.argmin(distance))]))
+    return found
+
+
+def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Flags:
+    """(K,) where a participant can appear with a speed (K,) [m/s].
+
+    It touches nobody, has a gap ahead in which it need not brake harder than is comfortable, and leaves its follower as
+    much.  foreign  (M, 7) boxes of all that is not of the fleet
+    """
+    lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
+    count = len(sites)
+    width = spec.size[1] if participant.walks else min(spec.size[1], WIDEST)
+    half = 0.5 * spec.size[0]
+    front, rear = np.full(count, spec.offset[0] + half), np.full(count, spec.offset[0] - half)
+    occupants = fleet.occupants()
+    nobody = np.full(count, -9)
+    leaders = find_leaders(lanes, lanes.chain(sites.row, PLANNED + 1), sites.progress, front, occupants, own=nobody)
+    followers = find_followers(lanes, sites.row, sites.progress, rear, occupants, nobody)
+    own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))
+    braking = own.response(speed, np.maximum(speed, 1.0), leaders.gap, speed - leaders.speed)
+    behind = followers.number
+    known = (behind >= 0) & (occupants.owner[behind] > FOREIGN) if len(occupants.row) else behind >= 0
+    table = np.repeat(Drivers.of([fleet.driver]).table, count, axis=0)
+    table[known] = fleet.drivers.table[occupants.owner[behind[known]]]
+    v = np.where(behind >= 0, occupants.speed[behind], 0.0) if len(occupants.row) else np.zeros(count)
+    pressed = Drivers(table).response(v, np.maximum(v, 1.0), followers.gap, v - speed)
+    fit = (sites.width >= width) & (braking >= -driver.deceleration) & (leaders.gap > driver.standstill_gap)
+    fit &= (behind < 0) | ((pressed >= -Drivers(table).deceleration) & (followers.gap > driver.standstill_gap))
+    boxes = np.concatenate([foreign, fleet.boxes])
+    for n in np.flatnonzero(fit).tolist():
+        fit[n] = not _touches(sites, n, participant, boxes)
+    return np.asarray(fit)
+
+
+def _touches(sites: SpawnSites, n: int, participant: Participant, boxes: Array) -> bool:
+    spec = participant.spec
+    yaw = float(sites.heading[n])
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y = sites.x[n] + cos * spec.offset[0], sites.y[n] + sin * spec.offset[0]
+    reach = np.hypot(spec.size[0], spec.size[1]) / 2.0 + np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0 + 2.0 * AIR
+    for box in boxes[np.hypot(boxes[:, 0] - x, boxes[:, 1] - y) < reach].tolist():
+        mine = (float(x), float(y), box[2], spec.size[0] + 2.0 * AIR, spec.size[1] + 2.0 * AIR, box[5], yaw)
+        if overlap(mine, box):
+            return True
+    return False

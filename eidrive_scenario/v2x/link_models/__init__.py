@@ -1,0 +1,1 @@
+"""Delay and loss models of single links."""

@@ -1,0 +1,74 @@
+"""The channel composed of one delay and one loss model, the same on every link."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal
+
+from eidrive_scenario.v2x.analytic.settings import Cv2xMode4Loss, Ieee80211pLoss
+from eidrive_scenario.v2x.link_channel import LinkChannel
+from eidrive_scenario.v2x.link_models.delay import ConstantDelay, Delay
+from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
+from eidrive_scenario.v2x.link_models.loss import Loss, NoLoss
+from eidrive_scenario.v2x.link_models.loss_process import LossProcess
+from eidrive_scenario.v2x.link_random import LinkRandom
+from eidrive_scenario.v2x.messages.message import Message
+from eidrive_scenario.v2x.profile import ChannelProfile
+
+
+class ComposedProfile(ChannelProfile):
+    """Delay and loss of every link.
+
+    reordering  true: a message may overtake an earlier one of its link, so that delays are those drawn; false: it
+                waits until the earlier ones have arrived
+    """
+
+    model: Literal["composed"] = "composed"
+    delay: Delay = ConstantDelay()
+    loss: Loss = NoLoss()
+    reordering: bool = True
+
+
+class ComposedChannel(LinkChannel):
+    """A message is lost where its draw lies below the loss probability p, and else delayed by another draw's quantile.
+
+    Both draws belong to the message and the link, whatever p is: what arrives with a larger p arrives with a smaller
+    one too.
+    """
+
+    settings: ClassVar[type[ChannelProfile]] = ComposedProfile
+
+    def __init__(self, profile: ComposedProfile, seed: int) -> None:
+        super().__init__()
+        self.profile = profile
+        self.own_perception = profile.own_perception
+        self._losses = LossProcess(profile.loss, seed)
+        self._draws = LinkRandom(seed)
+        self._last_arrival: dict[tuple[str, str], float] = {}
+
+    def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
+        distance = self.surroundings.distance(message.sender, receiver)
+        reason = self._losses.reason(message, receiver, now, distance)
+        if reason is not None:
+            return reason
+        seconds = delay_of(self.profile.delay, self._draws, message, receiver)
+        if not self.profile.reordering:
+            link = (message.sender, receiver)
+            last = self._last_arrival.get(link, now)
+            seconds = max(seconds, last - now)
+            while now + seconds < last:  # rounding
+                seconds = math.nextafter(seconds, math.inf)
+            self._last_arrival[link] = now + seconds
+        return seconds
+
+    def channel_busy_ratio(self, station: str) -> float | None:
+        loss = self.profile.loss
+        return loss.table().channel_busy_ratio if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss) else None
+
+
+def delay_of(delay: Delay, draws: LinkRandom, message: Message, receiver: str) -> float:
+    """How long this message takes on this link [s]."""
+    if isinstance(delay, TraceDelay) and delay.replay:
+        return delay.at(message.number)
+    u = draws.uniform("delay", message.sender, receiver, message.number) if delay.random else 0.5
+    return delay.quantile(u)

@@ -1,0 +1,1 @@
+"""V2X messages: content, size, encoding, generation rules."""

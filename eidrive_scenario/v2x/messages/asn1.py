@@ -1,0 +1,284 @@
+"""Messages in unaligned packed encoding rules, with ASN.1 modules that the user supplies.
+
+The values are laid out as in ETSI EN 302 637-2 V1.4.1 (CAM) and ETSI TR 103 562 V2.1.1 (CPM). A module may have fewer
+components than those; a component that it asks for beyond them is an error. TS 103 324 wraps the containers of a CPM in
+open types, which is not supported.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_file, reason_of
+from eidrive_scenario.v2x.messages.message import Message, StationState
+
+TYPES = {"cam": "CAM", "cpm": "CPM"}
+"""The type of the whole message, by kind."""
+
+_STATION_TYPES = {"pedestrian": 1, "bicycle": 2, "motorbike": 4, "car": 5, "bus": 6, "van": 7, "truck": 8, "misc": 15}
+_SUBCLASSES = {"car": 3, "motorbike": 2, "bus": 4, "van": 5, "truck": 6}
+_METRES_PER_DEGREE = 111_319.49
+"""Along the equator, about which the plane of the world is put."""
+
+
+MAX_BYTES = MIB
+"""Size of an ASN.1 module."""
+ROADSIDE = "misc"
+"""The class of stations that are no vehicles: roadside units."""
+
+
+class Asn1Encoder:
+    """Writes messages of a station of this class (`car`, …, `misc` is a roadside unit) with the modules in these files.
+
+    Raises SettingError, naming the file or the missing type, if asn1tools is not installed, a file cannot be read, or a
+    module has no such type or one that takes other components than ours: each kind of message is tried at once.
+    """
+
+    def __init__(
+        self,
+        files: Sequence[Path],
+        kinds: Sequence[str],
+        *,
+        station: str = "car",
+        source: str = "",
+        line: int | None = None,
+    ) -> None:
+        self._station = station
+        try:
+            import asn1tools
+        except ImportError as error:
+            remedy = "install it: pip install 'eidrive-scenario[asn1]'"
+            raise SettingError(Diagnostic("asn1_files needs the package asn1tools", remedy, source, line)) from error
+        for file in files:
+            if not is_regular_file(file):
+                problem = Diagnostic(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
+                raise SettingError(problem)
+        try:
+            texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
+            self._modules = asn1tools.compile_string("\n".join(texts), "uper")
+        except OSError as error:
+            problem = Diagnostic(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
+            raise SettingError(problem) from error
+        except Exception as error:  # asn1tools raises errors of many kinds for modules that are wrong
+            names = ", ".join(str(file) for file in files)
+            message = f"{names}: {_without_quotes(error)}"
+            raise SettingError(Diagnostic(message, "correct the module", source, line)) from error
+        for kind in kinds:
+            if TYPES[kind] not in self._modules.types:
+                message = f"the ASN.1 modules have no type {TYPES[kind]!r}, which a {kind} needs"
+                raise SettingError(Diagnostic(message, "add the file that defines it", source, line))
+        try:
+            for kind in kinds:
+                self._try(kind)
+        except SettingError as error:
+            raise SettingError([replace(problem, source=source, line=line) for problem in error.diagnostics]) from error
+
+    def _try(self, kind: str) -> None:
+        """Encode messages of this kind with and without what is optional."""
+        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown(1))
+        state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
+            message = Message("station", 0, 0.0, state, seen, 0, "cam" if kind == "cam" else "cpm")
+            self.encode(message, sensors=int(more), low_frequency=more)
+
+    def encode(self, message: Message, *, sensors: int = 0, low_frequency: bool = False) -> bytes:
+        """The message; a CPM with so many sensors, a CAM with or without the low-frequency container.
+
+        Raises SettingError if the module does not take it.
+        """
+        value = (
+            cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors, self._station)
+        )
+        try:
+            encoded: bytes = self._modules.encode(TYPES[message.kind], value)
+        except Exception as error:  # of many kinds, such as AttributeError for a type that refers to itself
+            why = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without all that we wanted to say
+            remedy = "docs/channels.md says after which standards messages are laid out"
+            raise SettingError(Diagnostic(f"the ASN.1 modules take no {message.kind}: {why}", remedy)) from error
+        return encoded
+
+    def decode(self, kind: str, data: bytes) -> Any:
+        """What such a message says, as asn1tools has it."""
+        return self._modules.decode(TYPES[kind], data)
+
+
+def _without_quotes(error: Exception) -> str:
+    """What asn1tools says, without the line of the file that it quotes: the path may lead to a file of another kind."""
+    place = re.search(r"line (\d+)", str(error))
+    return "not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
+
+
+def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Velocities and covariances of so many objects of which neither is known."""
+    return np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
+
+
+def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
+    """A cooperative awareness message after EN 302 637-2, annex A; of a roadside unit it says only where that is."""
+    state = message.state
+    if message.detections.classes[0] == ROADSIDE:
+        place = {"stationType": _STATION_TYPES[ROADSIDE], "referencePosition": _position(state)}
+        return _cam(message, {"basicContainer": place, "highFrequencyContainer": ("rsuContainerHighFrequency", {})})
+    *_, length, width, _, _ = message.detections.boxes[0].tolist()
+    parameters: dict[str, Any] = {
+        "basicContainer": {
+            "stationType": _STATION_TYPES[message.detections.classes[0]],
+            "referencePosition": _position(state),
+        },
+        "highFrequencyContainer": (
+            "basicVehicleContainerHighFrequency",
+            {
+                "heading": _heading(state.yaw),
+                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+                "vehicleLength": {
+                    "vehicleLengthValue": _within(length * 10.0, 1, 1022),
+                    "vehicleLengthConfidenceIndication": "unavailable",
+                },
+                "vehicleWidth": _within(width * 10.0, 1, 61),
+                "longitudinalAcceleration": {
+                    "longitudinalAccelerationValue": 161,
+                    "longitudinalAccelerationConfidence": 102,
+                },
+                "curvature": {"curvatureValue": 1023, "curvatureConfidence": "unavailable"},
+                "curvatureCalculationMode": "unavailable",
+                "yawRate": {"yawRateValue": 32767, "yawRateConfidence": "unavailable"},
+            },
+        ),
+    }
+    if low_frequency:
+        parameters["lowFrequencyContainer"] = (
+            "basicVehicleContainerLowFrequency",
+            {"vehicleRole": "default", "exteriorLights": (b"\x00", 8), "pathHistory": []},
+        )
+    return _cam(message, parameters)
+
+
+def _cam(message: Message, parameters: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "header": _header(2, message.sender),
+        "cam": {"generationDeltaTime": _milliseconds(message.state.time), "camParameters": parameters},
+    }
+
+
+def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
+    """A collective perception message of a station of this class after TR 103 562, annex A.
+
+    Objects are in the frame of the sender. A roadside unit leaves out the container of the originating station.
+    """
+    state, detections = message.state, message.detections
+    parameters: dict[str, Any] = {
+        "managementContainer": {"stationType": _STATION_TYPES[station], "referencePosition": _position(state)},
+        "numberOfPerceivedObjects": min(len(detections), 255),
+    }
+    if station != ROADSIDE:
+        parameters["stationDataContainer"] = (
+            "originatingVehicleContainer",
+            {
+                "heading": _heading(state.yaw),
+                "speed": {"speedValue": _within(abs(state.speed) * 100.0, 0, 16382), "speedConfidence": 127},
+                "driveDirection": "forward" if state.speed >= 0.0 else "backward",
+            },
+        )
+    if sensors:
+        parameters["sensorInformationContainer"] = [_sensor(number) for number in range(sensors)]
+    if len(detections):
+        delay = _within((state.time - detections.time) * 1e3, -1500, 1500)
+        parameters["perceivedObjectContainer"] = [
+            _object(message, row, delay) for row in range(min(len(detections), 128))
+        ]
+    return {
+        "header": _header(14, message.sender),
+        "cpm": {"generationDeltaTime": _milliseconds(state.time), "cpmParameters": parameters},
+    }
+
+
+def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
+    state, detections = message.state, message.detections
+    x, y, z, length, width, height, yaw = detections.boxes[row].tolist()
+    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    east, north = x - state.x, y - state.y
+    vx, vy = detections.velocity[row].tolist()
+    speeds = [16383, 16383]
+    if not math.isnan(vx + vy):
+        speeds = [_within(100.0 * v, -16382, 16382) for v in (cos * vx + sin * vy, cos * vy - sin * vx)]
+    number = row if message.objects is None else message.objects[row]
+    name = detections.classes[row]
+    kind: tuple[str, dict[str, int]] = ("other", {"type": 0, "confidence": 0})
+    if name in _SUBCLASSES:
+        kind = ("vehicle", {"type": _SUBCLASSES[name], "confidence": 0})
+    elif name in ("pedestrian", "bicycle"):
+        kind = ("person", {"type": 1 if name == "pedestrian" else 3, "confidence": 0})
+    return {
+        "objectID": number % 256,
+        "timeOfMeasurement": delay,
+        "objectConfidence": _within(100.0 * float(detections.confidence[row]), 0, 100),
+        "xDistance": _distance(cos * east + sin * north),
+        "yDistance": _distance(cos * north - sin * east),
+        "zDistance": _distance(z - state.z),
+        "xSpeed": {"value": speeds[0], "confidence": 127},
+        "ySpeed": {"value": speeds[1], "confidence": 127},
+        "yawAngle": {"value": _tenths_of_degrees(yaw - state.yaw), "confidence": 127},
+        "planarObjectDimension1": {"value": _within(10.0 * length, 0, 1023), "confidence": 102},
+        "planarObjectDimension2": {"value": _within(10.0 * width, 0, 1023), "confidence": 102},
+        "verticalObjectDimension": {"value": _within(10.0 * height, 0, 1023), "confidence": 102},
+        "objectRefPoint": 0,
+        "classification": [{"confidence": 101, "class": kind}],
+    }
+
+
+def _sensor(number: int) -> dict[str, Any]:
+    """A sensor of which only is said that it is there."""
+    properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
+    area = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0, "vehicleSensorPropertyList": [properties]}
+    return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
+
+
+def _header(number: int, sender: str) -> dict[str, int]:
+    station = sum(byte << (8 * place) for place, byte in enumerate(sender.encode()[-4:]))
+    return {"protocolVersion": 2, "messageID": number, "stationID": station}
+
+
+def _position(state: StationState) -> dict[str, Any]:
+    """The plane of the world about latitude and longitude 0."""
+    return {
+        "latitude": _within(state.y / _METRES_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
+        "longitude": _within(state.x / _METRES_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
+        "positionConfidenceEllipse": {
+            "semiMajorConfidence": 4095,
+            "semiMinorConfidence": 4095,
+            "semiMajorOrientation": 3601,
+        },
+        "altitude": {"altitudeValue": _within(100.0 * state.z, -100_000, 800_000), "altitudeConfidence": "unavailable"},
+    }
+
+
+def _heading(yaw: float) -> dict[str, int]:
+    """Clockwise from north, where y points."""
+    return {"headingValue": _tenths_of_degrees(math.pi / 2.0 - yaw), "headingConfidence": 127}
+
+
+def _distance(metres: float) -> dict[str, int]:
+    return {"value": _within(100.0 * metres, -132768, 132767), "confidence": 102}
+
+
+def _tenths_of_degrees(angle: float) -> int:
+    return round(math.degrees(angle) * 10.0) % 3600
+
+
+def _milliseconds(time: float) -> int:
+    return round(time * 1e3) % 65536
+
+
+def _within(value: float, low: int, high: int) -> int:
+    return min(max(round(value), low), high)

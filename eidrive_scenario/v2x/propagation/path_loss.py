@@ -1,0 +1,185 @@
+"""Path loss as a setting: which published model, and what it makes of bodies in between."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.special import ndtri
+
+from eidrive_scenario.settings import Settings
+from eidrive_scenario.v2x.propagation.gains import (
+    blockage_moments,
+    building_nlos,
+    free_space,
+    highway_los,
+    log_distance,
+    urban_los,
+    winner_b1,
+)
+from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, Integers
+
+Array = NDArray[np.float64]
+
+
+class LinkGeometry:
+    """M links and what stands on them; LOS is 0 among the states.
+
+    distance  (M,) between the antennas [m];  states  (M,) LOS, NLOSV or NLOS;  lower, upper  (M,) heights of the
+    antennas, tops  (M,) and of the highest vehicle in between [m];  vehicles  (M,) how many there are
+    """
+
+    def __init__(
+        self, distance: Array, states: Integers, lower: Array, upper: Array, tops: Array, vehicles: Integers
+    ) -> None:
+        self.distance = np.maximum(distance, 1.0)
+        self.states = states
+        self.lower = lower
+        self.upper = upper
+        self.tops = tops
+        self.vehicles = vehicles
+
+
+class Link(NamedTuple):
+    """One link of `LinkGeometry`, in plain numbers."""
+
+    distance: float
+    state: int
+    lower: float
+    upper: float
+    top: float
+    vehicles: int
+
+
+class Tr37885(Settings):
+    """3GPP TR 37.885: LOS of streets or of highways, NLOS behind buildings, and vehicles that add to LOS.
+
+    blockage  how the loss by vehicles in between is spread: `lognormal` as ns-3 reads the report, `normal` and not
+              below 0 dB, or its `mean`
+    """
+
+    kind: Literal["tr37885"] = "tr37885"
+    environment: Literal["urban", "highway"] = "urban"
+    blockage: Literal["lognormal", "normal", "mean"] = "lognormal"
+
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB] (table 6.2.1-2)."""
+
+    @property
+    def reaches(self) -> tuple[float, float, float]:
+        """Distance over which shadowing loses all but 1/e of its correlation, with LOS, NLOSv and NLOS [m]."""
+        return (10.0, 13.0, 13.0) if self.environment == "urban" else (25.0, 25.0, 25.0)
+
+    def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
+        los = urban_los if self.environment == "urban" else highway_los
+        clear = los(between.distance, frequency_ghz)
+        if not between.states.any():
+            return clear
+        mean, spread = blockage_moments(between.distance, between.lower, between.upper, between.tops)
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self._blocked(mean, spread, draws)],
+            building_nlos(between.distance, frequency_ghz),
+        )
+
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        los = urban_los if self.environment == "urban" else highway_los
+        if link.state == LOS:
+            return float(los(distance, frequency_ghz))
+        if link.state != NLOSV:
+            return float(building_nlos(distance, frequency_ghz))
+        mean, spread = blockage_moments(distance, link.lower, link.upper, link.top)
+        return float(los(distance, frequency_ghz) + self._blocked(mean, spread, draw))
+
+    def _blocked(self, mean: Array, spread: Array, draws: Array | float) -> Array:
+        if self.blockage == "mean":
+            return mean
+        if self.blockage == "normal":
+            return np.maximum(0.0, mean + spread * ndtri(draws))
+        some = np.where(mean > 0.0, mean, 1.0)
+        variance = np.log1p((spread / some) ** 2)
+        return np.where(mean > 0.0, np.exp(np.log(some) - variance / 2.0 + np.sqrt(variance) * ndtri(draws)), 0.0)
+
+
+class _LossPerVehicle(Settings):
+    """Base of path loss with LOS that adds a fixed loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+
+    Buildings have the NLOS of TR 37.885 where that loses more.
+    """
+
+    per_vehicle_db: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.9
+
+    spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
+    """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
+    reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
+    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
+
+    @abstractmethod
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m]."""
+
+    def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
+        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+        clear = self.line_of_sight_loss(between.distance, frequency_ghz)
+        if not between.states.any():
+            return clear
+        return np.select(
+            [between.states == LOS, between.states == NLOSV],
+            [clear, clear + self.per_vehicle_db * between.vehicles],
+            np.maximum(clear, building_nlos(between.distance, frequency_ghz)),
+        )
+
+    def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
+        """The same for one link."""
+        distance = max(link.distance, 1.0)
+        clear = float(self.line_of_sight_loss(distance, frequency_ghz))
+        if link.state == LOS:
+            return clear
+        if link.state == NLOSV:
+            return clear + self.per_vehicle_db * link.vehicles
+        return max(clear, float(building_nlos(distance, frequency_ghz)))
+
+
+class WinnerB1(_LossPerVehicle):
+    """WINNER+ B1 as in 3GPP TR 36.885, with one loss for each vehicle in between.
+
+    environment_height  taken off the antennas' heights [m]: 1.0 after 3GPP; 0.5 and 0 in the analytic models of 802.11p
+                        and C-V2X. 16 dB at 200 m hang on it
+    Buildings have the NLOS of TR 37.885, as that of TR 36.885 needs the corners of streets.
+    """
+
+    kind: Literal["winner_b1"]
+    environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 1.0
+
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m], for antennas at 1.5 m."""
+        height = 1.5 - self.environment_height
+        return winner_b1(distance, frequency_ghz, height, height)
+
+
+class LogDistance(_LossPerVehicle):
+    """Log-distance path loss, with one loss for each vehicle in between.
+
+    exponent            10 times this many dB per decade of distance; 2 is free space
+    reference_distance  [m], with the loss `reference_loss_db` there and below; None: of free space at the carrier
+    """
+
+    kind: Literal["log_distance"]
+    exponent: Annotated[float, Field(gt=0.0, le=10.0)] = 3.0
+    reference_distance: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
+    reference_loss_db: Annotated[float, Field(ge=-200.0, le=1000.0)] | None = None
+
+    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
+        """Return the path loss with LOS [dB] at distances [m]."""
+        reference = self.reference_loss_db
+        at_reference = free_space(self.reference_distance, frequency_ghz) if reference is None else reference
+        return log_distance(distance, self.exponent, self.reference_distance, at_reference)
+
+
+PathLoss = Annotated[Tr37885 | WinnerB1 | LogDistance, Field(discriminator="kind")]

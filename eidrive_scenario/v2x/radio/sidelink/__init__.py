@@ -1,0 +1,1 @@
+"""C-V2X sidelink Mode 4: sensing, resource selection, reception."""

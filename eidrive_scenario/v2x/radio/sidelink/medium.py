@@ -1,0 +1,299 @@
+"""Access of C-V2X Mode 4: sensing-based semi-persistent scheduling (3GPP TS 36.213, 14.1.1.6; TS 36.321, 5.14.1.1)."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
+from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.airtime import SUBFRAME
+from eidrive_scenario.v2x.radio.congestion import DccGate
+from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
+from eidrive_scenario.v2x.radio.sidelink.pscch import ControlChannel, Pdu
+from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
+from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
+from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
+
+Array = NDArray[np.float64]
+
+SUBCARRIERS = 12
+"""Of one resource block."""
+ATTEMPTS_PER_COUNT = 10
+"""C_resel is ten times the reselection counter (3GPP TS 36.213, 14.1.1.4B)."""
+UNUSED = 1.0
+"""A resource that was not used for so long is given up [s] (3GPP TS 36.321, 5.14.1.1)."""
+
+
+@dataclass
+class Grant:
+    """The resource that a station has reserved: it was or will be used first in `subframe`, then once per interval.
+
+    counter   transmissions that are left (SL_RESOURCE_RESELECTION_COUNTER)
+    used      subframe of the last transmission on it; None before the first
+    """
+
+    subframe: int
+    band: int
+    width: int
+    length: int
+    counter: int
+    used: int | None = None
+
+
+@dataclass
+class Sending:
+    """A transmission from `subframe`, the first that has not been sensed yet, to `end`, exclusive."""
+
+    row: int
+    transmission: Transmission
+    subframe: int
+    end: int
+
+
+class Sidelink(MediumAccess):
+    """Resources are (subframe of the interval, subchannels); no station receives in a subframe in which it transmits.
+
+    Subframe k lasts from k to k + 1 milliseconds. A station that has no resource for its first message selects one
+    when the message may be sent, from what it has sensed in the second before.
+
+    noise_dbm  noise in 10 MHz
+    """
+
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        queue: QueueSettings,
+        gate: DccGate,
+        sensing_dbm: float,
+        seed: int,
+        settings: SidelinkSettings,
+        noise_dbm: float,
+    ) -> None:
+        super().__init__(names, queue, gate, sensing_dbm)
+        self._settings = settings
+        self._seed = seed
+        noise = 10.0 ** (noise_dbm / 10.0)
+        self._control = ControlChannel(noise / BLOCKS, settings.control_curve)
+        self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
+        self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
+        self._grants: list[Grant | None] = [None] * len(names)
+        self._sent: list[deque[range]] = [deque() for _ in names]
+        """Subframes in which each station transmitted of late."""
+        self._choices: dict[str, int] = {}
+        """By name, how often each station has drawn a reselection counter, also before it left and came back."""
+        self._next_event = np.full(len(names), math.inf)
+        """When each station selects a resource, or starts its first message if it has one [s]."""
+        self._scheduled = np.zeros(len(names), dtype=np.bool_)
+        """Whether the event is the start of a message."""
+        self._sending: list[Sending] = []
+        """Transmissions that have not been sensed to their end."""
+        self._deaf_time, self._period_deaf = np.zeros(len(names)), np.zeros(len(names))
+        """Time in which each station could not measure, as it transmitted itself [s]."""
+        self._keys = self._sci_keys()
+        self._power = np.zeros((len(names), len(names)))
+
+    def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
+        started: list[Transmission] = []
+        dropped: list[Transmission] = []
+        if not self.names:
+            return started, dropped
+        self._power = power
+        while True:
+            row = int(np.argmin(self._next_event))
+            event = float(self._next_event[row])
+            if self._arrivals and self._arrivals[0].ready <= min(event, until - EARLY):
+                dropped += self._arrive(self._arrivals.popleft())
+                continue
+            if not event < until - EARLY:
+                break
+            self._measure(event)
+            if not self._scheduled[row]:
+                self._next_event[row] = self._occasion(row) * SUBFRAME
+                self._scheduled[row] = True
+                continue
+            started.append(self._start(row))
+        if math.isfinite(until):
+            self._measure(until)
+        self._sense(until)
+        return started, dropped
+
+    def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
+        self._next_event[row] = self.ready[row]
+        self._scheduled[row] = False
+
+    def share(self, transmission: Transmission) -> float:
+        return transmission.bands / self._settings.subchannels
+
+    def channel_busy_ratio(self, row: int, span: float) -> float:
+        """The channel busy ratio of a station: the mean over all subchannels of the subframes that it could measure."""
+        measured = span - float(self._deaf_time[row] + self._period_deaf[row])
+        return super().channel_busy_ratio(row, measured) if measured > 0.0 else 0.0
+
+    def reorder(self, rows: Sequence[int | None]) -> None:
+        former = {old: row for row, old in enumerate(rows) if old is not None}
+        self._grants = [None if old is None else self._grants[old] for old in rows]
+        self._sent = [deque() if old is None else self._sent[old] for old in rows]
+        self._scheduled = moved(self._scheduled, rows, 0.0).astype(np.bool_)
+        for field, fresh in (("_next_event", math.inf), ("_deaf_time", 0.0), ("_period_deaf", 0.0)):
+            setattr(self, field, moved(getattr(self, field), rows, fresh))
+        self._sending = [sending for sending in self._sending if sending.row in former]
+        for sending in self._sending:
+            sending.row = former[sending.row]
+        for entry in self.on_air:
+            if entry.control is not None:
+                entry.control = moved(entry.control, rows, PROPAGATION).astype(np.int8)
+        self._history.rearrange(rows)
+        self._keys = self._sci_keys()
+
+    def _start(self, row: int) -> Transmission:
+        """Transmit the first message of a station on its resource."""
+        transmission, grant = self._head[row], self._grants[row]
+        assert transmission is not None
+        assert grant is not None
+        subframe = round(float(self._next_event[row]) / SUBFRAME)
+        transmission.first_band, transmission.bands = grant.band, grant.width
+        grant.used = subframe
+        grant.counter -= 1
+        if grant.counter == 0 and self._draw("keep", row) < self._settings.keep:
+            grant.counter = self._new_counter(row)
+        transmission.reserves = grant.counter > 0
+        length = round(transmission.duration / SUBFRAME)
+        self._sending.append(Sending(row, transmission, subframe, subframe + length))
+        self._sent[row].append(range(subframe, subframe + length))
+        self._begin(row, transmission, subframe * SUBFRAME)
+        self._next(row)
+        return transmission
+
+    def _occasion(self, row: int) -> int:
+        """The subframe of the first message of a station: the next use of its resource, or of a new one."""
+        head, grant = self._head[row], self._grants[row]
+        assert head is not None
+        settings, ready = self._settings, float(self.ready[row])
+        now = math.floor(ready / SUBFRAME + 1e-6)
+        free = self._sent[row][-1].stop if self._sent[row] else now
+        width, length = settings.extent(head.message.size)
+        if grant is not None and grant.counter > 0 and grant.width >= width and grant.length >= length:
+            # a message that waits for congestion control to let it go has been processed meanwhile
+            processed = max(ready, head.ready + settings.processing)
+            earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
+            occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
+            in_time = occasion * SUBFRAME <= ready + settings.latency + EARLY
+            if in_time and not self._given_up(grant, now, occasion):
+                return occasion
+        earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
+        self._grants[row] = grant = self._select(row, now, earliest, width, length)
+        return grant.subframe
+
+    def _given_up(self, grant: Grant, now: int, occasion: int) -> bool:
+        """Whether a resource has not been used for too long."""
+        used = grant.subframe - self._settings.interval_subframes if grant.used is None else grant.used
+        unused = (occasion - used) // self._settings.interval_subframes - 1
+        limit = self._settings.reselect_after
+        return (now - used) * SUBFRAME > UNUSED or (limit is not None and unused >= limit)
+
+    def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
+        """A new resource among those that sensing leaves, and how often it is used."""
+        settings = self._settings
+        self._sense(now * SUBFRAME)
+        counter = self._new_counter(row)
+        sent, oldest = self._sent[row], now - settings.interval_subframes
+        while sent and sent[0].stop <= oldest:
+            sent.popleft()
+        request = Request(
+            now=now,
+            first=earliest,
+            last=max(earliest, now + settings.window_subframes),
+            width=width,
+            length=length,
+            interval=settings.interval_subframes,
+            uses=ATTEMPTS_PER_COUNT * counter,
+            threshold=settings.pssch_rsrp_threshold_dbm,
+        )
+        own = [subframe for spell in sent for subframe in range(max(spell.start, oldest), min(spell.stop, now))]
+        places = settings.subchannels - width + 1
+        order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * places))
+        reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
+        chosen = int(reported[math.floor(self._draw("choice", row) * len(reported))])
+        start, band = divmod(chosen, places)
+        return Grant(earliest + start, band, width, length, counter)
+
+    def _new_counter(self, row: int) -> int:
+        name = self.names[row]
+        self._choices[name] = self._choices.get(name, 0) + 1
+        low, high = self._settings.counter_range
+        return low + math.floor(self._draw("counter", row) * (high - low + 1))
+
+    def _sense(self, until: float) -> None:
+        """Let the stations receive the subframes that end by `until` [s]."""
+        ended = math.inf if math.isinf(until) else math.floor((until + EARLY) / SUBFRAME + 1e-9)
+        while self._sending:
+            first = min(sending.subframe for sending in self._sending)
+            if first >= ended:
+                return
+            self._receive(int(min(ended, first + WINDOW)))
+
+    def _receive(self, ended: int) -> None:
+        """Let the stations receive what is transmitted before subframe `ended`, at most one sensing window."""
+        due = [
+            Pdu(subframe, sending.row, sending.transmission)
+            for sending in self._sending
+            for subframe in range(sending.subframe, min(sending.end, ended))
+        ]
+        for sending in self._sending:
+            sending.subframe = max(sending.subframe, ended)
+        self._sending = [sending for sending in self._sending if sending.subframe < sending.end]
+        due.sort(key=lambda pdu: (pdu.subframe, pdu.row))
+        rows = np.array([pdu.row for pdu in due])
+        widths = np.array([pdu.transmission.bands for pdu in due])
+        blocks = np.array([self._settings.pssch_blocks(width) for width in widths.tolist()])[:, None]
+        power = self._power[rows]
+        for place, pdu in enumerate(due):
+            if pdu.transmission.gain is not None:
+                power[place] += pdu.transmission.gain
+        milliwatts = 10.0 ** (power / 10.0)
+        self._history.proceed(due[-1].subframe + 1)
+        busy, deaf = self._history.busy(self._history.receive(due, milliwatts / widths[:, None]), self._busy_above)
+        self._period_busy += SUBFRAME * busy
+        self._period_deaf += SUBFRAME * deaf
+        codes = self._control.decode(due, milliwatts / blocks, self._keys)
+        for pdu, code in zip(due, codes, strict=True):
+            before = pdu.transmission.control
+            pdu.transmission.control = code if before is None else np.where(before == DELIVERED, code, before)
+        codes[power < self.sensing_dbm] = PROPAGATION
+        self._note_reservations(due, codes, power - 10.0 * np.log10(SUBCARRIERS * blocks))
+
+    def _note_reservations(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
+        reserving = [place for place, pdu in enumerate(pdus) if pdu.transmission.reserves]
+        if reserving:
+            self._history.reserve([pdus[place] for place in reserving], codes[reserving], rsrp[reserving])
+
+    def _measure(self, now: float) -> None:
+        period = self.gate.control.period
+        while self._period is not None and now >= (self._period + 1) * period - EARLY:
+            end = (self._period + 1) * period
+            self._sense(end)
+            super()._measure(end)
+        super()._measure(now)
+
+    def _period_ratio(self, period: float) -> Array:
+        measured = period - self._period_deaf
+        ratio: Array = np.where(measured > EARLY, self._period_busy / np.maximum(measured, EARLY), 1.0)
+        self._deaf_time += self._period_deaf
+        self._period_deaf = np.zeros(len(self.names))
+        return ratio
+
+    def _sci_keys(self) -> Keys:
+        own = np.array([key(self._seed, "sci", name) for name in self.names], dtype=np.uint64)
+        return combine_keys(own[:, None], own[None, :])
+
+    def _draw(self, purpose: str, row: int) -> float:
+        return uniform(self._key(purpose, row), self._choices[self.names[row]])
+
+    def _key(self, purpose: str, row: int) -> int:
+        return key(self._seed, "sidelink", purpose, self.names[row], self._choices[self.names[row]])

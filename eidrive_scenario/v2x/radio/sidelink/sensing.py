@@ -1,0 +1,156 @@
+"""Sensing results of the stations of C-V2X Mode 4 in the last second: S-RSSI, and decoded control information."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.v2x.radio.reception import DELIVERED, Codes
+from eidrive_scenario.v2x.radio.sidelink.pscch import Pdu
+from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+NOT_DECODED = -np.inf
+CAPACITY = 256
+"""Reservations for which there is room at first."""
+
+
+@dataclass
+class Reservations:
+    """Decoded control information of the last `span` subframes that announces another use: columns of R entries.
+
+    subframes, bands, widths  (R,) when and where it was sent;  rsrp  (R, N) PSSCH-RSRP [dBm], -inf where not decoded
+    """
+
+    stations: int
+    span: int
+    subframes: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    bands: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    widths: Rows = field(default_factory=lambda: np.zeros(CAPACITY, dtype=np.int64))
+    begin: int = 0
+    end: int = 0
+
+    def __post_init__(self) -> None:
+        self.rsrp = np.full((CAPACITY, self.stations), NOT_DECODED, dtype=np.float32)
+
+    def add(self, subframes: Rows, bands: Rows, widths: Rows, rsrp: Array) -> None:
+        """Append entries, in the order of their subframes."""
+        count = len(subframes)
+        if self.end + count > len(self.subframes):
+            self._make_room(count, int(subframes[0]))
+        rows = slice(self.end, self.end + count)
+        self.subframes[rows], self.bands[rows], self.widths[rows] = subframes, bands, widths
+        self.rsrp[rows] = rsrp
+        self.end += count
+
+    def of(self, row: int, now: int) -> tuple[Rows, Rows, Rows, NDArray[np.float32]]:
+        """Subframes, subchannels, widths and PSSCH-RSRP of what a station decoded in the span before subframe `now`."""
+        self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
+        rsrp = self.rsrp[self.begin : self.end, row]
+        decoded = np.flatnonzero(rsrp > NOT_DECODED)
+        rows = decoded + self.begin
+        return self.subframes[rows], self.bands[rows], self.widths[rows], rsrp[decoded]
+
+    def rearrange(self, rows: Sequence[int | None]) -> None:
+        """Keep the columns of these former rows; None: a station that has decoded nothing yet."""
+        self.rsrp = _columns(self.rsrp, rows, NOT_DECODED)
+        self.stations = len(rows)
+
+    def _make_room(self, count: int, now: int) -> None:
+        self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
+        live = slice(self.begin, self.end)
+        kept = self.end - self.begin
+        size = len(self.subframes)
+        while kept + count > size // 2:
+            size *= 2
+        for name in ("subframes", "bands", "widths"):
+            column = np.zeros(size, dtype=np.int64)
+            column[:kept] = getattr(self, name)[live]
+            setattr(self, name, column)
+        rsrp = np.full((size, self.stations), NOT_DECODED, dtype=np.float32)
+        rsrp[:kept] = self.rsrp[live]
+        self.rsrp, self.begin, self.end = rsrp, 0, kept
+
+
+class SensingHistory:
+    """The sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2).
+
+    rssi       (WINDOW, S, N) S-RSSI by subframe mod WINDOW [mW]; 0 where a station transmits itself
+    monitored  (WINDOW, N) whether a station received in the subframe
+    """
+
+    def __init__(self, stations: int, subchannels: int, span: int) -> None:
+        self.rssi = np.zeros((WINDOW, subchannels, stations), dtype=np.float32)
+        self.monitored = np.zeros((WINDOW, stations), dtype=np.bool_)
+        self.reservations = Reservations(stations, span)
+        self._until: int | None = None
+
+    def proceed(self, until: int) -> None:
+        """Open the subframes up to `until`, exclusive, in which nothing has been received so far."""
+        if self._until is None:
+            self._until = until
+        gap = min(until - self._until, WINDOW)
+        if gap > 0:
+            start = (until - gap) % WINDOW
+            for rows in (slice(start, start + gap), slice(0, max(0, start + gap - WINDOW))):
+                self.rssi[rows] = 0.0
+                self.monitored[rows] = True
+            self._until = until
+
+    def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Rows:
+        """Add what is transmitted in subframes that are open; returns those subframes.
+
+        per_subchannel  (T, N) received power of each PDU in each of its subchannels [mW]
+        """
+        subframes = np.array([pdu.subframe for pdu in pdus], dtype=np.int64)
+        own = np.array([pdu.row for pdu in pdus], dtype=np.int64)
+        for pdu, power in zip(pdus, per_subchannel, strict=True):
+            first = pdu.transmission.first_band
+            self.rssi[pdu.subframe % WINDOW, first : first + pdu.transmission.bands] += power.astype(np.float32)
+        self.rssi[subframes % WINDOW, :, own] = 0.0
+        self.monitored[subframes % WINDOW, own] = False
+        return np.array(sorted({pdu.subframe for pdu in pdus}), dtype=np.int64)
+
+    def busy(self, subframes: Rows, threshold: float) -> tuple[Array, Rows]:
+        """Over these subframes: (N,) the sum of the shares of the subchannels whose S-RSSI exceeds the threshold [mW],
+        and (N,) in how many subframes a station transmitted itself and could not measure."""
+        rows = subframes % WINDOW
+        monitored = self.monitored[rows]
+        counts = ((self.rssi[rows] > threshold) & monitored[:, None]).sum(axis=(0, 1))
+        return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
+
+    def reserve(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
+        """Note the decoded control information of PDUs that announce another use."""
+        subframes = np.array([pdu.subframe for pdu in pdus], dtype=np.int64)
+        bands, widths = (
+            np.array([getattr(pdu.transmission, name) for pdu in pdus], dtype=np.int64)
+            for name in ("first_band", "bands")
+        )
+        heard = (codes == DELIVERED) & self.monitored[subframes % WINDOW]
+        self.reservations.add(subframes, bands, widths, np.where(heard, rsrp, NOT_DECODED))
+
+    def of(self, row: int, now: int, own: Rows) -> Sensed:
+        """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
+        self.proceed(now)
+        return Sensed(self.rssi[:, :, row], self.monitored[:, row], own, *self.reservations.of(row, now))
+
+    def rearrange(self, rows: Sequence[int | None]) -> None:
+        """Keep the columns of these former rows; None: a station that has sensed nothing yet."""
+        self.rssi = _columns(self.rssi, rows, 0.0)
+        self.monitored = _columns(self.monitored, rows, False)
+        self.reservations.rearrange(rows)
+
+
+def _columns(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
+    """An array by station in its last axis, for other stations."""
+    columns = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
+    known = [(place, old) for place, old in enumerate(rows) if old is not None]
+    columns[..., [place for place, _ in known]] = values[..., [old for _, old in known]]
+    return columns

@@ -1,0 +1,1 @@
+"""Statistics of links: delivery, delay, age of information."""

@@ -1,0 +1,1 @@
+"""Rigid bodies, contacts, ray tests and vehicle dynamics in pybullet."""

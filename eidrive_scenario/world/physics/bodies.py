@@ -1,0 +1,225 @@
+"""The bodies of the actors in pybullet: one rigid box each; and those of scripted actors, which are placed."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.world.actor import ActorSpec, Placement, Vector3
+from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.world.view import ActorState
+
+RAYS, SCRIPTED, DRIVEN, STATIC, TERRAIN = 1, 2, 4, 8, 16
+"""Groups of pybullet's collision filter; a ray belongs to the first by pybullet's default."""
+
+UNMOVED = 1e9
+"""Mass of what no collision moves [kg], and moment of inertia about the axes that no collision turns [kg m²]."""
+RESTITUTION = 0.3
+"""Of one body; two rebound with its square, about 0.1, as cars do above some 5 m/s."""
+BODY_FRICTION = 0.7
+STILL: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Body(ABC):
+    """One actor: its state, plain numbers as they stand in the view's rows, and its rigid body in pybullet."""
+
+    def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
+        self.client = client
+        self.spec = spec
+        self.name = spec.name
+        self.radius = math.hypot(spec.size[0], spec.size[1]) / 2
+        self.handle = -1
+        self.moved = True
+        """Whether the last step changed its pose."""
+        self.stale = False
+        """Whether the rigid body is not yet where the actor is: pybullet hears of it when somebody asks pybullet."""
+        self.yaw_rate = 0.0
+        self.acceleration: Vector3 = (0.0, 0.0, 0.0)
+        self._dt = dt
+        self._stand(placement)
+        self.velocity = self._along_heading(placement.speed)
+        self.velocity_before = self.velocity
+        """At the beginning of the last step [m/s]."""
+
+    @property
+    def box(self) -> tuple[float, ...]:
+        """(7,) x y z l w h yaw of the bounding box."""
+        return (self.centre_x, self.centre_y, self.centre_z, *self.spec.size, self.yaw)
+
+    @property
+    def state(self) -> ActorState:
+        """How it stands and moves."""
+        return ActorState(self.x, self.y, self.z, self.yaw, self.pitch, self.roll, *self.velocity, *self.acceleration,
+                          self.yaw_rate, self.speed)  # fmt: skip
+
+    @property
+    @abstractmethod
+    def travel(self) -> float:
+        """How far any part of it goes within a tick, if nothing hits it and it keeps its velocity [m]."""
+
+    @abstractmethod
+    def settle(self) -> None:
+        """Put the rigid body where the actor is."""
+
+    def remove(self) -> None:
+        """Take the body out of pybullet."""
+        bullet.removeBody(self.handle, physicsClientId=self.client)
+
+    def _stand(self, placement: Placement) -> None:
+        self._pose(placement.x, placement.y, placement.z, placement.yaw, placement.pitch, placement.roll)
+        self.speed = placement.speed
+
+    def _pose(self, x: float, y: float, z: float, yaw: float, pitch: float, roll: float) -> None:
+        self.x, self.y, self.z, self.yaw, self.pitch, self.roll = x, y, z, yaw, pitch, roll
+        ox, oy, oz = self.spec.offset
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        self.centre_x, self.centre_y, self.centre_z = x + cos * ox - sin * oy, y + sin * ox + cos * oy, z + oz
+
+    def _along_heading(self, speed: float) -> Vector3:
+        if self.pitch == 0.0:
+            return speed * math.cos(self.yaw), speed * math.sin(self.yaw), 0.0
+        level = speed * math.cos(self.pitch)
+        return level * math.cos(self.yaw), level * math.sin(self.yaw), -speed * math.sin(self.pitch)
+
+    def _accelerate_to(self, velocity: Vector3) -> None:
+        old, dt = self.velocity, self._dt
+        self.velocity_before, self.velocity = old, velocity
+        self.acceleration = (
+            (velocity[0] - old[0]) / dt,
+            (velocity[1] - old[1]) / dt,
+            (velocity[2] - old[2]) / dt,
+        )
+
+    def _create(self, centre: Vector3, at: Vector3, mass: float, inertia: float, group: int, meets: int) -> None:
+        """Make the rigid body, whose box has its centre there in the frame of the centre of gravity.
+
+        What must not be moved is added as a static body and gets its huge mass only then: pybullet does not integrate
+        it, yet collisions see the velocity that it is given, which that of a static body they do not.
+        """
+        length, width, height = self.spec.size
+        here = {"physicsClientId": self.client}
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_BOX,
+            halfExtents=(length / 2, width / 2, height / 2),
+            collisionFramePosition=centre,
+            **here,
+        )
+        self.handle = bullet.createMultiBody(
+            0.0 if mass == UNMOVED else mass,
+            shape,
+            basePosition=at,
+            baseOrientation=quaternion(self.yaw, self.pitch, self.roll),
+            useMaximalCoordinates=1,
+            **here,
+        )
+        bullet.changeDynamics(
+            self.handle,
+            -1,
+            mass=mass,
+            localInertiaDiagonal=(UNMOVED, UNMOVED, inertia),
+            linearDamping=0.0,
+            angularDamping=0.0,
+            lateralFriction=BODY_FRICTION,
+            restitution=RESTITUTION,
+            **here,
+        )
+        bullet.setCollisionFilterGroupMask(self.handle, -1, group, meets | RAYS, **here)
+
+
+class ScriptedBody(Body):
+    """An actor that stands exactly where it is placed; nothing pushes it."""
+
+    def __init__(self, client: int, spec: ActorSpec, placement: Placement, dt: float) -> None:
+        super().__init__(client, spec, placement, dt)
+        self._create(spec.offset, (self.x, self.y, self.z), UNMOVED, UNMOVED, SCRIPTED, DRIVEN)
+        self._from: tuple[float, ...] = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+        self._resting = False
+        """Whether it did not move in the last step, and came to its stand before that."""
+        self._resting_state: ActorState | None = None
+
+    @property
+    def state(self) -> ActorState:
+        if not self._resting:
+            return super().state
+        if self._resting_state is None:
+            self._resting_state = super().state
+        return self._resting_state
+
+    @property
+    def travel(self) -> float:
+        """How far any part of it has been moved in the step that it was placed for [m]."""
+        if not self.moved:
+            return 0.0
+        x, y, z, yaw, pitch, _ = self._from
+        turn = abs(wrap_angle(self.yaw - yaw)) + abs(self.pitch - pitch)
+        return math.dist((x, y, z), (self.x, self.y, self.z)) + turn * 2.0 * self.radius
+
+    def rest(self) -> None:
+        """Stay for this step: no placement was given."""
+        self.place(Placement(self.x, self.y, self.z, self.yaw, self.pitch, self.roll))
+
+    def place(self, placement: Placement) -> None:
+        """Be there at the end of the step, with a velocity out of the given speed and the distance covered.
+
+        Along the heading the velocity is the given speed; across, it follows from the distance where there is any.
+        """
+        p = placement
+        if self._resting and p.speed == 0.0 and self._from == (p.x, p.y, p.z, p.yaw, p.pitch, p.roll):
+            return
+        x, y, z, yaw = self.x, self.y, self.z, self.yaw
+        self._from = (x, y, z, yaw, self.pitch, self.roll)
+        was_moving = self.yaw_rate != 0.0 or self.velocity != STILL
+        self._stand(placement)
+        self.moved = self._from != (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+        along = self._along_heading(placement.speed)
+        if placement.teleport:
+            self._from = (self.x, self.y, self.z, self.yaw, self.pitch, self.roll)
+            self.velocity = self.velocity_before = along
+            self.acceleration, self.yaw_rate = STILL, 0.0
+        else:
+            dt = self._dt
+            if placement.across:
+                vx, vy, vz = (self.x - x) / dt, (self.y - y) / dt, (self.z - z) / dt
+                fx, fy, fz = self._along_heading(1.0)
+                excess = placement.speed - (vx * fx + vy * fy + vz * fz)
+                along = vx + excess * fx, vy + excess * fy, vz + excess * fz
+            self._accelerate_to(along)
+            self.yaw_rate = wrap_angle(self.yaw - yaw) / dt if self.yaw != yaw else 0.0
+        is_moving = self.moved or self.velocity != STILL
+        self.stale = self.stale or was_moving or is_moving
+        self._resting, self._resting_state = not is_moving and self.acceleration == STILL, None
+
+    def settle(self) -> None:
+        """Put the rigid body where the actor is."""
+        self.stale = False
+        turn = quaternion(self.yaw, self.pitch, self.roll)
+        bullet.resetBasePositionAndOrientation(self.handle, (self.x, self.y, self.z), turn, self.client)
+        bullet.resetBaseVelocity(self.handle, self.velocity, (0.0, 0.0, self.yaw_rate), self.client)
+
+    def pass_through(self, share: float) -> None:
+        """Put the rigid body on the way between its last and its next place, for a collision in between."""
+        x, y, z, yaw, pitch, roll = self._from
+        turn = quaternion(
+            yaw + share * wrap_angle(self.yaw - yaw),
+            pitch + share * (self.pitch - pitch),
+            roll + share * (self.roll - roll),
+        )
+        at = (x + share * (self.x - x), y + share * (self.y - y), z + share * (self.z - z))
+        bullet.resetBasePositionAndOrientation(self.handle, at, turn, self.client)
+        moving = ((self.x - x) / self._dt, (self.y - y) / self._dt, (self.z - z) / self._dt)
+        bullet.resetBaseVelocity(self.handle, moving, (0.0, 0.0, self.yaw_rate), self.client)
+
+
+def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
+    """x y z w of the rotation yaw, pitch, roll (z-y'-x'')."""
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    if pitch == 0.0 and roll == 0.0:
+        return 0.0, 0.0, sy, cy
+    cp, sp, cr, sr = math.cos(pitch / 2), math.sin(pitch / 2), math.cos(roll / 2), math.sin(roll / 2)
+    return (
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+        cy * cp * cr + sy * sp * sr,
+    )

@@ -1,0 +1,117 @@
+"""Which boxes began to touch, and how hard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from eidrive_scenario.geometry import box_corners, box_distance, overlap, points_in_box
+from eidrive_scenario.world.actor import Vector3
+from eidrive_scenario.world.physics.bodies import Body
+from eidrive_scenario.world.view import Contact
+
+PARTED = 0.05
+"""Two boxes that touched must be this far apart before they can touch anew [m], lest a scrape counts as many."""
+
+_FEW = 16
+"""Up to this many bodies, plain loops are faster than arrays."""
+
+
+class Touch(NamedTuple):
+    """What pybullet said about a contact within the step."""
+
+    position: Vector3
+    impact_speed: float
+
+
+class ContactTracker:
+    """Finds the contacts that begin: overlaps of boxes at the ends of steps, and what pybullet resolved within one."""
+
+    def __init__(self) -> None:
+        self._touching: dict[tuple[str, str], None] = {}
+
+    def forget(self, name: str) -> None:
+        """This actor has left the world."""
+        self._touching = {pair: None for pair in self._touching if name not in pair}
+
+    def update(self, bodies: Sequence[Body], touches: dict[tuple[str, str], Touch]) -> tuple[Contact, ...]:
+        """The contacts that began since the last call; `touches` are pybullet's by the names of the pair."""
+        if not self._touching and not touches and not any(body.moved for body in bodies):
+            return ()
+        begun: list[Contact] = []
+        near = {(first.name, second.name): (first, second) for first, second in _near_pairs(bodies)}
+        moved = {body.name for body in bodies if body.moved} if self._touching else set()
+        for pair in [pair for pair in self._touching if pair not in touches]:
+            if pair in near:
+                first, second = near[pair]
+                if box_distance(first.box, second.box) <= PARTED:
+                    continue
+            elif moved.isdisjoint(pair):
+                continue
+            del self._touching[pair]
+        for pair, (first, second) in near.items():
+            if pair in self._touching or pair in touches or not overlap(first.box, second.box):
+                continue
+            self._touching[pair] = None
+            begun.append(
+                Contact(
+                    *pair, _shared_point(first, second), relative_speed(first.velocity_before, second.velocity_before)
+                )
+            )
+        for pair, touch in touches.items():
+            if pair not in self._touching:
+                self._touching[pair] = None
+                begun.append(Contact(*pair, touch.position, touch.impact_speed))
+        return tuple(begun)
+
+
+def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
+    """Pairs of which one has moved and whose circles, with the hysteresis, overlap; in the order of the bodies."""
+    if len(bodies) > _FEW:
+        yield from _near_pairs_of_many(bodies)
+        return
+    for index, first in enumerate(bodies):
+        x, y, radius, moved = first.centre_x, first.centre_y, first.radius + PARTED, first.moved
+        for other in range(index + 1, len(bodies)):
+            second = bodies[other]
+            if moved or second.moved:
+                dx, dy, reach = second.centre_x - x, second.centre_y - y, radius + second.radius
+                if dx * dx + dy * dy <= reach * reach:
+                    yield first, second
+
+
+def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
+    """The same by sweeping along x: only neighbours in the order of x can be near."""
+    x, y, radius, moved = np.array([(b.centre_x, b.centre_y, b.radius, b.moved) for b in bodies]).T
+    order = np.argsort(x, kind="stable")
+    sorted_x = x[order]
+    last = np.searchsorted(sorted_x, sorted_x + radius[order] + radius.max() + PARTED, side="right")
+    counts = last - np.arange(len(bodies)) - 1
+    left = np.repeat(np.arange(len(bodies)), counts)
+    within = np.arange(len(left)) - np.repeat(np.cumsum(counts) - counts, counts)
+    first, second = order[left], order[left + within + 1]
+    near = np.hypot(x[first] - x[second], y[first] - y[second]) <= radius[first] + radius[second] + PARTED
+    near &= (moved[first] + moved[second]) > 0
+    pairs = np.sort(np.stack([first[near], second[near]], axis=1), axis=1)
+    for row, other in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
+        yield bodies[row], bodies[other]
+
+
+def _shared_point(first: Body, second: Body) -> Vector3:
+    """The middle of the corners of each box inside the other; of the centres, where boxes cross without such."""
+    boxes = np.array([first.box, second.box])
+    corners = box_corners(boxes)
+    inside = [corners[0][points_in_box(corners[0], boxes[1])], corners[1][points_in_box(corners[1], boxes[0])]]
+    points = np.concatenate(inside)
+    bottom = max(boxes[0, 2] - boxes[0, 5] / 2, boxes[1, 2] - boxes[1, 5] / 2)
+    top = min(boxes[0, 2] + boxes[0, 5] / 2, boxes[1, 2] + boxes[1, 5] / 2)
+    middle = points.mean(axis=0) if len(points) else boxes[:, :3].mean(axis=0)
+    return float(middle[0]), float(middle[1]), float((bottom + top) / 2)
+
+
+def relative_speed(first: Vector3, second: Vector3) -> float:
+    """Magnitude of the difference of two velocities [m/s]."""
+    return math.dist(first, second)

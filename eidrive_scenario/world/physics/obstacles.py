@@ -1,0 +1,165 @@
+"""The furniture of the roads as bodies in pybullet: what vehicles run into, and what hides one from another.
+
+All of it goes into a few meshes of triangles: pybullet's steps take longer with each body, and a road may have ten
+thousand posts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN
+from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.world.physics.spatial_grid import SQUARE, SpatialGrid
+from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
+from eidrive_scenario.world.road_objects import RoadObjectBody
+
+Array = NDArray[np.float64]
+
+MOST_FACES = 20_000
+"""In one collision shape; pybullet refuses much more."""
+FOLIAGE = 0.8
+"""Share of a crown's or a bush's extents that lets nobody see through."""
+CROWN = 0.3
+"""Where a tree's crown begins, as a share of its height."""
+_SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
+_FACES = np.array(
+    [(0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4), (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6),
+     (3, 0, 4), (3, 4, 7)]
+)  # fmt: skip
+"""Of a box: four corners of the bottom, then four of the top."""
+
+
+class Obstacles:
+    """Everything that stands at the roads and has a body."""
+
+    def __init__(self, furniture: Sequence[RoadObjectBody]) -> None:
+        solid = [piece for piece in furniture if piece.solid]
+        self._solid = _merged_rails(solid)
+        self._soft = [piece for piece in furniture if piece.kind in ("tree", "vegetation")]
+        self._where = np.array([(piece.pose.x, piece.pose.y) for piece in self._solid]).reshape(-1, 2)
+        self._nearby: SpatialGrid[RoadObjectBody] = SpatialGrid()
+        for piece in self._solid:
+            self._nearby.add(piece, _cells(piece))
+
+    def raise_bodies(self, client: int) -> list[int]:
+        """Put the bodies into pybullet; returns their handles."""
+        solid = [box for piece in self._solid for box in _solid_boxes(piece)]
+        soft = [_foliage(piece) for piece in self._soft]
+        return [*_meshes(client, solid, STATIC, RAYS | DRIVEN), *_meshes(client, soft, TERRAIN, RAYS)]
+
+    def clearance(self, x: float, y: float, most: float) -> float:
+        """How far from a point nothing solid stands, at most `most` [m]."""
+        return min([_gap(piece, x, y) for piece in self._nearby.query(x, y, most)], default=most)
+
+    def name_at(self, x: float, y: float) -> str:
+        """What stands at a point at which something was touched."""
+        gaps = [
+            (_gap(self._solid[row], x, y), row)
+            for row in np.flatnonzero(np.abs(self._where - (x, y)).max(axis=1) < 60.0).tolist()
+        ]
+        return self._solid[min(gaps)[1]].name if gaps else "obstacle"
+
+
+def _merged_rails(solid: Sequence[RoadObjectBody]) -> list[RoadObjectBody]:
+    """Parts of a rail or barrier that continue each other in a straight line as one piece."""
+    whole: list[RoadObjectBody] = []
+    for piece in solid:
+        before = whole[-1] if whole else None
+        if (
+            before is not None
+            and not piece.radius
+            and piece[:2] == before[:2]
+            and (piece.width, piece.height, piece.pose.z) == (before.width, before.height, before.pose.z)
+            and abs(piece.pose.h - before.pose.h) < 1e-3
+            and _follows(before, piece)
+        ):
+            length = before.length + piece.length
+            share = before.length / length
+            x, y = (share * a + (1 - share) * b for a, b in zip(before.pose[:2], piece.pose[:2], strict=True))
+            whole[-1] = before._replace(pose=before.pose._replace(x=x, y=y), length=length)
+        else:
+            whole.append(piece)
+    return whole
+
+
+def _follows(before: RoadObjectBody, piece: RoadObjectBody) -> bool:
+    """Whether a piece begins where the one before ends."""
+    step = (before.length + piece.length) / 2
+    cos, sin = math.cos(before.pose.h), math.sin(before.pose.h)
+    dx, dy = piece.pose.x - before.pose.x - step * cos, piece.pose.y - before.pose.y - step * sin
+    return math.hypot(dx, dy) < 0.05 and before.length < 200.0
+
+
+Box = tuple[float, float, float, float, float, float, float]
+"""Middle of the bottom x, y, z, length, width, height [m], heading [rad]."""
+
+
+def _solid_boxes(piece: RoadObjectBody) -> Iterator[Box]:
+    x, y, z, h = piece.pose[:4]
+    if piece.kind == "gantry":
+        cos, sin = math.cos(h), math.sin(h)
+        for side in (-piece.width / 2, piece.width / 2):
+            yield x - sin * side, y + cos * side, z, 0.3, 0.3, piece.height, h
+        yield x, y, z + piece.height - 0.6, 0.3, piece.width, 0.6, h
+    elif piece.radius:
+        # A square as large as the circle.
+        side = math.sqrt(math.pi) * piece.radius
+        yield x, y, z, side, side, piece.height, h
+    else:
+        yield x, y, z, piece.length, piece.width, piece.height, h
+
+
+def _foliage(piece: RoadObjectBody) -> Box:
+    x, y, z, h = piece.pose[:4]
+    low = CROWN * piece.height if piece.kind == "tree" else 0.0
+    return x, y, z + low, FOLIAGE * piece.length, FOLIAGE * piece.width, piece.height - low, h
+
+
+def _meshes(client: int, boxes: Sequence[Box], group: int, meets: int) -> Iterator[int]:
+    here = {"physicsClientId": client}
+    for start in range(0, len(boxes), MOST_FACES // len(_FACES)):
+        table = np.array(boxes[start : start + MOST_FACES // len(_FACES)])
+        vertices = _corners(table)
+        faces = (_FACES[None] + 8 * np.arange(len(table))[:, None, None]).reshape(-1, 3)
+        shape = create_triangle_shape(client, vertices.reshape(-1, 3), faces)
+        handle = bullet.createMultiBody(0.0, shape, useMaximalCoordinates=1, **here)
+        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
+        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
+        yield handle
+
+
+def _corners(boxes: Array) -> Array:
+    """(N, 8, 3) of boxes (N, 7)."""
+    along, aside = boxes[:, 3:4] / 2 * _SIGNS[:, 0], boxes[:, 4:5] / 2 * _SIGNS[:, 1]
+    cos, sin = np.cos(boxes[:, 6:7]), np.sin(boxes[:, 6:7])
+    x, y = boxes[:, 0:1] + cos * along - sin * aside, boxes[:, 1:2] + sin * along + cos * aside
+    low = np.stack([x, y, np.broadcast_to(boxes[:, 2:3], x.shape)], axis=2)
+    return np.concatenate([low, low + boxes[:, None, 5:6] * (0.0, 0.0, 1.0)], axis=1)
+
+
+def _cells(piece: RoadObjectBody) -> Iterator[tuple[int, int]]:
+    """The squares that a piece may touch."""
+    steps = max(math.ceil(max(piece.length, piece.width) / SQUARE), 1)
+    cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
+    dx, dy = (cos, sin) if piece.length >= piece.width else (-sin, cos)
+    extent, side = max(piece.length, piece.width), min(piece.length, piece.width) / 2
+    for step in range(steps + 1):
+        at = (step / steps - 0.5) * extent
+        x, y = piece.pose.x + at * dx, piece.pose.y + at * dy
+        for ox, oy in ((-side, -side), (side, -side), (side, side), (-side, side)):
+            yield math.floor((x + ox) / SQUARE), math.floor((y + oy) / SQUARE)
+
+
+def _gap(piece: RoadObjectBody, x: float, y: float) -> float:
+    """How far a point lies outside of a piece [m]."""
+    dx, dy = x - piece.pose.x, y - piece.pose.y
+    if piece.radius:
+        return max(math.hypot(dx, dy) - piece.radius, 0.0)
+    cos, sin = math.cos(piece.pose.h), math.sin(piece.pose.h)
+    along, aside = abs(cos * dx + sin * dy), abs(cos * dy - sin * dx)
+    return math.hypot(max(along - piece.length / 2, 0.0), max(aside - piece.width / 2, 0.0))

@@ -1,0 +1,158 @@
+"""What does not move: the ground, the roads on it, buildings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from eidrive_scenario.roads import PlacedObject, RoadNetwork, outlines, placed_objects, surface_meshes
+from eidrive_scenario.world.actor import Vector3
+from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN, quaternion
+from eidrive_scenario.world.physics.bullet import bullet
+from eidrive_scenario.world.physics.ground import is_level
+from eidrive_scenario.world.physics.obstacles import MOST_FACES, Obstacles
+from eidrive_scenario.world.physics.spatial_grid import SpatialGrid, grid_cells
+from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
+from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies
+
+GROUND = "ground"
+STOREY = 3.2
+"""Height of a building whose height the map does not say [m]."""
+
+
+@dataclass(frozen=True)
+class Building:
+    """A box that stands on the ground: centre [m], length, width, height [m], heading [rad]."""
+
+    name: str
+    centre: Vector3
+    size: Vector3
+    yaw: float
+    colour: Vector3 | None = None
+
+
+class Scenery:
+    """The bodies in pybullet of ground, buildings and what else stands at the roads.
+
+    entities  ids of objects that come as actors instead
+
+    What stands at the roads gets its bodies when somebody may run into it, or looks at it by rays.
+    """
+
+    def __init__(self, client: int, roads: RoadNetwork | None, entities: Collection[str] = ()) -> None:
+        self.roads = roads
+        self.buildings: list[Building] = []
+        self._nearby: SpatialGrid[tuple[float, float, float]] = SpatialGrid()
+        """Middle and radius of each building, seen from above [m]."""
+        self._client = client
+        self._entities = frozenset(entities)
+        self._names: dict[int, str] = {}
+        self.level = is_level(roads)
+        self._raised = False
+        self._obstacles: Obstacles | None = None
+        self._obstacle_handles: frozenset[int] = frozenset()
+        if roads is not None:
+            for placed in placed_objects(roads):
+                if placed.object.type == "building" and placed.object.id not in entities:
+                    building = _building(roads, placed)
+                    self.add_building(building.name, building.centre, building.size, building.yaw)
+
+    def add_building(
+        self, name: str, centre: Vector3, size: Vector3, yaw: float, colour: Vector3 | None = None
+    ) -> None:
+        """Put up a building that stops vehicles and rays."""
+        self.buildings.append(Building(name, centre, size, yaw, colour))
+        radius = math.hypot(size[0], size[1]) / 2
+        self._nearby.add((centre[0], centre[1], radius), grid_cells(centre[0], centre[1], radius))
+        half = (size[0] / 2, size[1] / 2, size[2] / 2)
+        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
+        self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
+
+    def raise_ground(self) -> bool:
+        """Make the ground that rays meet, where there is none yet; True if it was made now.
+
+        Vehicles do not need it, and on hilly roads it takes time, so it waits for the first ray.
+        """
+        if self._raised:
+            return False
+        self._raised = True
+        here = {"physicsClientId": self._client}
+        if self.level or self.roads is None:
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, **here)
+            # Without a shape to show, pybullet loads a textured plane from a file, which takes 7 ms.
+            shown = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=(0.01, 0.01, 0.01), **here)
+            self._add_static(plane, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND, shown)
+            return True
+        for mesh in surface_meshes(self.roads, 4.0):
+            if mesh.kind.startswith("marking"):
+                continue
+            for start in range(0, len(mesh.faces), MOST_FACES):
+                used, faces = np.unique(mesh.faces[start : start + MOST_FACES], return_inverse=True)
+                shape = create_triangle_shape(self._client, mesh.vertices[used], faces)
+                self._add_static(shape, (0.0, 0.0, 0.0), 0.0, TERRAIN, RAYS, GROUND)
+        return True
+
+    @cached_property
+    def furniture(self) -> tuple[RoadObjectBody, ...]:
+        """What stands at the roads, buildings aside."""
+        return tuple(road_object_bodies(self.roads, self._entities)) if self.roads is not None else ()
+
+    def raise_obstacles(self) -> bool:
+        """Give what stands at the roads its bodies, where it has none yet; True if they were made now."""
+        if self._obstacles is not None:
+            return False
+        self._obstacles = Obstacles(self.furniture)
+        handles = self._obstacles.raise_bodies(self._client)
+        self._obstacle_handles = frozenset(handles)
+        return bool(handles)
+
+    def name_of(self, handle: int, position: Vector3) -> str:
+        """The name of what has this body in pybullet, touched at a point."""
+        if handle in self._obstacle_handles and self._obstacles is not None:
+            return self._obstacles.name_at(position[0], position[1])
+        return self._names[handle]
+
+    @property
+    def highest_handle(self) -> int:
+        """The greatest number that pybullet gave to any of these bodies; -1 without any."""
+        return max([*self._names, *self._obstacle_handles], default=-1)
+
+    def clearance(self, x: float, y: float, most: float) -> float:
+        """How far from a point nothing stands, at most `most` [m]."""
+        free = most if self._obstacles is None else self._obstacles.clearance(x, y, most)
+        for bx, by, radius in self._nearby.query(x, y, most):
+            free = min(free, math.hypot(bx - x, by - y) - radius)
+        return free
+
+    def _add_static(
+        self, shape: int, at: Vector3, yaw: float, group: int, meets: int, name: str, shown: int = -1
+    ) -> None:
+        here = {"physicsClientId": self._client}
+        turn = quaternion(yaw, 0.0, 0.0)
+        handle = bullet.createMultiBody(
+            0.0, shape, shown, basePosition=at, baseOrientation=turn, useMaximalCoordinates=1, **here
+        )
+        bullet.changeDynamics(handle, -1, lateralFriction=BODY_FRICTION, restitution=RESTITUTION, **here)
+        bullet.setCollisionFilterGroupMask(handle, -1, group, meets, **here)
+        self._names[handle] = name
+
+
+def _building(roads: RoadNetwork, placed: PlacedObject) -> Building:
+    """The box around an object of the road network."""
+    entry, pose = placed.object, placed.pose
+    cos, sin = math.cos(pose.h), math.sin(pose.h)
+    length, width, height = placed.length or 1.0, placed.width or 1.0, placed.height or STOREY
+    x, y = pose.x, pose.y
+    if entry.outlines and not entry.repeats:
+        offset = np.concatenate(outlines(roads, entry))[:, :2] - (x, y)
+        corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        length, width = (high - low).tolist()
+        mx, my = ((low + high) / 2).tolist()
+        x, y = x + cos * mx - sin * my, y + sin * mx + cos * my
+        height = max([height, *(corner.height for outline in entry.outlines for corner in outline)])
+    return Building(entry.name or f"building {entry.id}", (x, y, pose.z + height / 2), (length, width, height), pose.h)

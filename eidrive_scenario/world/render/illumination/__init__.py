@@ -1,0 +1,1 @@
+"""Light sources, shadows and the sky."""

@@ -1,0 +1,1 @@
+"""Visible content of the world: bodies, roadside objects and lamps as meshes."""
