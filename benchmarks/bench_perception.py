@@ -161,7 +161,7 @@ def print_findings(every: int, seed: int) -> None:
     for kind, errors in sorted(found.errors.items()):
         hits = [error for error in errors if math.isfinite(error)]
         share, middle = 100 * len(hits) / len(errors), median(hits)
-        print(f"{kind:13} found {share:5.1f} % of {len(errors):4}   median error of the centre {middle:.2f} m")
+        print(f"{kind:13} found {share:5.1f} % of {len(errors):4}   median error of the center {middle:.2f} m")
     print(f"false detections per sweep {found.false / found.frames:.2f}")
     print("random scenes, by which nothing was chosen")
     look_at_random(150, RANDOM_SEED)

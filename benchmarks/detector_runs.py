@@ -32,7 +32,7 @@ CASES = (
     ("yolov5", AS_EI_DRIVE),
 )
 PARTS: dict[str, tuple[tuple[type, str], ...]] = {
-    "pictures": ((Camera, "read"),),
+    "images": ((Camera, "read"),),
     "network": ((ImageNetwork, "find"),),
     "detector": ((LearnedDetector, "detect"), (LidarDetector, "detect")),
     "LiDAR": ((Lidar, "read"),),

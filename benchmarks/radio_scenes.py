@@ -35,7 +35,7 @@ _CAR = """
   </Properties></Controller></ObjectController>
 </ScenarioObject>"""
 _START = """
-<Private entityRef="{name}">
+<Private entitiref="{name}">
   <PrivateAction><TeleportAction><Position>
     <LanePosition roadId="1" laneId="{lane}" s="{s:g}"/>
   </Position></TeleportAction></PrivateAction>
@@ -52,7 +52,7 @@ def write_scenario(folder: Path, stations: int, *, rate: float | None, all_liste
     """The scenario in this folder, its road beside it.
 
     The cars drive as scripted, without physics, so that what is measured are stations and radio. They have an oracle
-    that sees one metre far, as a CAM is of its sender alone.
+    that sees one meter far, as a CAM is of its sender alone.
 
     rate        of the messages [Hz]; None: by the rules of ETSI for CAM
     all_listen  whether every station hears all others, or the first one alone

@@ -24,7 +24,7 @@ CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "
 class Detections:
     """Perceived objects at one instant.
 
-    boxes       (N, 7) x y z l w h yaw of the box centre in the world frame [m, rad]
+    boxes       (N, 7) x y z l w h yaw of the box center in the world frame [m, rad]
     scores      (N,) confidence in [0, 1]
     classes     (N,) names out of CLASSES
     velocity    (N, 2) world frame [m/s], NaN where unknown

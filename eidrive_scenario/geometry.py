@@ -1,6 +1,6 @@
 """Plane and solid geometry of oriented boxes: corners, overlap, distance, intersection over union.
 
-A box is seven numbers `x y z l w h yaw`: centre, length, width, height [m] and heading [rad]; it stands upright.
+A box is seven numbers `x y z l w h yaw`: center, length, width, height [m] and heading [rad]; it stands upright.
 All of it is exact up to rounding. The functions for two single boxes work on plain floats, as a handful of actors does
 not pay for numpy; those for arrays broadcast.
 """
@@ -186,7 +186,7 @@ def _footprints_distance(a: Array, b: Array) -> Array:
 
 
 def _in_frame(points: Array, box: Array) -> Array:
-    """Points (..., K, 2) in the frame of boxes (..., 7): x along, y to the left, from the centre."""
+    """Points (..., K, 2) in the frame of boxes (..., 7): x along, y to the left, from the center."""
     offset = points - box[..., None, 0:2]
     cos, sin = np.cos(box[..., 6:7]), np.sin(box[..., 6:7])
     along = cos * offset[..., 0] + sin * offset[..., 1]

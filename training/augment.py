@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import affine_grid, avg_pool2d, grid_sample
 
-from eidrive_scenario.perception.learned.networks.boxes import centred
+from eidrive_scenario.perception.learned.networks.boxes import centered
 from eidrive_scenario.perception.learned.networks.targets import IGNORED, PADDING, Targets
 
 SMALLEST_SIDE = 3.0
@@ -41,7 +41,7 @@ def moved(pictures: Tensor, boxes: Tensor, classes: Tensor, draws: torch.Generat
     transform[:, 0, 0], transform[:, 0, 2] = mirror / zoom_x, shift_x
     transform[:, 1, 1], transform[:, 1, 2] = 1.0 / zoom_y, shift_y
     grid = affine_grid(transform, [batch, 3, height, width], align_corners=False)
-    # Grey where the picture does not reach.
+    # Gray where the picture does not reach.
     shown = grid_sample(pictures - 0.45, grid, mode="bilinear", padding_mode="zeros", align_corners=False) + 0.45
     size = torch.tensor([width, height] * 2, device=device, dtype=boxes.dtype)
     unit = boxes / size * 2.0 - 1.0
@@ -59,15 +59,15 @@ def moved(pictures: Tensor, boxes: Tensor, classes: Tensor, draws: torch.Generat
     present = classes != PADDING
     new = torch.where(present & poor & (classes >= 0), torch.full_like(classes, IGNORED), classes)
     new = torch.where(present & gone, torch.full_like(classes, PADDING), new)
-    return shown, Targets(centred(cut), new)
+    return shown, Targets(centered(cut), new)
 
 
 def _area(boxes: Tensor) -> Tensor:
     return (boxes[..., 2] - boxes[..., 0]) * (boxes[..., 3] - boxes[..., 1])
 
 
-def recoloured(pictures: Tensor, draws: torch.Generator) -> Tensor:
-    """Pictures (B, 3, H, W) with other brightness, contrast, colours, haze, blur and noise, in [0, 1]."""
+def recolored(pictures: Tensor, draws: torch.Generator) -> Tensor:
+    """Pictures (B, 3, H, W) with other brightness, contrast, colors, haze, blur and noise, in [0, 1]."""
     batch = len(pictures)
     device = pictures.device
 
@@ -83,8 +83,8 @@ def recoloured(pictures: Tensor, draws: torch.Generator) -> Tensor:
     out = out * torch.where(chosen(0.6), uniform(0.6, 1.4), 1.0)
     mean = out.mean(dim=(1, 2, 3), keepdim=True)
     out = mean + (out - mean) * torch.where(chosen(0.5), uniform(0.6, 1.3), 1.0)
-    grey = out.mean(dim=1, keepdim=True)
-    out = grey + (out - grey) * torch.where(chosen(0.5), uniform(0.3, 1.6), 1.0)
+    gray = out.mean(dim=1, keepdim=True)
+    out = gray + (out - gray) * torch.where(chosen(0.5), uniform(0.3, 1.6), 1.0)
     out = out * torch.where(chosen(0.4), uniform(0.88, 1.12, 3, 1, 1), 1.0)
     haze = torch.where(chosen(0.15), uniform(0.1, 0.55), 0.0)
     out = out * (1.0 - haze) + uniform(0.5, 0.85) * haze

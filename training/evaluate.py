@@ -2,7 +2,7 @@
 
 On at least 1,000 held-out pictures (rendered first, where they are not there yet) and on the library's own scenes:
 average precision at overlap 0.5 with the detections sorted over the whole set, recall by class, distance and weather;
-what is the matter with what is missed; traffic lights; error of lifted centres by distance; recall against fog and
+what is the matter with what is missed; traffic lights; error of lifted centers by distance; recall against fog and
 darkness; size and time. Writes reports/detection.md, .json and .png.
 """
 
@@ -27,7 +27,7 @@ from eidrive_scenario.perception.learned.detector import (
 )
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.world.weather import Weather, load_weather
-from training.judging import centre_errors, held_out, judge_dataset, judge_scenes, milliseconds, parameters
+from training.judging import center_errors, held_out, judge_dataset, judge_scenes, milliseconds, parameters
 from training.light_scenes import light_scenes
 from training.light_scores import light_table, readings
 from training.misses import misses
@@ -95,10 +95,10 @@ def _size_and_time(networks: Mapping[str, ImageNetwork], scene: Seen) -> Table:
 
 
 def _lifting(of: str, scenes: Sequence[Seen], names: Sequence[str]) -> list[Table]:
-    """Errors of lifted centres, with the LiDAR and without."""
+    """Errors of lifted centers, with the LiDAR and without."""
     found = []
     for sensors, use_lidar in (("camera and LiDAR", True), ("camera alone", False)):
-        errors = {name: centre_errors(DETECTORS[name], scenes, use_lidar) for name in names}
+        errors = {name: center_errors(DETECTORS[name], scenes, use_lidar) for name in names}
         found.append(error_table(errors, f"{of}, {sensors}"))
     return found
 
@@ -121,7 +121,7 @@ def add_to_card(name: str, judged: Sequence[Judged], pictures: int) -> None:
     """What shipped weights reach on the held-out pictures, into the card beside them."""
     path = SHIPPED / f"{name}.json"
     card = json.loads(path.read_text(encoding="utf-8"))
-    card["held_out"] = {"script": "training/evaluate.py", "pictures": pictures}
+    card["held_out"] = {"script": "training/evaluate.py", "images": pictures}
     for weather in WEATHERS:
         part = Part(VEHICLES, farthest=40.0, height=15.0, weather=weather)
         card["held_out"][f"vehicles_within_40_m_ap50_{weather}"] = round(score(judged, part).precision, 4)

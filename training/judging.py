@@ -21,7 +21,7 @@ from training.scoring import VEHICLES, Judged, Objects
 Array = NDArray[np.float64]
 
 MATCHED_WITHIN = 4.0
-"""Lifted boxes farther from every object's centre than this are not of one [m]."""
+"""Lifted boxes farther from every object's center than this are not of one [m]."""
 
 
 def held_out(folder: Path, seed: int, pictures: int, processes: int) -> Dataset:
@@ -76,8 +76,8 @@ def objects_of(labels: Sequence[Label]) -> Objects:
     )
 
 
-def centre_errors(kind: type[LearnedDetector], scenes: Iterable[Seen], use_lidar: bool) -> Array:
-    """(K, 2) distance of each vehicle that was found [m], and how far off in plan view its lifted centre is [m]."""
+def center_errors(kind: type[LearnedDetector], scenes: Iterable[Seen], use_lidar: bool) -> Array:
+    """(K, 2) distance of each vehicle that was found [m], and how far off in plan view its lifted center is [m]."""
     detector = kind(LearnedSettings())
     found = []
     for seen in scenes:
@@ -92,10 +92,10 @@ def centre_errors(kind: type[LearnedDetector], scenes: Iterable[Seen], use_lidar
             for label, enough in zip(seen.labels, objects.to_find, strict=True)
             if enough and IMAGE_CLASSES[label.number] in VEHICLES
         ]
-        centres = np.array([label.place[:2] for label in vehicles], dtype=float).reshape(-1, 2)
+        centers = np.array([label.place[:2] for label in vehicles], dtype=float).reshape(-1, 2)
         free = np.ones(len(vehicles), dtype=bool)
         for row in np.argsort(-detections.scores, kind="stable"):
-            away = np.linalg.norm(centres - detections.boxes[row, :2], axis=1)
+            away = np.linalg.norm(centers - detections.boxes[row, :2], axis=1)
             away[~free] = np.inf
             if len(away) and away.min() <= MATCHED_WITHIN:
                 nearest = int(np.argmin(away))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, LIGHT, STOP_SIGN, image_class
-from eidrive_scenario.roads.model.signal_states import lamp_colours, lamps, lit
+from eidrive_scenario.roads.model.signal_states import lamp_colors, lamps, lit
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.meshes import actor_mesh
@@ -25,11 +25,11 @@ from eidrive_scenario.world.weather import Weather
 Array = NDArray[np.float64]
 
 NEAREST = 0.3
-"""Bodies that come nearer to the camera than this are labelled without a silhouette [m]."""
+"""Bodies that come nearer to the camera than this are labeled without a silhouette [m]."""
 LEAST_CONTRAST = 0.05
 """Share of an object's contrast that must arrive through fog and rain."""
 DARK = 10
-"""Grey level, of 255, that something in or around an object must reach."""
+"""Gray level, of 255, that something in or around an object must reach."""
 LEAST_FACING = 0.25
 """Cosine of the angle between where a signal looks and where the camera is, below which it cannot be read."""
 
@@ -39,7 +39,7 @@ class Label(NamedTuple):
 
     number   of its class in IMAGE_CLASSES;  box  x1 y1 x2 y2 of what is seen of it [px]
     seen     its pixels in sight;  whole  those of its silhouette within the picture, were it alone
-    distance from the camera to its centre [m];  place  x y z l w h yaw in the world [m, rad]
+    distance from the camera to its center [m];  place  x y z l w h yaw in the world [m, rad]
     readable whether anything tells its class: not so for a traffic light from behind, nor in thick fog or the dark
     """
 
@@ -78,11 +78,11 @@ def actor_labels(
 
 def legible(labels: Iterable[Label], reading: CameraReading, weather: Weather) -> list[Label]:
     """The labels; those objects not readable of which fog leaves nothing, and those that are black on black."""
-    grey = cv2.blur(cv2.cvtColor(reading.rgb, cv2.COLOR_RGB2GRAY), (3, 3))
+    gray = cv2.blur(cv2.cvtColor(reading.rgb, cv2.COLOR_RGB2GRAY), (3, 3))
     found = []
     for label in labels:
         left, top, right, bottom = (int(side) for side in label.box)
-        dark = int(grey[max(top - 3, 0) : bottom + 3, max(left - 3, 0) : right + 3].max()) < DARK
+        dark = int(gray[max(top - 3, 0) : bottom + 3, max(left - 3, 0) : right + 3].max()) < DARK
         lost = math.exp(-weather.extinction * label.distance) < LEAST_CONTRAST
         found.append(label._replace(readable=label.readable and not dark and not lost))
     return found
@@ -143,10 +143,10 @@ def signal_labels(reading: CameraReading, heads: Sequence[SignalHead], states: M
 
 def signal_class(head: SignalHead, state: str) -> str | None:
     """The class of a traffic light or stop sign; None for all other signs."""
-    colours = lamp_colours(head.signal)
-    if not colours:
+    colors = lamp_colors(head.signal)
+    if not colors:
         return STOP_SIGN if sign_face(head.signal).shape == "octagon" else None
-    shining = [colour for (colour, _), on in zip(lamps(state, colours), lit(state, colours, 0.0), strict=True) if on]
+    shining = [color for (color, _), on in zip(lamps(state, colors), lit(state, colors, 0.0), strict=True) if on]
     return f"{LIGHT} {shining[0] if shining else 'off'}"
 
 
@@ -154,7 +154,7 @@ def head_box(head: SignalHead) -> tuple[Array, Array]:
     """(8, 3) corners and (3,) middle of the box of a signal's head [m]; a light is half as deep as wide."""
     pose = head.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
-    deep = 0.5 * head.width if lamp_colours(head.signal) else 0.0
+    deep = 0.5 * head.width if lamp_colors(head.signal) else 0.0
     corners = np.array(
         [
             (pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, pose.z + z)

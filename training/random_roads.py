@@ -35,12 +35,12 @@ _FURNITURE = {
 
 @dataclass(frozen=True)
 class House:
-    """A box beside the road: centre [m], length, width, height [m], heading [rad], colour."""
+    """A box beside the road: center [m], length, width, height [m], heading [rad], color."""
 
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     size: tuple[float, float, float]
     yaw: float
-    colour: tuple[float, float, float]
+    color: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Place:
     def build_houses(self, world: World) -> None:
         """Put the houses into a world with these roads."""
         for number, house in enumerate(self.houses):
-            world.add_building(f"house {number}", house.centre, house.size, house.yaw, house.colour)
+            world.add_building(f"house {number}", house.center, house.size, house.yaw, house.color)
 
 
 def random_place(rng: np.random.Generator, folder: Path) -> Place:
@@ -105,12 +105,12 @@ def random_street(rng: np.random.Generator) -> Street:
     if rng.random() < 0.5:
         side.append(LaneSpec("shoulder", float(rng.uniform(0.5, 2.5))))
     side += [LaneSpec("shoulder", 0.63, ("curb", "standard")), LaneSpec("sidewalk", float(rng.uniform(1.5, 4.0)))]
-    colour = str(rng.choice(["white", "yellow"]))
+    color = str(rng.choice(["white", "yellow"]))
     if rng.random() < 0.3:
-        middle = LaneSpec("bidirectional", make_roads.LANE, ("solid broken", colour))
-        return Street(left=(middle, *side), right=tuple(side), centre=("broken solid", colour))
-    centre = str(rng.choice(["solid", "solid solid", "broken"]))
-    return Street(left=tuple(side), right=tuple(side), centre=(centre, colour))
+        middle = LaneSpec("bidirectional", make_roads.LANE, ("solid broken", color))
+        return Street(left=(middle, *side), right=tuple(side), center=("broken solid", color))
+    center = str(rng.choice(["solid", "solid solid", "broken"]))
+    return Street(left=tuple(side), right=tuple(side), center=(center, color))
 
 
 def _half_width(street: Street, sign: int) -> float:
@@ -194,9 +194,9 @@ def winding_road(rng: np.random.Generator) -> Element:
     left = add(section, "left")
     for i in range(len(street.left), 0, -1):
         add_lane(left, i, street.left[i - 1])
-    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
-    add(centre, "link")
-    add_mark(centre, street.centre)
+    center = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(center, "link")
+    add_mark(center, street.center)
     right = add(section, "right")
     for i, spec in enumerate(street.right, start=1):
         add_lane(right, -i, spec)
@@ -291,9 +291,9 @@ def random_houses(roads: RoadNetwork, rng: np.random.Generator) -> list[House]:
                 pose = roads.road_pose_at(road.id, min(s + length / 2, road.length), t)
                 if _clear_of_roads(roads, pose.x, pose.y, pose.h, length, depth):
                     tone = rng.uniform(0.25, 0.9)
-                    colour = tuple(float(c) for c in (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95))
-                    centre = (pose.x, pose.y, pose.z + height / 2)
-                    found.append(House(centre, (length, depth, height), pose.h, (colour[0], colour[1], colour[2])))
+                    color = tuple(float(c) for c in (tone * rng.uniform(0.75, 1.1, 3)).clip(0.05, 0.95))
+                    center = (pose.x, pose.y, pose.z + height / 2)
+                    found.append(House(center, (length, depth, height), pose.h, (color[0], color[1], color[2])))
                 s += length + gap + rng.uniform(0.0, 10.0)
     return found
 

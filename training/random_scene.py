@@ -67,7 +67,7 @@ class Spots:
 
     @classmethod
     def of(cls, roads: RoadNetwork, step: float = 1.5) -> Spots:
-        """All places, every `step` metres of each lane."""
+        """All places, every `step` meters of each lane."""
         poses, kinds, widths = [], [], []
         for road in roads.roads.values():
             for s in np.arange(step / 2, road.length, step).tolist():
@@ -154,7 +154,7 @@ def _camera_pose(place: tuple[float, float, float], yaw: float, pitch: float, ro
 
 
 def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
-    """A body of this shape in a random size and colour."""
+    """A body of this shape in a random size and color."""
     sizes = _SIZES[shape]
     length, width, height = sizes[int(rng.integers(len(sizes)))]
     grow = rng.uniform(0.93, 1.07, 3) * rng.uniform(0.95, 1.05)
@@ -162,11 +162,11 @@ def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
     wheels = shape in _WHEELED
     wheelbase = 0.58 * size[0] if wheels else 0.0
     radius = {"motorbike": 0.31, "bicycle": 0.34}.get(shape, 0.33 if size[2] < 2.2 else 0.45)
-    colour = None
+    color = None
     if rng.random() < 0.6:
         tone = float(rng.uniform(0.08, 0.95))
         red, green, blue = (tone + rng.normal(0.0, 0.18, 3)).clip(0.03, 0.97).tolist()
-        colour = (red, green, blue)
+        color = (red, green, blue)
     return ActorSpec(
         name=name,
         shape=shape,
@@ -175,7 +175,7 @@ def random_actor(rng: np.random.Generator, name: str, shape: str) -> ActorSpec:
         offset=(0.5 * wheelbase, 0.0, size[2] / 2),
         wheelbase=wheelbase,
         wheel_radius=radius,
-        colour=colour,
+        color=color,
     )
 
 

@@ -88,7 +88,7 @@ def _inside(view: View, place: Place) -> bool:
     x, y, z = view.pose[:3, 3].tolist()
     for house in place.houses:
         reach = 1.0 + np.hypot(house.size[0], house.size[1]) / 2
-        if np.hypot(house.centre[0] - x, house.centre[1] - y) < reach and z < house.centre[2] + house.size[2]:
+        if np.hypot(house.center[0] - x, house.center[1] - y) < reach and z < house.center[2] + house.size[2]:
             return True
     return False
 

@@ -107,12 +107,12 @@ def plot_sweeps(curves: Mapping[str, Any], path: Path) -> None:
 
     figure, (fog, dark) = pyplot.subplots(1, 2, figsize=(11, 4), sharey=True)
     names = [name for name in curves["curves"]["fog"] if name != "at"]
-    for colour, name in zip(("tab:blue", "tab:orange", "tab:green"), names, strict=False):
+    for color, name in zip(("tab:blue", "tab:orange", "tab:green"), names, strict=False):
         data = curves["curves"]["fog"]
-        fog.plot(data["at"], data[name], "o-", color=colour, label=name)
+        fog.plot(data["at"], data[name], "o-", color=color, label=name)
         for title, line in (("headlights", "-"), ("no lamps", "--")):
             data = curves["curves"][title]
-            dark.plot(data["at"], data[name], f"o{line}", color=colour, label=f"{name}, {title}")
+            dark.plot(data["at"], data[name], f"o{line}", color=color, label=f"{name}, {title}")
     fog.set_xscale("log")
     fog.set_xlabel("visual range [m]")
     fog.set_ylabel(f"recall, vehicles within {FARTHEST:.0f} m (n = {curves['vehicles']})")

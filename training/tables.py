@@ -64,7 +64,7 @@ def tables_of(judged: Mapping[str, list[Judged]], of: str) -> list[Table]:
 
 
 def error_table(errors: Mapping[str, Array], of: str) -> Table:
-    """Medians of the errors of lifted centres."""
+    """Medians of the errors of lifted centers."""
     bins = (
         ("all within 30 m", 0.0, 30.0),
         *((f"{a:.0f} to {b:.0f} m", a, b) for a, b in ((0, 10), (10, 20), (20, 30), (30, 50))),
@@ -80,7 +80,7 @@ def error_table(errors: Mapping[str, Array], of: str) -> Table:
                 cells += ["-", "-", "0"]
         rows.append(cells)
     head = [f"{name} {what}" for name in errors for what in ("median", "90 %", "n")]
-    return f"{of}: error of lifted centres in plan view [m]", ["distance", *head], rows
+    return f"{of}: error of lifted centers in plan view [m]", ["distance", *head], rows
 
 
 def as_markdown(tables: Sequence[Table], notes: Mapping[str, str] | None = None) -> str:

@@ -23,7 +23,7 @@ from torch import nn
 
 from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, best_confidence, match
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES, suppression_groups
-from eidrive_scenario.perception.learned.networks.boxes import centred
+from eidrive_scenario.perception.learned.networks.boxes import centered
 from eidrive_scenario.perception.learned.networks.ssd import default_boxes
 from eidrive_scenario.perception.learned.networks.ssd_loss import SsdLoss
 from eidrive_scenario.perception.learned.networks.suppression import suppress
@@ -32,7 +32,7 @@ from eidrive_scenario.perception.learned.networks.yolov5 import ANCHORS_PER_SCAL
 from eidrive_scenario.perception.learned.networks.yolov5_loss import YoloLoss
 from eidrive_scenario.perception.learned.torch_network import ssd_candidates, yolo_candidates
 from eidrive_scenario.perception.learned.weights import Description, save
-from training.augment import moved, recoloured
+from training.augment import moved, recolored
 from training.dataset import Dataset
 
 INPUT_SIZE = (512, 384)
@@ -73,7 +73,7 @@ class Samples:
 
 
 def fit_anchors(dataset: Dataset, seed: int, rounds: int = 60) -> Anchors:
-    """Nine anchors by k-means over the boxes' widths and heights, nearness being the overlap of boxes on one centre
+    """Nine anchors by k-means over the boxes' widths and heights, nearness being the overlap of boxes on one center
     (Redmon and Farhadi, YOLO9000, 2017, section 2), sorted by area, three for each scale."""
     box = dataset.box[dataset.to_find()].astype(float)
     sides = np.maximum(box[:, 2:] - box[:, :2], 2.0)
@@ -199,10 +199,10 @@ def train(options: argparse.Namespace) -> None:
             # Time, not epochs, sets the schedule where there is a limit, so that it always ends in small steps.
             progress = max(step / steps, (time.perf_counter() - began) / limit)
             if progress > PLAIN_FROM:
-                pictures, targets = pixels, Targets(centred(samples.boxes[rows]), samples.classes[rows])
+                pictures, targets = pixels, Targets(centered(samples.boxes[rows]), samples.classes[rows])
             else:
                 pictures, targets = moved(pixels, samples.boxes[rows], samples.classes[rows], draws)
-            pictures = recoloured(pictures, draws)
+            pictures = recolored(pictures, draws)
             for group in optimizer.param_groups:
                 group["lr"] = learning_rate(int(progress * steps), steps, options.rate)
             with torch.autocast(device.type, torch.bfloat16, enabled=autocast):

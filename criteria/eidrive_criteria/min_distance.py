@@ -14,11 +14,11 @@ class MinDistanceSettings(PairSettings):
     """`{of: Ego, to: Incoming, at_least: 1.5}` [m]; without `at_least` it measures and passes.
 
     measure  `box`: between the nearest points of the bodies, 0 if they touch, so that a crash fails every limit;
-             `centre`: between the centres of the bounding boxes in the horizontal plane (the metric of the EI-Drive
+             `center`: between the centers of the bounding boxes in the horizontal plane (the metric of the EI-Drive
              paper), which stays above 0 in a crash
     """
 
-    measure: Literal["centre", "box"] = "box"
+    measure: Literal["center", "box"] = "box"
 
 
 class MinDistance(PairCriterion):
@@ -31,21 +31,21 @@ class MinDistance(PairCriterion):
     def __init__(self, settings: MinDistanceSettings) -> None:
         super().__init__(settings)
         self._measure = settings.measure
-        self._centre = self._box = math.inf
+        self._center = self._box = math.inf
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
         a, b = view.plain_boxes[of], view.plain_boxes[to]
-        centre = math.hypot(b[0] - a[0], b[1] - a[1])
-        box = centre - (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) / 2.0
+        center = math.hypot(b[0] - a[0], b[1] - a[1])
+        box = center - (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) / 2.0
         if view.contacts and any({contact.first, contact.second} == {self.of, self.to} for contact in view.contacts):
             box = 0.0  # Bodies that touched within the step may stand apart again at its end.
         elif box <= self._box:  # Else they are not as near as they have been, however they are turned.
             box = box_distance(a, b)
-        self._centre, self._box = min(self._centre, centre), min(self._box, box)
-        return centre if self._measure == "centre" else box
+        self._center, self._box = min(self._center, center), min(self._box, box)
+        return center if self._measure == "center" else box
 
     def words(self) -> str:
-        measure = "centre to centre" if self._measure == "centre" else "box to box"
+        measure = "center to center" if self._measure == "center" else "box to box"
         return f"{self.of} and {self.to} came within {self.smallest:.2f} m ({measure}) at {self.when:.2f} s"
 
     def metrics(self) -> Mapping[str, float]:
@@ -53,4 +53,4 @@ class MinDistance(PairCriterion):
         if not math.isfinite(self.smallest):
             return {}
         pair = f"min_distance.{self.of}.{self.to}"
-        return {f"{pair}.centre": self._centre, f"{pair}.box": self._box, f"{pair}.time": self.when}
+        return {f"{pair}.center": self._center, f"{pair}.box": self._box, f"{pair}.time": self.when}

@@ -38,7 +38,7 @@ def check(
 ) -> None:
     """Print every mistake in scenarios, distributions and roads as `file:line: what is wrong; what would be right`.
 
-    Findings end with the rule that made them: `eidrive list checks` names all rules.
+    Findings end with the rule that made them: `eidrive list rules` names all rules.
     """
     from eidrive_scenario.checks.distribution_checks import DistributionCheckReport
 

@@ -50,7 +50,7 @@ def run(
     user_value: Annotated[
         list[str] | None, typer.Option(metavar="K=V", help="Value for UserDefinedValueConditions; repeatable.")
     ] = None,
-    stand_in: Annotated[
+    controller: Annotated[
         list[str] | None,
         typer.Option(metavar="K=V", help="Who plays the controller K of another tool, such as alks; repeatable."),
     ] = None,
@@ -112,7 +112,7 @@ def run(
         weather=weather,
         parameters=parameters,
         user_values=_assigned("--user-value", user_value or []),
-        controllers=_assigned("--stand-in", stand_in or []),
+        controllers=_assigned("--controller", controller or []),
         dt=_positive("--dt", dt),
         time_limit=_positive("--time-limit", time_limit),
         allow_torchscript=allow_torchscript,

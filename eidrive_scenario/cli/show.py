@@ -26,7 +26,7 @@ class Names(StrEnum):
     criteria = "criteria"
     actions = "actions"
     conditions = "conditions"
-    checks = "checks"
+    rules = "rules"
 
 
 def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = Names.scenarios) -> None:
@@ -42,7 +42,7 @@ def list_names(what: Annotated[Names, typer.Argument(help="Of which kind.")] = N
         lines = library.names("weather")
     elif what is Names.catalogs:
         lines = _catalog_lines()
-    elif what is Names.checks:
+    elif what is Names.rules:
         from eidrive_scenario.checks.registry import ALL_RULES
 
         width = max(len(rule.name) for rule in ALL_RULES)

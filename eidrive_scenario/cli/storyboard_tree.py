@@ -17,8 +17,8 @@ def storyboard_tree(storyboard: Storyboard) -> Tree:
     """The tree that a run would tick, with the actions of Init first."""
     root = Tree(Text(storyboard.scenario.name, style="bold"), guide_style="dim")
     init = root.add(_heading("init", "", ""))
-    for behaviour in storyboard.init.children:
-        init.add(_action(behaviour))
+    for behavior in storyboard.init.children:
+        init.add(_action(behavior))
     _add(root, storyboard.root)
     return root
 
@@ -30,8 +30,8 @@ def _add(branch: Tree, element: StoryElement) -> None:
         if leaf is not None:
             here.add(Text.assemble((f"{word} when ", "cyan"), leaf.trigger.describe() or "criteria say so"))
     if isinstance(element, ActionElement):
-        for behaviour in element.children:
-            here.add(_action(behaviour))
+        for behavior in element.children:
+            here.add(_action(behavior))
     for child in element.elements:
         _add(here, child)
 
@@ -50,8 +50,8 @@ def _heading(kind: str, name: str, remarks: str) -> Text:
     return Text.assemble(*parts)
 
 
-def _action(behaviour: object) -> Text:
-    if not isinstance(behaviour, ActionBehaviour):
-        return Text(str(behaviour))
-    actor = f"{behaviour.actor_name}: " if behaviour.actor_name else ""
-    return Text(f"{actor}{behaviour.describe()}")
+def _action(behavior: object) -> Text:
+    if not isinstance(behavior, ActionBehaviour):
+        return Text(str(behavior))
+    actor = f"{behavior.actor_name}: " if behavior.actor_name else ""
+    return Text(f"{actor}{behavior.describe()}")

@@ -32,8 +32,8 @@ from eidrive_scenario.world.actor import ActorSpec, Control
 Array = NDArray[np.float64]
 
 EGO_BODY_MARGIN = 0.9
-"""A reported box whose centre lies this near to the own outline is the own body: half the width of a car, so that the
-centre of another car can come as near only after a collision [m]."""
+"""A reported box whose center lies this near to the own outline is the own body: half the width of a car, so that the
+center of another car can come as near only after a collision [m]."""
 TIME_TOLERANCE = 1e-9
 
 SENDER_REPORT_SUFFIX = " itself"
@@ -89,7 +89,7 @@ class Agent:
         self._own_places: deque[tuple[float, float, float, float, float]] = deque(
             maxlen=math.ceil(settings.lifetime(complete=False) / dt) + 2
         )
-        """Time [s], centre of the body and height of its reference point [m], heading [rad]."""
+        """Time [s], center of the body and height of its reference point [m], heading [rad]."""
 
     def act(self, readings: Readings, inbox: Sequence[ReceivedMessage], now: float, goal: Goal | None) -> AgentStep:
         """One tick at `now` [s]."""
@@ -198,7 +198,7 @@ class Agent:
         return detections if len(others) == len(detections) else detections.subset(others)
 
     def _own_place(self, time: float) -> tuple[float, float, float, float]:
-        """Centre, height and heading of the own body at the last instant up to `time`, or the earliest known."""
+        """Center, height and heading of the own body at the last instant up to `time`, or the earliest known."""
         for held in reversed(self._own_places):
             if held[0] <= time + TIME_TOLERANCE:
                 return held[1:]

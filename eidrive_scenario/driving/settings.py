@@ -88,7 +88,7 @@ def _areas(value: Any) -> Any:
     """Areas as polygons: given as [x0, x1, y0, y1], a list of such rectangles, one polygon, or a list of polygons."""
     if value is None:
         return None
-    explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in metres"
+    explanation = "an area is [x0, x1, y0, y1], a list of such, or a polygon [[x, y], [x, y], [x, y], …], in meters"
     if not isinstance(value, Sequence) or isinstance(value, str) or not value:
         raise ValueError(explanation)
     if all(isinstance(entry, (int, float)) for entry in value) or all(_is_point(entry) for entry in value):
@@ -143,8 +143,8 @@ class AgentSettings(Settings):
     asn1_files      ASN.1 modules that say how large a message is, relative to the scenario file
     target_speed    where the storyboard asks for none; None keeps the first one
     conflict_area   polygons (a rectangle is [x0, x1, y0, y1]) in which an object makes the vehicle brake with
-    conflict_brake  [m/s²], until
-    conflict_hold   has gone by since an object was last known there
+    conflict_deceleration  [m/s²], until
+    conflict_hold_time   has gone by since an object was last known there
     min_existence   probability of existence (of an object without one: score) from which on the planner reacts to it;
                     0.5 is the likelier of the two hypotheses, as in trackers and fusion
     """
@@ -177,8 +177,8 @@ class AgentSettings(Settings):
     asn1_files: Annotated[tuple[str, ...], BeforeValidator(_names)] = ()
     target_speed: Annotated[float, Field(ge=0.0, le=1e4)] | None = None
     conflict_area: Annotated[tuple[Polygon, ...] | None, BeforeValidator(_areas)] = None
-    conflict_brake: PositiveFloat = 5.0
-    conflict_hold: NonNegativeFloat = 1.05
+    conflict_deceleration: PositiveFloat = 5.0
+    conflict_hold_time: NonNegativeFloat = 1.05
     min_existence: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
 
     @model_validator(mode="after")

@@ -17,7 +17,7 @@ from eidrive_scenario.experiments.statistics import (
     Proportion,
     Summary,
     paired_difference,
-    summarise,
+    summarize,
     wilson,
 )
 from eidrive_scenario.simulation import RunResult, RunSettings
@@ -97,20 +97,20 @@ class Cell:
     scenario: str
     arm: ExperimentArm
     seeds: tuple[int, ...]
-    centres: tuple[float, ...]
+    centers: tuple[float, ...]
     boxes: tuple[float, ...]
     collision_free: Proportion
     published: Published
 
     @property
-    def centre(self) -> Summary:
-        """Between the centres of the two cars: the paper's metric."""
-        return summarise(self.centres)
+    def center(self) -> Summary:
+        """Between the centers of the two cars: the paper's metric."""
+        return summarize(self.centers)
 
     @property
     def box(self) -> Summary:
         """Between the bodies: 0 where they touch."""
-        return summarise(self.boxes)
+        return summarize(self.boxes)
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: ModelVariant) -> Table
                     scenario=scenario,
                     arm=arm,
                     seeds=tuple(seed for seed, _ in mine),
-                    centres=tuple(_metric(result, f"min_distance.{EGO}.{HIDDEN}.centre") for _, result in mine),
+                    centers=tuple(_metric(result, f"min_distance.{EGO}.{HIDDEN}.center") for _, result in mine),
                     boxes=tuple(_metric(result, f"min_distance.{EGO}.{HIDDEN}.box") for _, result in mine),
                     collision_free=wilson(free, len(mine)),
                     published=PUBLISHED[scenario, arm.name],
@@ -192,7 +192,7 @@ def evaluate_claims(table: Table) -> tuple[PublishedClaim, ...]:
 def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> PublishedClaim:
     difference = _paired(smaller, larger)
     evidence = (
-        f"{larger.arm.name} {larger.centre.mean:.2f} m, {smaller.arm.name} {smaller.centre.mean:.2f} m; "
+        f"{larger.arm.name} {larger.center.mean:.2f} m, {smaller.arm.name} {smaller.center.mean:.2f} m; "
         f"difference per seed {difference.mean:+.2f} m, 95 % interval [{difference.low:+.2f}, {difference.high:+.2f}]"
     )
     return PublishedClaim(scenario, statement, difference.mean > 0, evidence)
@@ -200,12 +200,12 @@ def _order(scenario: str, statement: str, smaller: Cell, larger: Cell) -> Publis
 
 def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> PublishedClaim:
     """Lost frames leave some runs as good as cooperation and spoil others."""
-    between = latency.centre.mean <= error.centre.mean <= cooperation.centre.mean
-    wider = error.centre.population_sd > cooperation.centre.population_sd
+    between = latency.center.mean <= error.center.mean <= cooperation.center.mean
+    wider = error.center.population_sd > cooperation.center.population_sd
     fewer = error.collision_free.share < cooperation.collision_free.share
     evidence = (
-        f"mean {latency.centre.mean:.2f} / {error.centre.mean:.2f} / {cooperation.centre.mean:.2f} m; "
-        f"sd {error.centre.population_sd:.3f} against {cooperation.centre.population_sd:.3f} m; collision-free "
+        f"mean {latency.center.mean:.2f} / {error.center.mean:.2f} / {cooperation.center.mean:.2f} m; "
+        f"sd {error.center.population_sd:.3f} against {cooperation.center.population_sd:.3f} m; collision-free "
         f"{error.collision_free.successes} against {cooperation.collision_free.successes} of {len(error.seeds)}"
     )
     statement = "latency <= error <= cooperation, error with a larger sd or fewer collision-free runs than cooperation"
@@ -215,7 +215,7 @@ def _mixture(scenario: str, latency: Cell, error: Cell, cooperation: Cell) -> Pu
 def _paired(first: Cell, second: Cell) -> PairedDifference:
     if first.seeds != second.seeds:
         raise ValueError(f"{first.arm.name} and {second.arm.name} were not run with the same seeds")
-    return paired_difference(first.centres, second.centres)
+    return paired_difference(first.centers, second.centers)
 
 
 NOTEWORTHY = 0.05
@@ -232,12 +232,12 @@ def difference(links: Table, own: Table) -> str:
         place = SCENARIOS.get(scenario, scenario).split(",")[0].lower()
         for arm in ARMS[1:]:
             before, after = links.cell(scenario, arm.name), own.cell(scenario, arm.name)
-            change = after.centre.mean - before.centre.mean
+            change = after.center.mean - before.center.mean
             if abs(change) < NOTEWORTHY and before.collision_free == after.collision_free:
                 smaller = max(smaller, abs(change))
                 continue
             shifts.append(
-                f"{place} {arm.title} {before.centre.mean:.2f} → {after.centre.mean:.2f} m, collision-free "
+                f"{place} {arm.title} {before.center.mean:.2f} → {after.center.mean:.2f} m, collision-free "
                 f"{before.collision_free.successes} → {after.collision_free.successes} of {len(after.seeds)}"
             )
         for table in (links, own):

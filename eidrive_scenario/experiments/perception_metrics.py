@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 SIGHTED = 2.0
-"""A station sees an object where it reports one of its own with its centre this near [m]."""
+"""A station sees an object where it reports one of its own with its center this near [m]."""
 
 
 @dataclass(frozen=True)
@@ -37,20 +37,20 @@ class MetricSample:
 
 
 def snapshot(frame: Frame, station: str, *, reach: float) -> MetricSample:
-    """What `station` knows in a frame of all actors around it, up to `reach` [m] from its centre to theirs.
+    """What `station` knows in a frame of all actors around it, up to `reach` [m] from its center to theirs.
 
     Stations are not asked for, as they tell of themselves, and boxes of them or beyond the reach do not count: the
     region is the same for what is known and what is there. Who sees what is told by the stations' own detections; of
     the oracle's that is the line of sight.
     """
     view, step = frame.view, frame.steps[station]
-    centre = view.boxes[view.row(station), :2]
+    center = view.boxes[view.row(station), :2]
     asked = [row for name, row in view.rows.items() if name not in frame.steps]
     objects = view.boxes[asked].reshape(-1, 7)
-    objects = objects[np.linalg.norm(objects[:, :2] - centre, axis=1) <= reach]
+    objects = objects[np.linalg.norm(objects[:, :2] - center, axis=1) <= reach]
     stations = view.boxes[[view.row(name) for name in frame.steps if name in view.rows]]
     known = step.fused.boxes
-    outside = np.linalg.norm(known[:, :2] - centre, axis=1) > reach
+    outside = np.linalg.norm(known[:, :2] - center, axis=1) > reach
     distinct = ~outside & ~_near(known, stations)
     others = [other.detections.boxes for name, other in frame.steps.items() if name != station]
     return MetricSample(
@@ -98,7 +98,7 @@ def recall_by_sight(snapshots: Iterable[MetricSample], least: float) -> Recall:
 
 
 def position_error(snapshots: Iterable[MetricSample], farthest: float = 4.0) -> float:
-    """Root mean square distance between the centres of objects and of what is known of them, seen from above [m].
+    """Root mean square distance between the centers of objects and of what is known of them, seen from above [m].
 
     Each object and the box nearest to it are a pair, nearest pairs first, up to `farthest` [m] apart: an overlap would
     hide the larger errors. NaN where there is no pair.
@@ -124,7 +124,7 @@ def _matches(entry: MetricSample, least: float) -> Matches:
 
 
 def _near(boxes: Array, others: Array) -> Bools:
-    """(N,) whether the centre of one of `others` is within SIGHTED of that of a box (N, 7)."""
+    """(N,) whether the center of one of `others` is within SIGHTED of that of a box (N, 7)."""
     if not len(boxes) or not len(others):
         return np.zeros(len(boxes), dtype=bool)
     distance = np.linalg.norm(boxes[:, None, :2] - others[None, :, :2], axis=2)

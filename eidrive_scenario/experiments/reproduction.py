@@ -33,7 +33,7 @@ def command_of(scenario: Path, seed: int, settings: RunSettings) -> str:
     for option, values in (
         ("--param", settings.parameters),
         ("--user-value", settings.user_values),
-        ("--stand-in", settings.controllers),
+        ("--controller", settings.controllers),
     ):
         words += _assignments(option, values)
     words += ["--seed", str(seed)]

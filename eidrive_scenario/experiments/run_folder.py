@@ -12,7 +12,7 @@ from pathlib import Path
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.atomic import partial_path
 from eidrive_scenario.files.lock import FileLock
-from eidrive_scenario.recording.run_files import PICTURES, RECORDING, RESULT, read_result
+from eidrive_scenario.recording.run_files import IMAGES, RECORDING, RESULT, read_result
 from eidrive_scenario.resolved_settings import ResolvedSettings
 
 _READABLE = 100
@@ -45,7 +45,7 @@ class RunFolder:
     @property
     def pictures(self) -> Path:
         """Folder of the camera images while the run goes on."""
-        return partial_path(self.path / PICTURES)
+        return partial_path(self.path / IMAGES)
 
     def prepare(self) -> None:
         """Remove what an earlier run has left that did not end, with the page that `eidrive view` made of it."""
@@ -62,11 +62,11 @@ class RunFolder:
         (self.path / RESULT).unlink(missing_ok=True)
         for outdated in (self.path / RECORDING, (self.path / RECORDING).with_suffix(".html")):
             outdated.unlink(missing_ok=True)
-        shutil.rmtree(self.path / PICTURES, ignore_errors=True)
+        shutil.rmtree(self.path / IMAGES, ignore_errors=True)
         if self.recording.exists():
             self.recording.replace(self.path / RECORDING)
         if self.pictures.exists():
-            self.pictures.replace(self.path / PICTURES)
+            self.pictures.replace(self.path / IMAGES)
         unfinished = partial_path(self.path / RESULT)
         unfinished.write_bytes(result)
         unfinished.replace(self.path / RESULT)

@@ -19,7 +19,7 @@ from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, text_of
 from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.recording import CameraImageWriter, CsvWriter, Explanation, Recorder, RunLog
 from eidrive_scenario.recording.run_files import (
-    PICTURES,
+    IMAGES,
     RECORDING,
     RESULT,
     read_results,
@@ -33,7 +33,7 @@ from eidrive_scenario.simulation.run import checked_seed
 from eidrive_scenario.wall_limit import limit_wall_time
 
 __all__ = [
-    "PICTURES",
+    "IMAGES",
     "RECORDING",
     "RESULT",
     "as_json_text",

@@ -26,7 +26,7 @@ class Summary:
     largest: float
 
 
-def summarise(values: Sequence[float]) -> Summary:
+def summarize(values: Sequence[float]) -> Summary:
     """The summary of at least one finite value. Raises ValueError otherwise."""
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or not len(sample) or not np.isfinite(sample).all():
@@ -68,11 +68,11 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
         raise ValueError(f"confidence is {confidence}, expected a number between 0 and 1")
     z = NormalDist().inv_cdf(0.5 + confidence / 2)
     share = successes / trials
-    centre = share + z * z / (2 * trials)
+    center = share + z * z / (2 * trials)
     half = z * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials * trials))
     scale = 1 + z * z / trials
-    low = 0.0 if successes == 0 else (centre - half) / scale
-    high = 1.0 if successes == trials else (centre + half) / scale
+    low = 0.0 if successes == 0 else (center - half) / scale
+    high = 1.0 if successes == trials else (center + half) / scale
     return Proportion(successes, trials, low, high, confidence)
 
 

@@ -14,7 +14,7 @@ from eidrive_scenario.experiments.paper import SCENARIOS, Cell, PublishedClaim, 
 
 HEADINGS = (
     "arm",
-    "centres [m]\nmean ± sd",
+    "centers [m]\nmean ± sd",
     "\nmin",
     "boxes\nmean",
     "[m]\nmin",
@@ -25,11 +25,11 @@ HEADINGS = (
 
 def row(cell: Cell) -> tuple[str, ...]:
     """One row of the table, in the order of HEADINGS; sd is the population's, as in the paper."""
-    centre, box, free = cell.centre, cell.box, cell.collision_free
+    center, box, free = cell.center, cell.box, cell.collision_free
     return (
         cell.arm.title,
-        f"{centre.mean:.2f} ± {centre.population_sd:.2f}",
-        f"{centre.smallest:.2f}",
+        f"{center.mean:.2f} ± {center.population_sd:.2f}",
+        f"{center.smallest:.2f}",
         f"{box.mean:.2f}",
         f"{box.smallest:.2f}",
         f"{free.successes}/{free.trials} {free.low:.2f}-{free.high:.2f}",

@@ -18,7 +18,7 @@ OUTSIDE = 1e6
 
 
 def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]:
-    """Pairs (row of first, row of second) of centres (N, 3) and (M, 3) that lie nearer than `gate` [m].
+    """Pairs (row of first, row of second) of centers (N, 3) and (M, 3) that lie nearer than `gate` [m].
 
     The assignment pairs as many as possible and has the least sum of distances; each row is used at most once.
     """

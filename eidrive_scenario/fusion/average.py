@@ -55,14 +55,14 @@ class AverageFusion(FusionMethod):
 
     def _labels(self, reports: Sequence[Detections]) -> list[int]:
         """The object of each box, over all boxes of all reports in order; objects are numbered as they appear."""
-        objects = [_Object(*centre) for centre in reports[0].boxes[:, :3].tolist()]
+        objects = [_Object(*center) for center in reports[0].boxes[:, :3].tolist()]
         labels = list(range(len(objects)))
         for report in reports[1:]:
-            centres = report.boxes[:, :3]
+            centers = report.boxes[:, :3]
             known = [(thing.x, thing.y, thing.z) for thing in objects]
-            plain: list[list[float]] = centres.tolist()
+            plain: list[list[float]] = centers.tolist()
             few = len(known) * len(plain) <= FEW_PAIRS
-            found = associate_few(known, plain, self.gate) if few else associate(np.array(known), centres, self.gate)
+            found = associate_few(known, plain, self.gate) if few else associate(np.array(known), centers, self.gate)
             pairs = {column: row for row, column in found}
             for column, (x, y, z) in enumerate(plain):
                 label = pairs.get(column)
@@ -85,7 +85,7 @@ def joint_existence(reports: Sequence[Detections], labels: Sequence[int]) -> Arr
 
 @dataclass
 class _Object:
-    """The mean of the centres so far."""
+    """The mean of the centers so far."""
 
     x: float
     y: float

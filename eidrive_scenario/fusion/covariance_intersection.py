@@ -29,7 +29,7 @@ class CovarianceIntersectionSettings(Settings):
     """The property `fusion_settings` of this method.
 
     gate           probability that two estimates of one object are within the gate
-    gate_distance  centres of one object are nearer than this where a report does not say how exact it is [m]
+    gate_distance  centers of one object are nearer than this where a report does not say how exact it is [m]
     max_age        an object of which its station has said nothing for so long is forgotten, and a message later than
                    this comes too late [s]. Objects at rest are told once a second (ETSI TS 103 324, T_GenCpmMax)
     existence      an object is reported from this probability on that there is one; half is the likelier hypothesis

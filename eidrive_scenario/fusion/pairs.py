@@ -25,7 +25,7 @@ class AssociationGate(NamedTuple):
     """When two positions may be of one object.
 
     chi_square  squared Mahalanobis distance at most
-    distance    where one of the two does not say how exact it is: between the centres at most [m]
+    distance    where one of the two does not say how exact it is: between the centers at most [m]
     """
 
     chi_square: float
@@ -50,7 +50,7 @@ class Pairs(NamedTuple):
 def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_station: bool) -> Pairs:
     """Pairs of tracks that may be one object: of the same station, or the second of a later one than the first.
 
-    They may by the gate, by the station's own number, or because the centre of one lies within half a width of the
+    They may by the gate, by the station's own number, or because the center of one lies within half a width of the
     other: two bodies cannot be in one place, however sure their reporters are that they stand apart. The cost is the
     negative log-likelihood of the offset, but for constants.
     """

@@ -22,13 +22,13 @@ PLANE = np.ix_((X, Y, YAW), (X, Y, YAW))
 
 @dataclass(frozen=True)
 class MotionNoise:
-    """What the filter does not know of its motion. The slip is that of a car whose tyres give way by 0.075 m/s for each
+    """What the filter does not know of its motion. The slip is that of a car whose tires give way by 0.075 m/s for each
     m/s² across, in curves of some two seconds.
 
     acceleration, turn_rate            white noise of the inertial unit [m/s²/√Hz], [rad/s/√Hz]
     acceleration_bias, turn_bias       biases that it may have, standard deviations [m/s²], [rad/s]
     acceleration_walk, turn_walk       how fast these change [m/s²/√s], [rad/s/√s]
-    slip                               of tyres in curves: velocity across the heading, which the model does not have,
+    slip                               of tires in curves: velocity across the heading, which the model does not have,
                                        white, per lateral acceleration [m/√s per m/s²]
     drift                              the same when driving straight [m/√s]
     """

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
-from eidrive_scenario.roads.model.signal_states import lamp_colours, must_stop
+from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import is_stop_sign
 
@@ -71,7 +71,7 @@ class SignalsAhead:
 
     def __init__(self, roads: RoadNetwork | None) -> None:
         self._lines = stop_lines(roads) if roads is not None else ()
-        self._colours = {signal.id: lamp_colours(signal) for signal in (roads.signals.values() if roads else ())}
+        self._colors = {signal.id: lamp_colors(signal) for signal in (roads.signals.values() if roads else ())}
         self._states: dict[str, str] = {}
         self._on_way: list[tuple[float, StopLine]] = []
 
@@ -90,7 +90,7 @@ class SignalsAhead:
                 state = self._states.get(line.signal)
                 stop = state is not None
                 if stop and line.kind == "light":
-                    stop = must_stop(state or "", self._colours[line.signal])
+                    stop = must_stop(state or "", self._colors[line.signal])
                 yield SignalAhead(line.signal, line.kind, place - progress, state, stop)
 
 

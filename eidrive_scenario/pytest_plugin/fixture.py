@@ -44,7 +44,7 @@ class RunScenario(Protocol):
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Parametrise tests that are marked with `scenario` over scenarios, channels and seeds."""
+    """Parametrize tests that are marked with `scenario` over scenarios, channels and seeds."""
     marker = metafunc.definition.get_closest_marker("scenario")
     if marker is None:
         return

@@ -22,7 +22,7 @@ Image = NDArray[np.uint8]
 
 QUALITY = 90
 """Of the JPEG files, in percent."""
-_COLOURS = {
+_COLORS = {
     "car": (80, 220, 255),
     "van": (80, 220, 255),
     "truck": (90, 160, 255),
@@ -80,9 +80,9 @@ def drawn(picture: Image, found: ImageDetections) -> Image:
     canvas = picture.copy()
     for box, score, name in zip(found.boxes, found.scores.tolist(), found.classes, strict=True):
         left, top, right, bottom = np.rint(box).astype(int).tolist()
-        colour = _COLOURS.get(name, _OTHER)
-        cv2.rectangle(canvas, (left, top), (right - 1, bottom - 1), colour, 1)
-        _label(canvas, f"{name} {score:.2f}", left, top, colour)
+        color = _COLORS.get(name, _OTHER)
+        cv2.rectangle(canvas, (left, top), (right - 1, bottom - 1), color, 1)
+        _label(canvas, f"{name} {score:.2f}", left, top, color)
     return canvas
 
 
@@ -94,19 +94,19 @@ def drawn_in_space(reading: CameraReading, found: Detections) -> Image:
         places, _ = pixels(corners, reading)
         if not np.isfinite(places).all() or (np.abs(places) > 10 * max(width, height)).any():
             continue
-        colour = _COLOURS.get(name, _OTHER)
+        color = _COLORS.get(name, _OTHER)
         points = np.rint(places).astype(int).tolist()
         for first, last in _EDGES:
-            cv2.line(canvas, points[first], points[last], colour, 1, cv2.LINE_AA)
-        _label(canvas, f"{name} {score:.2f}", min(x for x, _ in points), min(y for _, y in points), colour)
+            cv2.line(canvas, points[first], points[last], color, 1, cv2.LINE_AA)
+        _label(canvas, f"{name} {score:.2f}", min(x for x, _ in points), min(y for _, y in points), color)
     return canvas
 
 
-def _label(canvas: Image, text: str, left: int, top: int, colour: tuple[int, int, int]) -> None:
+def _label(canvas: Image, text: str, left: int, top: int, color: tuple[int, int, int]) -> None:
     """Text above a place, or below where there is no room, dark behind."""
     font, size = cv2.FONT_HERSHEY_SIMPLEX, max(0.35, canvas.shape[1] / 1800.0)
     (wide, high), _ = cv2.getTextSize(text, font, size, 1)
     left = min(max(left, 0), max(canvas.shape[1] - wide, 0))
     base = top - 3 if top - 3 - high >= 0 else top + high + 4
     cv2.putText(canvas, text, (left, base), font, size, (0, 0, 0), 3, cv2.LINE_AA)
-    cv2.putText(canvas, text, (left, base), font, size, colour, 1, cv2.LINE_AA)
+    cv2.putText(canvas, text, (left, base), font, size, color, 1, cv2.LINE_AA)

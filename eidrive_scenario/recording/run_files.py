@@ -12,7 +12,7 @@ from eidrive_scenario.files.atomic import PARTIAL, partial_path
 from eidrive_scenario.files.bounded import read_regular_file
 from eidrive_scenario.files.bounded_json import load_json
 
-RECORDING, RESULT, PICTURES = "recording.mcap", "result.json", "pictures"
+RECORDING, RESULT, IMAGES = "recording.mcap", "result.json", "images"
 """Names of the files in a run's folder."""
 _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""

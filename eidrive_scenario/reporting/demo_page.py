@@ -29,7 +29,7 @@ from eidrive_scenario.reporting.page import png_address, write_page
 
 Array = NDArray[np.float64]
 
-COLOURS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
+COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHES = {"none": "8 8", "cooperation": "", "latency": "", "error": "8 8"}
 HORIZON = 12.0
 """The chart shows the two cars while they are this near [m]."""
@@ -80,7 +80,7 @@ def write_demo(
         symbols=Markup(
             f'<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>{symbols}</defs></svg>'
         ),
-        colours=COLOURS,
+        colors=COLORS,
         seeds=len(links.cells[0].seeds),
         watched=watched,
         legend=Markup(legend()),
@@ -109,9 +109,9 @@ def _place(
         "arms": [
             {
                 "title": arm.title,
-                "colour": COLOURS[arm.name],
+                "color": COLORS[arm.name],
                 "summary": _summary(table.cell(scenario, arm.name), mine[arm.name], watched),
-                "pictures": [
+                "images": [
                     _picture(moment, mine[arm.name], arm, place, window, _identifier(scenario))
                     for moment in mine[arm.name].moments
                 ],
@@ -136,7 +136,7 @@ def _picture(
     row = story.times.index(snapshot.time)
     lost = sum(event.outcome == "lost" for event in snapshot.links)
     caption = (
-        f"at {snapshot.time:.2f} s, {story.centres[row]:.1f} m between centres, "
+        f"at {snapshot.time:.2f} s, {story.centers[row]:.1f} m between centers, "
         f"{story.ego} {_speed(story.speeds[row])}" + (", last message lost" if lost else "")
     )
     svg = top_view(
@@ -162,8 +162,8 @@ def _chart(stories: Mapping[str, Story]) -> str:
         story = stories[arm.name]
         if not story.times:
             continue
-        nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centres[row]))
-        lines.append(ChartSeries(arm.title, COLOURS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
+        nearest = min(range(len(story.times)), key=lambda row: (story.boxes[row], story.centers[row]))
+        lines.append(ChartSeries(arm.title, COLORS[arm.name], story.times, story.boxes, DASHES[arm.name], nearest))
         near = [row for row, gap in enumerate(story.boxes) if gap <= HORIZON]
         if near:
             start, end = min(start, story.times[near[0]]), max(end, story.times[near[-1]])
@@ -179,12 +179,12 @@ def _chart(stories: Mapping[str, Story]) -> str:
 def _window(scenario: str, stories: Mapping[tuple[str, str], Story]) -> Window:
     """The same for all pictures of a scenario: all actors at all of its decisive instants."""
     points = [
-        tuple(centre)
+        tuple(center)
         for (name, _), story in stories.items()
         if name == scenario
         for moment in story.moments
         if moment.snapshot is not None
-        for centre in moment.snapshot.view.centres.tolist()
+        for center in moment.snapshot.view.centers.tolist()
     ]
     return Window.around(points or [(0.0, 0.0)], margin=7.0)
 

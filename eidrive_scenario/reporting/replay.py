@@ -44,7 +44,7 @@ _LARGEST_PAGE = 64 * 2**20
 """Maximum size of the frames in a page, about [bytes]."""
 _ABSENT = len("null, ")
 """Size of the entry of a station for a frame before its first one [bytes]."""
-COLOURS = {
+COLORS = {
     "own": OWN,
     "received": RECEIVED,
     "link": LINK,
@@ -194,9 +194,9 @@ def replay_data(
     report: DamageReport | None = None,
     settings: Mapping[str, AgentSettings] | None = None,
 ) -> dict[str, Any]:
-    """What the page's script draws, as plain lists; lengths in metres to a centimetre, angles to a milliradian.
+    """What the page's script draws, as plain lists; lengths in meters to a centimeter, angles to a milliradian.
 
-    actors   by name: category and size; poses[frame][name] = x, y, yaw of the box centre, speed
+    actors   by name: category and size; poses[frame][name] = x, y, yaw of the box center, speed
     stations by name, for each frame: own and heard boxes [x, y, l, w, yaw] or, where it is estimated, with the
              probability of existence as sixth; links [sender, delivered], plan's reason
     changes  [time, path, after, why] of the storyboard's transitions
@@ -219,7 +219,7 @@ def replay_data(
         if not budget.take(_size(part) + _ABSENT * added * len(data["times"]), frame.view.time):
             break
         _append(data, part)
-    return {**data, "roads": _roads(roads or RoadDrawing()), "colours": COLOURS}
+    return {**data, "roads": _roads(roads or RoadDrawing()), "colors": COLORS}
 
 
 def _part(frame: Frame, knowledge: dict[str, SnapshotBuilder], settings: Mapping[str, AgentSettings]) -> dict[str, Any]:
@@ -305,6 +305,6 @@ def _roads(roads: RoadDrawing) -> dict[str, Any]:
     return {
         "lanes": [[LANES.get(kind, LANE), polygon.round(2).tolist()] for kind, polygon in roads.lanes],
         "lines": [
-            [is_broken(kind), PAINT.get(colour, WHITE), line.round(2).tolist()] for kind, colour, line in roads.markings
+            [is_broken(kind), PAINT.get(color, WHITE), line.round(2).tolist()] for kind, color, line in roads.markings
         ],
     }

@@ -22,7 +22,7 @@ from eidrive_scenario.experiments.trends import (
 )
 from eidrive_scenario.files.atomic import create
 
-COLOURS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce")
+COLORS = ("#0b6e99", "#c2410c", "#4d7c0f", "#7e22ce")
 SPEEDS = (5.0, 10.0, 15.0)
 DELAYS = tuple(round(0.005 + 0.01 * step, 3) for step in range(40))
 """Between the knees, which all lie at whole hundredths of a second or near them [s]."""
@@ -34,16 +34,16 @@ def precision_picture() -> Figure:
     """Average precision over the delay, for three speeds and both usual thresholds."""
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
     for axes, iou in zip(figure.subplots(2, 1, sharex=True), (0.7, 0.5), strict=True):
-        for colour, speed, size in zip(COLOURS, SPEEDS, (11, 8, 5), strict=False):
+        for color, speed, size in zip(COLORS, SPEEDS, (11, 8, 5), strict=False):
             curve = precision_by_delay(speed, iou, DELAYS)
-            look = {"ms": size, "mfc": "none", "lw": 1, "color": colour}
+            look = {"ms": size, "mfc": "none", "lw": 1, "color": color}
             axes.plot(1e3 * curve.x, curve.measured, "o-", label=f"{speed:g} m/s, as received", **look)
             knee = 1e3 * largest_shift(iou) / speed
-            axes.axvline(knee, color=colour, lw=1, ls="--")
-            axes.text(knee, 1.09, f"{knee:.0f} ms", color=colour, ha="center", fontsize=8)
+            axes.axvline(knee, color=color, lw=1, ls="--")
+            axes.text(knee, 1.09, f"{knee:.0f} ms", color=color, ha="center", fontsize=8)
         moved = precision_by_delay(SPEEDS[-1], iou, DELAYS, compensated=True)
         label = f"{SPEEDS[-1]:g} m/s, moved on to the present"
-        axes.plot(1e3 * moved.x, moved.measured, "x", ms=4, color=COLOURS[3], label=label)
+        axes.plot(1e3 * moved.x, moved.measured, "x", ms=4, color=COLORS[3], label=label)
         axes.set_title(f"IoU {iou:g}: lost where speed times delay passes {largest_shift(iou):.2f} m (dashed)", pad=16)
         axes.set_ylabel("average precision")
         axes.set_ylim(-0.05, 1.05)
@@ -82,12 +82,12 @@ def age_picture() -> Figure:
 
 
 def _draw(axes: Axes, curves: Sequence[Curve]) -> None:
-    for colour, curve in zip(COLOURS, curves, strict=False):
-        axes.plot(curve.x, curve.expected, "--", lw=1.2, color=colour, label=f"{curve.label}, expected")
+    for color, curve in zip(COLORS, curves, strict=False):
+        axes.plot(curve.x, curve.expected, "--", lw=1.2, color=color, label=f"{curve.label}, expected")
         if curve.chance is not None:
             low, high = curve.expected - curve.chance, curve.expected + curve.chance
-            axes.fill_between(curve.x, low, high, color=colour, alpha=0.15, lw=0, label="  95 % of all samples")
-        axes.plot(curve.x, curve.measured, "o", ms=4, color=colour, label=f"{curve.label}, measured")
+            axes.fill_between(curve.x, low, high, color=color, alpha=0.15, lw=0, label="  95 % of all samples")
+        axes.plot(curve.x, curve.measured, "o", ms=4, color=color, label=f"{curve.label}, measured")
         off = float(np.max(np.abs(curve.measured - curve.expected)))
         axes.plot([], [], " ", label=f"  largest difference {off:.3f}")
 

@@ -53,7 +53,7 @@ _STREET: tuple[tuple[str, str, float, float, float], ...] = (
     ("Bus", "bus", 70.0, 3.4, math.pi),
     ("Fire engine", "firetruck", 25.4, 8.0, -math.pi / 2),
     ("Behind it", "car", 29.5, 21.0, -math.pi / 2),
-    ("Lorry", "truck", 33.0, -24.0, math.pi / 2),
+    ("Truck", "truck", 33.0, -24.0, math.pi / 2),
     ("Cyclist", "bicycle", 13.5, -3.1, 0.1),
     ("Walker", "pedestrian", 13.2, -6.0, 1.3),
     ("Another", "pedestrian", 12.6, 5.2, -1.4),

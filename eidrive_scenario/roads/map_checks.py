@@ -58,7 +58,7 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
         what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield MapWarning("road-jump", spans, what, "let it begin at s=0", curves[0].line)
+        yield MapWarning("geometry-gap", spans, what, "let it begin at s=0", curves[0].line)
     for one, other in pairwise(curves):
         if one.line is not None and one.line == other.line:
             continue
@@ -66,7 +66,7 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         if abs(missing) > JUMP:
             how = "ends before the next one begins" if missing > 0.0 else "runs on into the next one"
             what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
-            yield MapWarning("road-jump", spans, what, "let s be the sum of the lengths before", other.line)
+            yield MapWarning("geometry-gap", spans, what, "let s be the sum of the lengths before", other.line)
             continue
         end, start = one.at(one.length), other.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
@@ -74,18 +74,22 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         if apart > JUMP:
             what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
             remedy = "let each geometry begin where the one before ends"
-            yield MapWarning("road-jump", "such jumps", what, remedy, other.line)
+            yield MapWarning("geometry-gap", "such jumps", what, remedy, other.line)
         elif KINK < turn < CORNER:
             what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
             yield MapWarning(
-                "road-kink", "such kinks", what, "let each geometry go on with the heading before", other.line
+                "heading-discontinuity",
+                "such kinks",
+                what,
+                "let each geometry go on with the heading before",
+                other.line,
             )
     over = curves[-1].s + curves[-1].length - road.length
     if abs(over) > JUMP:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
         yield MapWarning(
-            "road-jump", "lengths that are not those of the geometry", what, "correct the length", road.line
+            "geometry-gap", "lengths that are not those of the geometry", what, "correct the length", road.line
         )
 
 
@@ -199,11 +203,13 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
         if apart > JUMP:
             names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
             what = f"{names} are linked, and their ends are {apart:.3g} m apart"
-            yield MapWarning("road-jump", "linked lanes that do not meet", what, "let the roads meet there", lane.line)
+            yield MapWarning(
+                "geometry-gap", "linked lanes that do not meet", what, "let the roads meet there", lane.line
+            )
 
 
 class RoadEnd(NamedTuple):
-    """An end of a road: its point, the change of x and y per metre of t, and the lane offset [m]."""
+    """An end of a road: its point, the change of x and y per meter of t, and the lane offset [m]."""
 
     x: float
     y: float
@@ -224,7 +230,7 @@ def _lane_end(road: Road, end: LaneEnd, known: dict[tuple[str, int], RoadEnd]) -
         found = known[road.id, end.side] = RoadEnd(x, y, dx, dy, road.lane_offset.value(s))
     section = road.sections[end.lane.section]
     lane = section.lanes[end.lane.lane]
-    t = found.offset + lane.side * lane.centre.value(section.length if end.side > 0 else 0.0)
+    t = found.offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
     return found.x + t * found.dx, found.y + t * found.dy
 
 

@@ -15,7 +15,7 @@ from eidrive_scenario.roads.objects import outlines
 DASH, GAP = 3.0, 6.0
 """Broken lines in built-up areas (German RMS: 3 m of paint, 6 m of gap)."""
 APART = 0.24
-"""Distance between the lines of a double line, centre to centre [m]."""
+"""Distance between the lines of a double line, center to center [m]."""
 STRIPE = 0.5
 """Width of a crosswalk's stripes and of the gaps between them [m]."""
 MOST_STRIPES = 500

@@ -117,11 +117,11 @@ class RoadNetwork(RoadAttributes):
         return poses.road_pose_at(self.road(road_id), s, t)
 
     def lane_pose_at(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-        """The pose at a lane's centre line plus offset; heading of the lane, along growing s. Raises PositionError."""
+        """The pose at a lane's center line plus offset; heading of the lane, along growing s. Raises PositionError."""
         return poses.lane_pose_at(self.road(road_id), lane_id, s, offset)
 
-    def centres(self, places: Sequence[LaneLocation]) -> Array:
-        """(N, 3) points of the lanes' centre lines at places [m], wherever across the lanes those are."""
+    def centers(self, places: Sequence[LaneLocation]) -> Array:
+        """(N, 3) points of the lanes' center lines at places [m], wherever across the lanes those are."""
         tables = self.tables
         road = np.array([tables.index[place.road] for place in places], dtype=np.int64)
         s = np.array([place.s for place in places])
@@ -212,7 +212,7 @@ class RoadNetwork(RoadAttributes):
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """The place `distance` metres further along the lane in its driving direction (back where negative).
+        """The place `distance` meters further along the lane in its driving direction (back where negative).
 
         Through links and junctions; at a fork the route decides, else `choose(branches)`, else the straightest way is
         taken. None where the lane ends, or the place where it does with `to_end`. `visit` says where on a route that
@@ -264,7 +264,7 @@ class RoadNetwork(RoadAttributes):
         return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """The smallest rectangle around all lane centres: least x, least y, greatest x, greatest y [m]."""
+        """The smallest rectangle around all lane centers: least x, least y, greatest x, greatest y [m]."""
         points: Array = self._locator.sample_points
         low, high = points.min(axis=0), points.max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])

@@ -41,7 +41,7 @@ def fewest_junctions(network: RoadNetwork) -> Cost:
 
 
 def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
-    """Metres, each road's times a factor that the generator draws: now one way is the cheapest, now another."""
+    """Meters, each road's times a factor that the generator draws: now one way is the cheapest, now another."""
     draws = generator.uniform(0.0, math.log(MOST_UNLIKELY), len(network.roads)).tolist()
     factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
 

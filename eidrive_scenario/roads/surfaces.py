@@ -1,4 +1,4 @@
-"""What a road looks like: surface triangles lane by lane, kerbs, and markings, as arrays for drawing."""
+"""What a road looks like: surface triangles lane by lane, curbs, and markings, as arrays for drawing."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KINDS = {
     "marking_white": (0.92, 0.92, 0.90),
     "marking_yellow": (0.92, 0.75, 0.16),
 }
-"""The kinds of surface, each with a colour to draw it in: red, green, blue in [0, 1]."""
+"""The kinds of surface, each with a color to draw it in: red, green, blue in [0, 1]."""
 
 _BY_LANE_TYPE = {
     "sidewalk": "sidewalk",
@@ -68,7 +68,7 @@ class SurfaceMesh:
     faces: Integers
 
     @property
-    def colour(self) -> tuple[float, float, float]:
+    def color(self) -> tuple[float, float, float]:
         """Red, green, blue in [0, 1]."""
         return KINDS[self.kind]
 
@@ -82,7 +82,7 @@ class _Part(NamedTuple):
 def surface_meshes(network: RoadNetwork, spacing: float = 2.0) -> list[SurfaceMesh]:
     """All road surfaces and markings, one mesh per kind.
 
-    `spacing` is the distance between the cross sections that are looked at [m]; those that lie within a centimetre of
+    `spacing` is the distance between the cross sections that are looked at [m]; those that lie within a centimeter of
     a straight surface are left out.
     """
     parts: list[_Part] = []

@@ -43,9 +43,9 @@ def metered(luminance: Floats, settings: CameraSettings) -> Exposure:
     if time is None or gain is None:
         wanted = optics / white_level(luminance)
         if time is None:
-            time = min(wanted / (1.0 if gain is None else _linear(gain)), settings.longest_exposure)
+            time = min(wanted / (1.0 if gain is None else _linear(gain)), settings.max_exposure_time)
         if gain is None:
-            gain = min(max(20.0 * math.log10(wanted / time), 0.0), settings.highest_gain)
+            gain = min(max(20.0 * math.log10(wanted / time), 0.0), settings.max_gain)
     return Exposure(time, gain, optics / (time * _linear(gain)))
 
 

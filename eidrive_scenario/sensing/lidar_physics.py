@@ -27,7 +27,7 @@ REFLECTIVITY: Mapping[str, float] = {
     "misc": 0.40,
 }
 """Share of light that a body sends back in all directions, by class: values for car paint, metal, clothes and plastic
-between those that Muckenhuber et al. measured (Automotive lidar modelling approach based on material properties and
+between those that Muckenhuber et al. measured (Automotive lidar modeling approach based on material properties and
 lidar capabilities, Sensors 20, 2020)."""
 GROUND, WET_GROUND = 0.17, 0.06
 """Of asphalt, buildings and what else stands there, and of asphalt under water."""
@@ -57,13 +57,13 @@ class Returns(NamedTuple):
 
 def extinction(weather: Weather) -> float:
     """Of light of 905 nm [1/m]: fog by Kruse's law (ITU-R P.1814), drops as for visible light."""
-    kilometres = weather.visual_range / 1000.0
-    if kilometres > 50.0:
+    kilometers = weather.visual_range / 1000.0
+    if kilometers > 50.0:
         power = 1.6
-    elif kilometres > 6.0:
+    elif kilometers > 6.0:
         power = 1.3
     else:
-        power = 0.585 * kilometres ** (1.0 / 3.0)
+        power = 0.585 * kilometers ** (1.0 / 3.0)
     return float(weather.fog_extinction * (WAVELENGTH / 0.55) ** -power + weather.precipitation_extinction)
 
 

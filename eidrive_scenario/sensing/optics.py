@@ -19,7 +19,7 @@ Floats = NDArray[np.float32]
 
 
 class _Bend(NamedTuple):
-    """The straight picture to take, and where each pixel of the bent one lies in it (pixel centres at integers)."""
+    """The straight picture to take, and where each pixel of the bent one lies in it (pixel centers at integers)."""
 
     straight: Pinhole
     x: Floats
@@ -61,7 +61,7 @@ class Optics:
 
 @lru_cache(maxsize=32)
 def _bend(settings: CameraSettings) -> _Bend:
-    """For each pixel centre, the direction that the lens shows there, found by iteration to 1e-9.
+    """For each pixel center, the direction that the lens shows there, found by iteration to 1e-9.
 
     Raise SettingError if the iteration does not converge, as with strong coefficients that compensate each other.
     """

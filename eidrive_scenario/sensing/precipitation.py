@@ -50,12 +50,12 @@ def drops_before(weather: Weather, pinhole: Pinhole, draws: np.random.Generator)
         number, slope, least, widening = 8000.0, 4.1 * amount**-0.21, 0.6, 1.0
     else:
         number, slope, least, widening = 3800.0 * amount**-0.87, 2.55 * amount**-0.48, 0.3, 8.0
-    per_cubic_metre = number / slope * math.exp(-slope * least)
+    per_cubic_meter = number / slope * math.exp(-slope * least)
     usual = (least + 1.0 / slope) * widening
     farthest = max(pinhole.focal * usual * 1e-3 / FAINTEST, 2.0 * NEAREST)
     half_x, half_y = 0.55 * pinhole.width / pinhole.focal, 0.65 * pinhole.height / pinhole.focal
     volume = 4.0 * half_x * half_y * farthest**3 / 3.0
-    count = min(int(draws.poisson(per_cubic_metre * volume)), MOST)
+    count = min(int(draws.poisson(per_cubic_meter * volume)), MOST)
     depth = farthest * np.maximum(draws.random(count), (NEAREST / farthest) ** 3) ** (1.0 / 3.0)
     places = np.stack(
         [draws.uniform(-half_x, half_x, count) * depth, draws.uniform(-half_y, half_y, count) * depth, depth]
@@ -134,8 +134,8 @@ def draw_drops_on_lens(luminance: Floats, weather: Weather, draws: np.random.Gen
 
 
 def _pixels(points: Array, pinhole: Pinhole) -> Array:
-    centre = np.array([pinhole.centre_x - 0.5, pinhole.centre_y - 0.5])
-    found: Array = points[:, :2] / points[:, 2:] * pinhole.focal + centre
+    center = np.array([pinhole.center_x - 0.5, pinhole.center_y - 0.5])
+    found: Array = points[:, :2] / points[:, 2:] * pinhole.focal + center
     return found
 
 

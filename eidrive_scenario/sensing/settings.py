@@ -1,4 +1,4 @@
-"""Settings of sensors as a person types them: metres, degrees, hertz."""
+"""Settings of sensors as a person types them: meters, degrees, hertz."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class SensorSettings(Settings):
 class TruthSettings(SensorSettings):
     """The sensor behind the oracle: exact boxes of what is in its line of sight.
 
-    range          to the centre of an object from the centre of the own body [m]
+    range          to the center of an object from the center of the own body [m]
     field_of_view  horizontal, about the mount's heading [degrees]
     visibility     least share of an object's sampled points that must be in sight
     """
@@ -87,13 +87,13 @@ def _noise(value: Any) -> Any:
 
 
 class CameraSettings(SensorSettings):
-    """A camera. Lengths in metres, `width` and `height` in pixels, times in seconds.
+    """A camera. Lengths in meters, `width` and `height` in pixels, times in seconds.
 
     fov            horizontal, of the picture without distortion [degrees]
     distortion     k1, k2, p1, p2, k3 of Brown and Conrady, as OpenCV has them
     near, far      what is nearer or farther is not drawn
     noise          of the sensor; None is a sensor without
-    exposure_time, gain   [s], [dB]; None is automatic, within longest_exposure and highest_gain
+    exposure_time, gain   [s], [dB]; None is automatic, within max_exposure_time and max_gain
     lens_drops     whether rain reaches the lens
     supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
     """
@@ -109,8 +109,8 @@ class CameraSettings(SensorSettings):
     f_number: Annotated[float, Field(ge=0.1, le=1000.0)] = 1.6
     exposure_time: Annotated[float, Field(ge=1e-9, le=100.0)] | None = None
     gain: Annotated[float, Field(ge=-20.0, le=80.0)] | None = None
-    longest_exposure: Annotated[float, Field(ge=1e-9, le=100.0)] = 0.03
-    highest_gain: float = Field(default=36.0, ge=0.0, le=80.0)
+    max_exposure_time: Annotated[float, Field(ge=1e-9, le=100.0)] = 0.03
+    max_gain: float = Field(default=36.0, ge=0.0, le=80.0)
     lens_drops: bool = True
     supersampling: int = Field(default=1, ge=1, le=4)
 
@@ -133,14 +133,14 @@ class CameraSettings(SensorSettings):
         k1, k2, p1, p2, k3 = self.distortion
         if not any(self.distortion):
             return self
-        decentring = 3.0 * math.hypot(p1, p2)
+        decentering = 3.0 * math.hypot(p1, p2)
         half = math.tan(math.radians(self.fov) / 2.0)
         corner = 1.1 * half * math.hypot(1.0, self.height / self.width)
         radius = distorted = 0.0
         for step in range(1, 401):
             radius = 4.0 * corner * step / 400
             square = radius * radius
-            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3))) - decentring * square
+            further = radius * (1.0 + square * (k1 + square * (k2 + square * k3))) - decentering * square
             if further <= distorted:
                 break
             distorted = further

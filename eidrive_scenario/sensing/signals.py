@@ -71,6 +71,6 @@ def signal_kind(signal: Signal) -> str | None:
 
 
 def is_stop_sign(signal: Signal) -> bool:
-    """Whether a sign tells to stop: 206 of the German catalogue, which OpenDRIVE files use, or R1-1 of the American."""
+    """Whether a sign tells to stop: 206 of the German catalog, which OpenDRIVE files use, or R1-1 of the American."""
     kind = signal.type.upper()
     return not signal.dynamic and (kind in ("206", "R1-1") or (kind == "R1" and signal.subtype == "1"))

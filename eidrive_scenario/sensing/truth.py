@@ -19,22 +19,22 @@ from eidrive_scenario.world.view import WorldView
 Array = NDArray[np.float64]
 
 INSET = 0.9
-"""The sampled corners lie at this share of the way from centre to corner, so that a ray to one meets the body."""
+"""The sampled corners lie at this share of the way from center to corner, so that a ray to one meets the body."""
 
 SAMPLES = np.array(
     [[x * INSET, y * INSET, z * INSET] for x in (1, -1) for y in (1, -1) for z in (1, -1)]
     + [[0.0, 0.0, 0.0], [0.0, 0.0, INSET]]
 )
-"""(10, 3) points of a box, in half lengths from its centre: eight corners, the centre, the middle of the top."""
+"""(10, 3) points of a box, in half lengths from its center: eight corners, the center, the middle of the top."""
 
 FEW_PAIRS, FEW_RAYS = 64, 80
 """Up to so many pairs of a sensor and an actor, and so many rays, plain numbers are faster than arrays."""
 
 
 class TruthSensor:
-    """Reports an object if its centre is within range and field of view and enough of its points are in sight.
+    """Reports an object if its center is within range and field of view and enough of its points are in sight.
 
-    Range is measured between the centres of the bodies; rays start at the mount and pass through the own body.
+    Range is measured between the centers of the bodies; rays start at the mount and pass through the own body.
     """
 
     def __init__(self, settings: TruthSettings, spec: ActorSpec, name: str = "truth") -> None:

@@ -27,7 +27,7 @@ class ExternalObjects:
         self.warnings = tuple(
             Diagnostic(
                 f"entity {name!r} refers to the external object {scenario.external[name].name!r}, "
-                "of which nothing is known here: a box of half a metre stands for it",
+                "of which nothing is known here: a box of half a meter stands for it",
                 "give it a Vehicle, Pedestrian or MiscObject",
                 scenario.external[name].source,
                 scenario.external[name].line,

@@ -55,7 +55,7 @@ class Storyboard:
         check_acyclic(self.context.actors)
         self._external = ExternalObjects(scenario, roads)
         self.context.warnings += self._external.warnings
-        self._stand_ins = build_controller_models(
+        self._controller_models = build_controller_models(
             self.context.actors, self.context, controllers or {}, registry("controllers")
         )
         self.context.warnings += unassigned_controller_warnings(self.context.actors, controllers or {})
@@ -74,7 +74,11 @@ class Storyboard:
 
     def give_pose(self, name: str, pose: Pose, speed: float) -> None:
         """Where an entity is after the next step, and its speed [m/s]. Raises SettingError if none waits for it."""
-        waiting = [stand_in.actor.name for stand_in in self._stand_ins if stand_in.accepts_external_poses]
+        waiting = [
+            controller_model.actor.name
+            for controller_model in self._controller_models
+            if controller_model.accepts_external_poses
+        ]
         if name not in waiting:
             what = f"nobody waits for poses of {name!r}"
             raise SettingError(Diagnostic(what, "let the stand-in `external` play its controller", "set_pose"))
@@ -103,9 +107,9 @@ class Storyboard:
         commands = self.context.commands
         trains = self._bring_trailers()
         self._refresh(commands)
-        for stand_in in self._stand_ins:
-            if stand_in.actor.present and not stand_in.actor.driven:
-                stand_in.step()
+        for controller_model in self._controller_models:
+            if controller_model.actor.present and not controller_model.actor.driven:
+                controller_model.step()
         drawn = {back.name for _, back in trains}
         for name, actor in self.context.actors.items():
             if not actor.present or name in drawn:

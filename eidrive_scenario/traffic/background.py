@@ -44,7 +44,7 @@ class BackgroundTraffic:
 
     Cars are called after their traffic, `<name>.0001` and on; no name is used twice in a run.
 
-    centre     where an entity is and moves, None while it is not in the world
+    center     where an entity is and moves, None while it is not in the world
     taken      names that nobody else may have
     must_stop  what the traffic lights say
     """
@@ -54,14 +54,14 @@ class BackgroundTraffic:
         roads: RoadNetwork,
         *,
         seed: int,
-        centre: Callable[[str], CentralObject | None],
+        center: Callable[[str], CentralObject | None],
         taken: frozenset[str] = frozenset(),
         must_stop: MustStop | None = None,
     ) -> None:
         self.seed = seed
         self.fleet = Fleet(roads, seed=seed, must_stop=must_stop)
         self.ground = SpawnAreas(self.fleet.lanes)
-        self.centre = centre
+        self.center = center
         self.time = 0.0
         self.dt = 0.0
         self.instances: list[TrafficGenerator] = []

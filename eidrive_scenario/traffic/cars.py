@@ -35,7 +35,7 @@ class Cars:
     own_speed     desired speed, NaN for the limit [m/s];  factor  of the limit that the car keeps to
     top_speed     what the vehicle can do [m/s]
     fallback      desired speed where the map gives no limit [m/s]
-    offset        left of the lane's centre [m];  slope  of the path against it, left positive
+    offset        left of the lane's center [m];  slope  of the path against it, left positive
     shift         offset at the start of a lane change [m];  shift_done, shift_length  of its way [m]
     plan          rows of the lanes that the car takes, its own first, -1 beyond the end
     granted       which of them, in junctions, it may enter

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from eidrive_scenario.traffic.lanes import Array, TrafficLanes
 
 CLEARANCE = 3.2
-"""Two lanes meet where their centre lines come closer than this: less than lanes side by side have, more than two cars
+"""Two lanes meet where their center lines come closer than this: less than lanes side by side have, more than two cars
 need whose ends swing out in bends [m]."""
 FORK = 9.0
 """From here on two lanes that begin together lie apart [m]."""
@@ -65,7 +65,7 @@ class Crossings:
 
     @cached_property
     def _lines(self) -> tuple[dict[int, Array], Array, Array]:
-        """The centre lines (K, 2) of all lanes in junctions, and the corners of the boxes around those of all lanes."""
+        """The center lines (K, 2) of all lanes in junctions, and the corners of the boxes around those of all lanes."""
         lanes = self._lanes
         inside = np.array([row for group in self._by_junction.values() for row in group], dtype=np.int64)
         counts = np.maximum((lanes.length[inside] / SAMPLE).astype(np.int64), 1) + 1

@@ -39,7 +39,7 @@ REACT_EACH = 0.05
 class Fleet:
     """Cars on the lanes of a road network.
 
-    Each follows the lane's centre with the Intelligent Driver Model, slows down for bends, takes a branch at a fork by
+    Each follows the lane's center with the Intelligent Driver Model, slows down for bends, takes a branch at a fork by
     its own stream of random numbers (seed, name), and enters a junction only when the lanes that it meets are free and
     its light, if any, lets it. Lanes are changed by MOBIL. A car that reaches the end of the lanes leaves: `departed`
     names it.
@@ -138,7 +138,7 @@ class Fleet:
         desired_speed: float | None = None,
         driver: IntelligentDriver | None = None,
     ) -> Placement:
-        """Bring a car in at a lane's centre line; without a desired speed it drives at the limit.
+        """Bring a car in at a lane's center line; without a desired speed it drives at the limit.
 
         Raises PositionError for a lane that does not exist, ValueError for a name that is taken.
         """

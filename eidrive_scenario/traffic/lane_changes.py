@@ -25,7 +25,7 @@ LAST_CHANCE = 50.0
 DECIDE_EACH = 0.5
 """A driver thinks of changing lanes as often [s]."""
 SETTLED = 0.3
-"""This near the centre of its lane a car may think of the next change [m]."""
+"""This near the center of its lane a car may think of the next change [m]."""
 ROOM = 60.0
 """Of two cars that would change into the same lane at once, this near each other, only one does [m]."""
 
@@ -43,7 +43,7 @@ class LaneChanges:
     ) -> list[tuple[int, int]]:
         """Cars among `who` that change lanes now, and to which lane; the most eager first.
 
-        leaders, desired  of all cars;  to_junction  (N,) metres to the next junction, inf if there is none in sight
+        leaders, desired  of all cars;  to_junction  (N,) meters to the next junction, inf if there is none in sight
         """
         lanes, row = self._lanes, cars.row[who]
         found: list[tuple[float, int, int]] = []
@@ -118,11 +118,11 @@ class LaneChanges:
 
     @staticmethod
     def length(speed: Array) -> Array:
-        """Metres that a lane change takes at speeds (N,) [m/s]."""
+        """Meters that a lane change takes at speeds (N,) [m/s]."""
         return np.maximum(speed * DURATION, SHORTEST)
 
     def begin(self, cars: Cars, index: int, target: int) -> None:
-        """Let a car begin its change: it belongs to the new lane from now on, still beside its centre."""
+        """Let a car begin its change: it belongs to the new lane from now on, still beside its center."""
         rows, progress = cars.row[[index]], cars.progress[[index]]
         apart = float(self._lanes.apart(rows, np.array([target]), progress)[0])
         cars.offset[index] -= apart
@@ -131,7 +131,7 @@ class LaneChanges:
         cars.shift_length[index] = float(self.length(cars.speed[[index]])[0])
 
     def advance(self, cars: Cars, covered: Array) -> None:
-        """Move those who change sideways while they cover metres (N,): a path of least jerk, as a quintic has it."""
+        """Move those who change sideways while they cover meters (N,): a path of least jerk, as a quintic has it."""
         who = np.flatnonzero(cars.changing)
         if not who.size:
             return

@@ -27,7 +27,7 @@ WALKABLE = frozenset(("sidewalk", "walking"))
 class TrafficLanes:
     """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction.
 
-    left, right   the neighbour of the same direction to which the marking lets cars change, -1 where there is none
+    left, right   the neighbor of the same direction to which the marking lets cars change, -1 where there is none
     beside_left, beside_right  the same, whatever the marking
     onward, backward  the first lane that a lane leads to, and that leads to it, -1 where there is none
     ends_at       progress at which a lane comes to an end while one beside it goes on, inf for all others
@@ -53,7 +53,7 @@ class TrafficLanes:
         self._ways: list[list[int]] = []
         self._link()
         self.left, self.right, self.beside_left, self.beside_right = (np.full(len(self.keys), -1) for _ in range(4))
-        self._join_neighbours()
+        self._join_neighbors()
         self.ends_at = np.full(len(self.keys), np.inf)
         self._find_ends()
         self._tightest = np.full(len(self.keys), np.nan)
@@ -81,7 +81,7 @@ class TrafficLanes:
                 if self.backward[other] < 0:
                     self.backward[other] = row
 
-    def _join_neighbours(self) -> None:
+    def _join_neighbors(self) -> None:
         for road in self.tables.roads:
             if road.junction_id is not None:
                 continue
@@ -101,7 +101,7 @@ class TrafficLanes:
                         self.left[one], self.right[two] = (two if outward else -1), (one if inward else -1)
 
     def _may_cross(self, one: int, two: int) -> tuple[bool, bool]:
-        """Whether the marking between neighbours, `one` left of `two` along s, lets cars from one to two, and back.
+        """Whether the marking between neighbors, `one` left of `two` along s, lets cars from one to two, and back.
 
         It is the marking on the outer edge of the lane nearer to lane 0. `increase` lets cars change to the higher id.
         """
@@ -136,7 +136,7 @@ class TrafficLanes:
         return self.tables.width.value(row, ds)
 
     def apart(self, row: Integers, other: Integers, progress: Array) -> Array:
-        """How far left of the driving direction the centre of `other` lies from that of `row`, of one section [m]."""
+        """How far left of the driving direction the center of `other` lies from that of `row`, of one section [m]."""
         s = self.s(row, progress)
         return (self.tables.lane_t(other, s)[0] - self.tables.lane_t(row, s)[0]) * self.direction[row]
 
@@ -161,7 +161,7 @@ class TrafficLanes:
         return self._ways[row]
 
     def stretch(self, row: Integers, progress: Array) -> Array:
-        """Metres of path per metre of progress, at the lanes' centre lines."""
+        """Meters of path per meter of progress, at the lanes' center lines."""
         return self.tables.stretch(row, self.s(row, progress))
 
     def tightest(self, row: Integers) -> Array:

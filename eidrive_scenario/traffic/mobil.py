@@ -1,4 +1,4 @@
-"""MOBIL, minimising overall braking induced by lane changes.
+"""MOBIL, minimizing overall braking induced by lane changes.
 
 Kesting, Treiber and Helbing, General lane-changing model MOBIL for car-following models, Transportation Research
 Record 1999 (2007) 86.
@@ -21,7 +21,7 @@ class LaneChanger:
     politeness         p, the weight of the others' disadvantage, from 0 (egoistic) to 1 (altruistic)
     threshold          Δa_th, the smallest advantage worth a lane change [m/s²]
     safe_deceleration  b_safe, what the new follower can be asked for [m/s²]
-    bias               Δa_bias, in favour of the lane on the side of slow traffic [m/s²]
+    bias               Δa_bias, in favor of the lane on the side of slow traffic [m/s²]
     """
 
     politeness: float = 0.5

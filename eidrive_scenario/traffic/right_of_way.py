@@ -84,7 +84,7 @@ class RightOfWay:
                 cars.granted[index] = False
 
     def _distances(self, cars: Cars, begins: Array) -> Array:
-        """(N,) metres to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
+        """(N,) meters to the first junction lane ahead that a car may not enter yet, inf if there is none in sight."""
         barred = (cars.plan >= 0) & self._lanes.in_junction[cars.plan] & ~cars.granted & ~cars.walks[:, None]
         barred[:, 0] = False
         distance = np.where(barred, begins, np.inf).min(axis=1)

@@ -29,7 +29,7 @@ class ActorSpec:
 
     shape   which mesh shows it: car, firetruck, ambulance, bus, van, truck, motorbike, bicycle, pedestrian, rsu, box
     category  one of eidrive_scenario.detections.CLASSES
-    size    length, width, height [m];  offset  box centre in the actor's frame [m]
+    size    length, width, height [m];  offset  box center in the actor's frame [m]
     """
 
     name: str
@@ -49,7 +49,7 @@ class ActorSpec:
     max_acceleration: float = 10.0
     max_deceleration: float = 10.0
     properties: Mapping[str, str] = field(default_factory=dict)
-    colour: tuple[float, float, float] | None = None
+    color: tuple[float, float, float] | None = None
     """Body paint, red green blue in [0, 1]; by the name where None."""
 
 

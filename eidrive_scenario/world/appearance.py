@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 FLASH = 0.5
 """How long a flashing light is on, and off, where nobody says so [s]."""
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class LightState:
     mode: str
     intensity: float | None = None
     """Luminous intensity [cd]."""
-    colour: Colour | None = None
+    color: Color | None = None
     """Red, green, blue in [0, 1]."""
     since: float = 0.0
     fade: float = 0.0

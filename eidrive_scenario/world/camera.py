@@ -27,14 +27,14 @@ class CameraImage(NamedTuple):
 class Pinhole:
     """A camera without distortion, square pixels. Pixel (j, i) covers [j, j + 1) x [i, i + 1) of the picture's plane.
 
-    focal, centre_x, centre_y [px]; near, far along the optical axis [m]
+    focal, center_x, center_y [px]; near, far along the optical axis [m]
     """
 
     width: int
     height: int
     focal: float
-    centre_x: float
-    centre_y: float
+    center_x: float
+    center_y: float
     near: float = 0.1
     far: float = 500.0
 
@@ -45,13 +45,13 @@ class Pinhole:
 
     def finer(self, times: float) -> Pinhole:
         """The same view on `times` as many pixels along each axis."""
-        lens = (self.focal * times, self.centre_x * times, self.centre_y * times)
+        lens = (self.focal * times, self.center_x * times, self.center_y * times)
         return Pinhole(round(self.width * times), round(self.height * times), *lens, self.near, self.far)
 
     @property
     def intrinsics(self) -> Array:
         """(3, 3) from camera coordinates to pixels."""
-        return np.array([[self.focal, 0.0, self.centre_x], [0.0, self.focal, self.centre_y], [0.0, 0.0, 1.0]])
+        return np.array([[self.focal, 0.0, self.center_x], [0.0, self.focal, self.center_y], [0.0, 0.0, 1.0]])
 
 
 class Radiance(NamedTuple):

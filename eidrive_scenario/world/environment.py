@@ -12,7 +12,7 @@ class Environment:
 
     date_time      ISO 8601, of the instant `clock_since` [s] of the run
     clock_runs     False: the time of day stands still
-    friction       scales the grip of tyres, 1 on a dry road
+    friction       scales the grip of tires, 1 on a dry road
     wetness, clouds, precipitation   as the standard names them
     precipitation_intensity [mm/h], precipitation_share in [0, 1] (files of 1.0)
     fog_range      visual range [m];  illuminance of the sun [lx]

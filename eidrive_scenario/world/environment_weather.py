@@ -12,7 +12,7 @@ from eidrive_scenario.world.weather import Weather
 LATITUDE = 48.0
 """Where the sun's height is reckoned from a time of day alone [degrees]; the clock then shows the sun's time."""
 LEAST_FRICTION = 1e-3
-"""The standard allows a road without any friction; tyres need a little."""
+"""The standard allows a road without any friction; tires need a little."""
 HURRICANE = 100.0
 """Wind that is stronger blows as strong as this [m/s]."""
 CLEAR = 1e6

@@ -14,14 +14,14 @@ SHAPES = (
     "car", "firetruck", "ambulance", "bus", "van", "truck", "motorbike", "bicycle", "pedestrian", "rsu", "box",
 )  # fmt: skip
 SHAPE_PROPERTY = "eidrive.shape"
-COLOUR_PROPERTY = "eidrive.colour"
+COLOR_PROPERTY = "eidrive.color"
 
 _WORDS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("firetruck", ("firetruck", "fire_truck", "fireengine", "fire_engine", "firebrigade")),
     ("ambulance", ("ambulance",)),
     ("bus", ("bus", "fusorosa", "coach")),
     ("van", ("van", "sprinter", "transporter")),
-    ("truck", ("truck", "lorry", "semi", "trailer", "carlacola")),
+    ("truck", ("truck", "truck", "semi", "trailer", "carlacola")),
     ("motorbike", ("motorbike", "motorcycle", "mc", "harley", "yamaha", "vespa", "kawasaki")),
     ("bicycle", ("bicycle", "bike", "cyclist", "crossbike", "gazelle", "omafiets")),
     ("pedestrian", ("pedestrian", "walker", "person", "adult", "child")),
@@ -69,12 +69,12 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
     """The body of the actor `name`, as its Vehicle, Pedestrian or MiscObject says.
 
     Its shape is the Property `eidrive.shape`, or else follows from the category, the name and the 3D model; its paint
-    is the Property `eidrive.colour` (`#rrggbb`). A dimension of 0, with which some catalogs leave the box open, becomes
+    is the Property `eidrive.color` (`#rrggbb`). A dimension of 0, with which some catalogs leave the box open, becomes
     that of a common body of this shape. Raises ScenarioError with the line of the wrong Property or dimension.
     """
     properties = {entry.name: entry.value for entry in entity.properties.property} if entity.properties else {}
     shape = _shape(entity, properties)
-    dimensions, centre = entity.bounding_box.dimensions, entity.bounding_box.center
+    dimensions, center = entity.bounding_box.dimensions, entity.bounding_box.center
     given = (dimensions.length, dimensions.width, dimensions.height)
     if min(given) < 0.0:
         what = f"the bounding box of {name!r} is {given[0]:g} x {given[1]:g} x {given[2]:g} m"
@@ -88,10 +88,10 @@ def actor_spec(name: str, entity: Vehicle | Pedestrian | MiscObject) -> ActorSpe
         shape=shape,
         category=_CATEGORIES.get(shape, shape),
         size=(length, width, height),
-        offset=(centre.x, centre.y, centre.z + lift),
+        offset=(center.x, center.y, center.z + lift),
         mass=entity.mass or _USUAL_MASS.get(shape, 80.0),
         properties=properties,
-        colour=_colour(entity, properties),
+        color=_color(entity, properties),
     )
     return _with_axles(common, entity) if isinstance(entity, Vehicle) else common
 
@@ -143,7 +143,7 @@ def _shape(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]
 
 
 def _words(entity: Vehicle | MiscObject) -> set[str]:
-    """The words in the entity's name and 3D model, single and in neighbouring pairs."""
+    """The words in the entity's name and 3D model, single and in neighboring pairs."""
     words: set[str] = set()
     for text in (entity.name, (entity.model3d or "").rsplit("/", 1)[-1]):
         parts = [part.lower() for part in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)]
@@ -152,13 +152,13 @@ def _words(entity: Vehicle | MiscObject) -> set[str]:
     return words
 
 
-def _colour(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> Vector3 | None:
-    text = properties.get(COLOUR_PROPERTY)
+def _color(entity: Vehicle | Pedestrian | MiscObject, properties: dict[str, str]) -> Vector3 | None:
+    text = properties.get(COLOR_PROPERTY)
     if text is None:
         return None
     if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
-        line, source = _place(entity, COLOUR_PROPERTY)
-        raise ScenarioError(Diagnostic(f"colour {text!r} is not understood", "write it as #rrggbb", source, line))
+        line, source = _place(entity, COLOR_PROPERTY)
+        raise ScenarioError(Diagnostic(f"color {text!r} is not understood", "write it as #rrggbb", source, line))
     red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue
 

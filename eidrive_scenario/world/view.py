@@ -55,14 +55,14 @@ class ActorState(NamedTuple):
 class WorldView:
     """All actors at time `time` [s]; one row per actor, in the order in which they entered the world.
 
-    position      (N, 3) of the reference point (OpenSCENARIO: rear axle centre on the ground for vehicles) [m]
+    position      (N, 3) of the reference point (OpenSCENARIO: rear axle center on the ground for vehicles) [m]
     yaw pitch roll  (N,) [rad]; right-handed, x forward, y left, z up; pitch positive nose down (z-y'-x'' rotation)
     velocity      (N, 3) of the reference point, world frame [m/s]
     acceleration  (N, 3) world frame [m/s²]
     yaw_rate      (N,) [rad/s]
     speed         (N,) along the heading, negative backwards [m/s]
     size          (N, 3) length, width, height of the bounding box [m]
-    offset        (N, 3) box centre in the actor's frame [m]
+    offset        (N, 3) box center in the actor's frame [m]
     contacts      touches that began during the step that led here
     unseen        actors that sensors do not see, as the scenario says
     unseen_by     the same for the sensors of these names, of whom it says something else
@@ -135,8 +135,8 @@ class WorldView:
             raise KeyError(f"actor {name!r} is not in the world at {self.time:.2f} s") from None
 
     @property
-    def centres(self) -> Array:
-        """(N, 3) centres of the bounding boxes in the world frame [m]; pitch and roll neglected."""
+    def centers(self) -> Array:
+        """(N, 3) centers of the bounding boxes in the world frame [m]; pitch and roll neglected."""
         return self.boxes[:, :3]
 
     @cached_property
@@ -150,13 +150,13 @@ class WorldView:
 
     @cached_property
     def boxes(self) -> Array:
-        """(N, 7) x y z l w h yaw of the bounding boxes, centre in the world frame [m, rad]."""
+        """(N, 7) x y z l w h yaw of the bounding boxes, center in the world frame [m, rad]."""
         if 0 < len(self.names) <= FEW:
             return np.array(self.plain_boxes)
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T
-        centres = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
-        return np.concatenate([centres, self.size, self.yaw[:, None]], axis=1)
+        centers = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
+        return np.concatenate([centers, self.size, self.yaw[:, None]], axis=1)
 
 
 def _box(state: ActorState, offset: list[float], size: list[float]) -> tuple[float, ...]:

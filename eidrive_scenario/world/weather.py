@@ -46,7 +46,7 @@ class Weather(Settings):
     visual_range   Koschmieder's, of the air without precipitation [m]; fog below 1000
     precipitation, precipitation_intensity  what falls, and how much water [mm/h]
     wetness        of the road: 0 dry, 0.25 moist, 0.5 wet with puddles, 0.75 and 1 flooded
-    friction       grip of the tyres as a share of that on a dry road; None is what wetness and snow leave
+    friction       grip of the tires as a share of that on a dry road; None is what wetness and snow leave
     wind_direction, wind_speed  where the wind blows to, 0 along x, 90 along y [degrees]; [m/s]
     street_lighting  illuminance on the roads by lamps that stand there, at night [lx]
     headlights     `auto` lights those of vehicles when it is dark or the air is thick
@@ -102,7 +102,7 @@ class Weather(Settings):
 
     @property
     def friction_scale(self) -> float:
-        """Grip of the tyres as a share of that on a dry road."""
+        """Grip of the tires as a share of that on a dry road."""
         if self.friction is not None:
             return self.friction
         if self.precipitation == "snow" and self.precipitation_intensity > 0.0:

@@ -135,7 +135,7 @@ class World:
         self._changed()
 
     def set_friction(self, scale: float) -> None:
-        """Scale the grip of all tyres: 1 on a dry road, less on a wet one."""
+        """Scale the grip of all tires: 1 on a dry road, less on a wet one."""
         if not scale > 0.0:
             raise SettingError(Diagnostic(f"the road's friction scale is {scale:g}", "give a number above 0"))
         self._friction = scale
@@ -146,7 +146,7 @@ class World:
         return self._weather
 
     def set_weather(self, weather: Weather) -> None:
-        """Another weather from now on, its grip on the tyres included."""
+        """Another weather from now on, its grip on the tires included."""
         self._weather = weather
         self._friction = weather.friction_scale
 
@@ -170,10 +170,10 @@ class World:
         return {FIRST_LABEL - row: head.signal.id for row, head in enumerate(heads)}
 
     def add_building(
-        self, name: str, centre: Vector3, size: Vector3, yaw: float = 0.0, colour: Vector3 | None = None
+        self, name: str, center: Vector3, size: Vector3, yaw: float = 0.0, color: Vector3 | None = None
     ) -> None:
-        """Put up a building: a box around `centre` [m], length, width, height [m], that stops vehicles and rays."""
-        self._scenery.add_building(name, centre, size, yaw, colour)
+        """Put up a building: a box around `center` [m], length, width, height [m], that stops vehicles and rays."""
+        self._scenery.add_building(name, center, size, yaw, color)
         self._changed()
 
     def step(self, placements: Mapping[str, Placement], controls: Mapping[str, Control]) -> None:

@@ -29,7 +29,7 @@ SCENARIO = """<OpenSCENARIO>
   <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
   <Entities>{cars}</Entities>
   <Storyboard><Init><Actions>{everywhere}
-    <Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private></Actions></Init>
+    <Private entitiref="Ego">{ego}</Private><Private entitiref="Other">{other}</Private></Actions></Init>
     {story}</Storyboard></OpenSCENARIO>"""
 
 CRUISE = """<ObjectController><Controller name="cruise" controllerType="movement"><Properties>{properties}</Properties>
@@ -63,7 +63,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
     """Plays actions: `play(seconds, (actor, action, condition), …, ego=(lane, s, speed), other=…)`.
 
     Actions start at once without a condition. `driven` gives Ego an eidrive controller; nothing then moves it. `cruise`
-    gives it one of another tool, with these properties, for which an adaptive cruise control or `stand_in` stands in.
+    gives it one of another tool, with these properties, which adaptive cruise control or `controller_model` executes.
     `brakes` is the largest deceleration of the vehicles [m/s²], `performance` are further limits of theirs. Each action
     may start so many times as `executions` says.
     """
@@ -77,7 +77,7 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         dt: float = 0.1,
         driven: bool = False,
         cruise: str | None = None,
-        stand_in: str = "adaptive_cruise",
+        controller_model: str = "adaptive_cruise",
         everywhere: str = "",
         edge: str = "none",
         performance: str = "",
@@ -98,7 +98,9 @@ def scene(tmp_path: Path) -> Callable[..., Played]:
         path.write_text(text)
         scenario = load_scenario(path)
         assert scenario.road_file is not None
-        storyboard = Storyboard(scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": stand_in})
+        storyboard = Storyboard(
+            scenario, RoadNetwork.load(scenario.road_file), dt=dt, controllers={"cruise": controller_model}
+        )
         world, played = KinematicWorld(scenario, dt), Played(dt)
         first = storyboard.initial()
         world.add(first.spawns)

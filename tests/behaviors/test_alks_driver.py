@@ -28,7 +28,13 @@ def test_behind_a_car_that_brakes_to_a_stop_none_of_them_hits_it(scene: Any, mod
     stop = ("Other", BRAKE.format(rate=6, speed=0), after(1))
     steps = (("Ego", ON), stop)
     played = scene(
-        20, *steps, cruise=said(model=model), stand_in="alks", ego=(-1, 100.0, 20.0), other=(-1, 145.0, 20.0), dt=0.05
+        20,
+        *steps,
+        cruise=said(model=model),
+        controller_model="alks",
+        ego=(-1, 100.0, 20.0),
+        other=(-1, 145.0, 20.0),
+        dt=0.05,
     )
     gaps = [rows["Other"].x - rows["Ego"].x - 5.0 for rows in played.rows]
     assert min(gaps) > 0.5
@@ -40,7 +46,7 @@ def test_it_brakes_for_a_slower_car_that_cuts_in_and_not_for_one_that_stays_besi
     properties = said(model=model, cruise="false", cutInPerceptionDelayMode="Time")
     scenery: dict[str, Any] = {
         "cruise": properties,
-        "stand_in": "alks",
+        "controller_model": "alks",
         "ego": (-1, 100.0, 20.0),
         "other": (-2, 140.0, 10.0),
         "dt": 0.05,
@@ -56,15 +62,15 @@ def test_on_a_free_road_it_returns_to_its_set_speed_at_2_m_s2(scene: Any) -> Non
         private("""<ControllerAction><ActivateControllerAction longitudinal="false"/></ControllerAction>"""),
     )
     steps = (("Ego", ON), (*slower, after(1)), ("Ego", BRAKE.format(rate=10, speed=10), after(1)))
-    played = scene(3, *steps, cruise=said(model="FSM"), stand_in="alks", other=(1, 900.0, 1.0))
+    played = scene(3, *steps, cruise=said(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0))
     assert played.at(3).speed == pytest.approx(10.0)
     faster = ("Ego", BRAKE.format(rate=10, speed=30), after(1))
-    played = scene(4, ("Ego", ON), faster, cruise=said(model="FSM"), stand_in="alks", other=(1, 900.0, 1.0))
+    played = scene(4, ("Ego", ON), faster, cruise=said(model="FSM"), controller_model="alks", other=(1, 900.0, 1.0))
     assert played.at(4).speed == pytest.approx(30.0)
 
 
 def test_an_unknown_model_is_an_error_with_the_nearest_name(scene: Any) -> None:
     with pytest.raises(ScenarioError, match="did you mean 'ReferenceDriver'"):
-        scene(1, cruise=said(model="ReferenzDriver"), stand_in="alks")
+        scene(1, cruise=said(model="ReferenzDriver"), controller_model="alks")
     with pytest.raises(ScenarioError, match="aebTTC = 'soon'"):
-        scene(1, cruise=said(aebTTC="soon"), stand_in="alks")
+        scene(1, cruise=said(aebTTC="soon"), controller_model="alks")

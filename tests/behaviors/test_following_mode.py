@@ -101,7 +101,7 @@ def test_a_tracker_settles_on_a_moving_value_within_its_bound(start: float, rate
 
 
 @pytest.mark.element("LaneChangeAction")
-def test_a_step_to_the_side_takes_the_time_that_the_tyres_need(scene: Any) -> None:
+def test_a_step_to_the_side_takes_the_time_that_the_tires_need(scene: Any) -> None:
     """4 m with 10 m/s², half of it to gain speed sideways: 2 · √(4 / 10) s = 1.26 s."""
     played = scene(3, ("Ego", change("step", 0, "follow")), dt=0.01)
     y = [row["Ego"].y for row in played.rows]
@@ -146,7 +146,7 @@ def test_a_vehicle_drives_to_its_trajectory_from_where_it_is(scene: Any) -> None
 
 
 def test_on_a_bend_that_the_car_can_drive_both_modes_are_the_same(scene: Any) -> None:
-    """Corners of 0.1 rad, which a polyline takes within 4 m: 0.025 per metre."""
+    """Corners of 0.1 rad, which a polyline takes within 4 m: 0.025 per meter."""
     points, heading = [(100.0, -2.0)], 0.0
     for _ in range(6):
         points.append((points[-1][0] + 10.0 * math.cos(heading), points[-1][1] + 10.0 * math.sin(heading)))

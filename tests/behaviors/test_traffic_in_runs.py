@@ -242,7 +242,7 @@ def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
         ),
         (swarm(more='<DirectionOfTravelDistribution same="0" opposite="0"/>'), "shares 0, 0"),
         (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), "speeds from 9 to 3"),
-        (swarm(centre="Egon"), "Egon"),
+        (swarm(center="Egon"), "Egon"),
         (swarm(more=distribution((0.0, PEDESTRIAN))), "are no shares"),
         (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "no road '9'"),
         (
@@ -281,7 +281,7 @@ def test_traffic_needs_roads(run: Run, tmp_path: Path) -> None:
 def test_a_collision_with_any_vehicle_counts_traffic_too(run: Run) -> None:
     """Ego follows a car that has just come from a source at 5 m/s, and speeds up into it."""
     touch = (
-        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
+        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>'
         '</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="vehicle"/></CollisionCondition>'
         "</EntityCondition></ByEntityCondition>"
     )

@@ -82,7 +82,7 @@ def test_lights_and_animations_are_in_the_frames(run: Any) -> None:
     played = run(2, ("Ego", light, after(0.3)), ("Ego", door, after(0.5)))
     looks = played.frames[-1].appearances["Ego"]
     beacon = looks.lights["rotating beacon"]
-    assert (beacon.mode, beacon.colour, beacon.intensity, beacon.since) == (
+    assert (beacon.mode, beacon.color, beacon.intensity, beacon.since) == (
         "flashing",
         (0, 0, 1),
         40.0,
@@ -102,16 +102,16 @@ def test_lights_and_animations_are_in_the_frames(run: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("colour", "expected"),
+    ("color", "expected"),
     [
         ('colorType="other"><ColorRgb red="0.1" green="0.2" blue="0.3"/>', (0.1, 0.2, 0.3)),
         ('colorType="other"><ColorCmyk cyan="0.5" magenta="0" yellow="1" key="0.5"/>', (0.25, 0.5, 0.0)),
     ],
 )
-def test_colours_of_lights(run: Any, colour: str, expected: tuple[float, ...]) -> None:
+def test_colors_of_lights(run: Any, color: str, expected: tuple[float, ...]) -> None:
     light = private(f"""<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="highBeam"/>
-      </LightType><LightState mode="on"><Color {colour}</Color></LightState></LightStateAction></AppearanceAction>""")
-    found = run(0.2, ("Ego", light)).frames[-1].appearances["Ego"].lights["highBeam"].colour
+      </LightType><LightState mode="on"><Color {color}</Color></LightState></LightStateAction></AppearanceAction>""")
+    found = run(0.2, ("Ego", light)).frames[-1].appearances["Ego"].lights["highBeam"].color
     assert found == pytest.approx(expected)
 
 

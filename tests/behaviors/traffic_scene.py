@@ -47,12 +47,12 @@ def distribution(*entities: tuple[float, str]) -> str:
 
 
 def swarm(
-    count: int = 12, *, centre: str = "Ego", inner: float = 30, reach: float = 150, more: str = "", **given: str
+    count: int = 12, *, center: str = "Ego", inner: float = 30, reach: float = 150, more: str = "", **given: str
 ) -> str:
     attributes = "".join(f' {name}="{value}"' for name, value in given.items())
     return (
         f'<TrafficSwarmAction innerRadius="{inner}" semiMajorAxis="{reach}" semiMinorAxis="60" offset="0" '
-        f'numberOfVehicles="{count}"{attributes}><CentralObject entityRef="{centre}"/>{more}</TrafficSwarmAction>'
+        f'numberOfVehicles="{count}"{attributes}><CentralObject entitiref="{center}"/>{more}</TrafficSwarmAction>'
     )
 
 

@@ -1,4 +1,4 @@
-"""Our reader against ASAM's schemas: the same judgement, valid or invalid, on every file and on 3,300 mutants of them.
+"""Our reader against ASAM's schemas: the same judgment, valid or invalid, on every file and on 3,300 mutants of them.
 
 The schemas and the files are in the folder that EIDRIVE_CORPORA names. Where the two do not agree, a table that the
 test prints says on what, how often, and why; a disagreement that it does not explain fails.

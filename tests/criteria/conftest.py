@@ -12,7 +12,7 @@ from eidrive_scenario.api import Contact, Frame, WorldView
 
 
 class Car(NamedTuple):
-    """An actor for a hand-made frame: box centre [m], yaw [rad], speed along the heading [m/s]; box 4 x 2 x 1.5 m."""
+    """An actor for a hand-made frame: box center [m], yaw [rad], speed along the heading [m/s]; box 4 x 2 x 1.5 m."""
 
     x: float
     y: float = 0.0
@@ -30,7 +30,7 @@ def car() -> type[Car]:
 
 @pytest.fixture
 def frame() -> MakeFrame:
-    """`frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box centre on the ground."""
+    """`frame(time, {"Ego": Car(…)}, contacts=[…])`; the reference point is the box center on the ground."""
 
     def make(time: float, cars: Mapping[str, Car], contacts: Sequence[Contact] = ()) -> Frame:
         table = np.array(list(cars.values()), dtype=float).reshape(-1, 4)

@@ -14,20 +14,20 @@ def criterion(**settings: Any) -> MinDistance:
 
 
 def passing(frame: Any, car: Any) -> list[Any]:
-    """Incoming crosses from left to right, 10 m ahead at first, 5 m ahead of the Ego's centre at 2 s, then away."""
+    """Incoming crosses from left to right, 10 m ahead at first, 5 m ahead of the Ego's center at 2 s, then away."""
     places = [car(10, 10, -math.pi / 2), car(8, 4, -math.pi / 2), car(5, 0, -math.pi / 2), car(5, -8, -math.pi / 2)]
     return [frame(float(second), {"Ego": car(0), "Incoming": place}) for second, place in enumerate(places)]
 
 
-def test_centre_and_box(frame: Any, car: Any) -> None:
-    distance = criterion(measure="centre")
+def test_center_and_box(frame: Any, car: Any) -> None:
+    distance = criterion(measure="center")
     (verdict,) = evaluate_criteria(passing(frame, car), [distance])
     # Square on at 2 s: half of Ego's length is 2 m, half of Incoming's width 1 m.
     assert verdict == Verdict(
-        "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (centre to centre) at 2.00 s"
+        "min_distance", True, 5.0, None, "m", None, "Ego and Incoming came within 5.00 m (center to center) at 2.00 s"
     )
     assert distance.metrics() == {
-        "min_distance.Ego.Incoming.centre": 5.0,
+        "min_distance.Ego.Incoming.center": 5.0,
         "min_distance.Ego.Incoming.box": pytest.approx(2.0),
         "min_distance.Ego.Incoming.time": 2.0,
     }
@@ -35,7 +35,7 @@ def test_centre_and_box(frame: Any, car: Any) -> None:
 
 @pytest.mark.parametrize(
     ("measure", "at_least", "violated"),
-    [("centre", 5.0, None), ("centre", 5.01, 2.0), ("centre", 9.0, 1.0), ("box", 1.99, None), ("box", 2.01, 2.0)],
+    [("center", 5.0, None), ("center", 5.01, 2.0), ("center", 9.0, 1.0), ("box", 1.99, None), ("box", 2.01, 2.0)],
 )
 def test_limit(frame: Any, car: Any, measure: str, at_least: float, violated: float | None) -> None:
     (verdict,) = evaluate_criteria(passing(frame, car), [criterion(measure=measure, at_least=at_least)])
@@ -55,7 +55,7 @@ def test_min_distance_of_a_crash_fails_every_limit_by_default(frame: Any, car: A
     """Square on the middle of the other's side: the centers stay 3 m apart."""
     crash = [frame(0.0, {"Ego": car(0), "Incoming": car(3, 0, math.pi / 2)})]
     assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=0.01)])] == [False]
-    assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=2.9, measure="centre")])] == [
+    assert [verdict.passed for verdict in evaluate_criteria(crash, [criterion(at_least=2.9, measure="center")])] == [
         True
     ]
 

@@ -37,7 +37,7 @@ def test_reaching_is_fatal_only_when_it_is_too_late(frame: Any, car: Any) -> Non
 
 
 def test_driven_distance(frame: Any, car: Any) -> None:
-    far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=metres)) for metres in (20.0, 20.1))
+    far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=meters)) for meters in (20.0, 20.1))
     verdicts = evaluate_criteria(driving(frame, car), [far, farther])
     assert [verdict.passed for verdict in verdicts] == [True, False]
     assert verdicts[0].value == pytest.approx(20.0)

@@ -202,7 +202,7 @@ def test_messages_by_the_rules_of_etsi_take_a_fraction_of_the_bytes_and_of_the_m
     etsi = play(with_properties(tmp_path, "RsuStack", ("generation", "etsi")), "ideal", kept)
     often, never = play(ONE, "ideal"), play(ONE, "none")
     assert etsi.links["RSU", "Ego"].bytes_sent < 0.3 * often.links["RSU", "Ego"].bytes_sent
-    apart = [result.metrics["min_distance.Ego.Incoming.centre"] for result in (never, etsi, often)]
+    apart = [result.metrics["min_distance.Ego.Incoming.center"] for result in (never, etsi, often)]
     assert apart[0] < apart[1] <= apart[2]
     messages = said(kept)
     assert all(message.objects is not None and len(message.objects) == len(message.detections) for message in messages)

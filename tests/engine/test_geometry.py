@@ -1,4 +1,4 @@
-"""Oriented boxes: numbers worked out by hand, and agreement of the single with the vectorised functions."""
+"""Oriented boxes: numbers worked out by hand, and agreement of the single with the vectorized functions."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ def test_text_parameter_cannot_add_settings(make: Make) -> None:
 
 
 def test_criterion_takes_parameters(make: Make) -> None:
-    path = make("none", ("at_least: 3.5, measure: centre", "at_least: ${$Gap * 10}, measure: centre"))
+    path = make("none", ("at_least: 3.5, measure: center", "at_least: ${$Gap * 10}, measure: center"))
     limits = [
         verdict.limit
         for gap in ("1", "2")

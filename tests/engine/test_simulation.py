@@ -45,12 +45,12 @@ def test_vehicles_take_the_wheel_in_the_order_of_their_names(tmp_path: Path, mon
     start, end = text.index('<ScenarioObject name="Ego">'), text.index('<ScenarioObject name="Incoming">')
     more = "".join(text[start:end].replace('name="Ego"', f'name="{name}"') for name in names)
     init = "".join(
-        f'<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>'
+        f'<Private entitiref="{name}"><PrivateAction><TeleportAction><Position>'
         f'<WorldPosition x="{20 * number}" y="90"/></Position></TeleportAction></PrivateAction></Private>'
         for number, name in enumerate(names)
     )
     text = (
-        text[:start] + more + text[start:].replace('<Private entityRef="Ego">', init + '<Private entityRef="Ego">', 1)
+        text[:start] + more + text[start:].replace('<Private entitiref="Ego">', init + '<Private entitiref="Ego">', 1)
     )
     path = tmp_path / "many.xosc"
     path.write_text(text)
@@ -77,8 +77,8 @@ def test_the_hidden_car_is_hit_without_cooperation_and_missed_with_it(name: str)
     collision = next(verdict for verdict in alone.criteria if verdict.name == "collision")
     assert "Ego and Incoming hit each other at" in collision.reason
     assert (helped.passed, helped.exit_code, helped.end_reason) == (True, 0, "stop trigger")
-    centre = "min_distance.Ego.Incoming.centre"
-    assert helped.metrics[centre] > alone.metrics[centre]
+    center = "min_distance.Ego.Incoming.center"
+    assert helped.metrics[center] > alone.metrics[center]
     assert alone.metrics["min_distance.Ego.Incoming.box"] == 0.0
 
 

@@ -156,7 +156,7 @@ def changed(folder: Path, name: str, fusion: str, roads: Roads = unchanged, scen
     """The scenario in a changed world, with this method of fusion; its catalogs are those of the library."""
     folder.mkdir()
     source = resolve_scenario(name)
-    text = source.read_text().replace('x="${40.0 + $CentreAhead}"', 'x="41.384"')
+    text = source.read_text().replace('x="${40.0 + $CenterAhead}"', 'x="41.384"')
     text = text.replace('name="fusion" value="average"', f'name="fusion" value="{fusion}"')
     (map_name,) = re.findall(r'LogicFile filepath="([^"]*)"', text)
     tree = etree.parse(source.parent / map_name)

@@ -1,7 +1,7 @@
 """Writes the roads of the scenario library: `python xosc/roads/make_roads.py` from the checkout.
 
 Each file is a crossing of two straight streets with the lanes of one of the paper's places. Frame: the ego vehicle
-starts at the origin and drives along x; y points left. Metres throughout. Connecting roads lead along lane centres:
+starts at the origin and drives along x; y points left. Meters throughout. Connecting roads lead along lane centers:
 straight on for every lane, right from the outermost lane, left from the innermost; a turn is a line, then clothoid, arc
 and clothoid, so that the curvature has no jump.
 """
@@ -19,11 +19,11 @@ from eidrive_scenario.roads.model import curves
 
 LANE = 3.5
 SIDEWALK = 2.0
-KERB = 0.12
+CURB = 0.12
 CLOTHOID = math.radians(25.0)
 """Part of a quarter turn that each of the two clothoids takes."""
 CORNER_MARGIN = 2.6
-"""Width between a right turn's lane and the kerb in the middle of the turn."""
+"""Width between a right turn's lane and the curb in the middle of the turn."""
 HOUSES = ((14.0, 10.0, 9.5), (11.0, 9.0, 6.5), (18.0, 12.0, 13.0))
 """Length along the street, depth and height of the houses of a row."""
 HOUSE_GAP, SETBACK, CORNER_CLEARANCE = 5.0, 3.0, 14.0
@@ -37,7 +37,7 @@ Element = etree._Element
 
 @dataclass(frozen=True)
 class LaneSpec:
-    """One lane of a street: type, width and the marking on its outer edge (type, colour)."""
+    """One lane of a street: type, width and the marking on its outer edge (type, color)."""
 
     type: str
     width: float
@@ -50,13 +50,13 @@ class Street:
 
     left: tuple[LaneSpec, ...]
     right: tuple[LaneSpec, ...]
-    centre: tuple[str, str]
+    center: tuple[str, str]
 
     def side(self, sign: int) -> tuple[LaneSpec, ...]:
         return self.left if sign > 0 else self.right
 
-    def centre_of(self, lane: int) -> float:
-        """t of a lane's centre."""
+    def center_of(self, lane: int) -> float:
+        """t of a lane's center."""
         specs = self.side(lane)
         sign = 1 if lane > 0 else -1
         return sign * (sum(spec.width for spec in specs[: abs(lane) - 1]) + specs[abs(lane) - 1].width / 2)
@@ -68,7 +68,7 @@ class Street:
     def edge(self, sign: int) -> float:
         """|t| of the outer edge of the last driving lane."""
         last = self.driving(sign)[-1]
-        return abs(self.centre_of(last)) + LANE / 2
+        return abs(self.center_of(last)) + LANE / 2
 
     def verge(self, sign: int) -> float:
         """Width between the last driving lane and the sidewalk."""
@@ -84,11 +84,11 @@ AVENUE_SIDE = (DRIVING_INNER, DRIVING_OUTER, LaneSpec("shoulder", 2.5), GUTTER, 
 AVENUE = Street(
     left=(LaneSpec("bidirectional", LANE, ("solid broken", "yellow")), *AVENUE_SIDE),
     right=AVENUE_SIDE,
-    centre=("broken solid", "yellow"),
+    center=("broken solid", "yellow"),
 )
 """Two lanes each way around a shared left-turn lane."""
 SIDE_STREET_SIDE = (DRIVING_OUTER, LaneSpec("parking", 3.5), LaneSpec("shoulder", 0.5), GUTTER, WALK)
-SIDE_STREET = Street(left=SIDE_STREET_SIDE, right=SIDE_STREET_SIDE, centre=("solid solid", "yellow"))
+SIDE_STREET = Street(left=SIDE_STREET_SIDE, right=SIDE_STREET_SIDE, center=("solid solid", "yellow"))
 """One lane each way with parking on both sides."""
 
 
@@ -116,8 +116,8 @@ class Arm:
         return -1 if self.contact == "end" else 1
 
     def mouth(self, lane: int) -> tuple[float, float]:
-        """Where a lane's centre meets the junction."""
-        s, t = (self.length if self.contact == "end" else 0.0), self.street.centre_of(lane)
+        """Where a lane's center meets the junction."""
+        s, t = (self.length if self.contact == "end" else 0.0), self.street.center_of(lane)
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         return self.x + cos * s - sin * t, self.y + sin * s + cos * t
 
@@ -206,7 +206,7 @@ def ways(arms: dict[str, Arm]) -> Iterator[Way]:
 
 
 def course(way: Way) -> list[curves.Curve]:
-    """The centre line of the way's first lane."""
+    """The center line of the way's first lane."""
     (x, y), (x_end, y_end) = way.start.mouth(way.lanes[0][0]), way.end.mouth(way.lanes[0][1])
     heading = way.start.inward
     along = math.cos(heading) * (x_end - x) + math.sin(heading) * (y_end - y)
@@ -232,7 +232,7 @@ def course(way: Way) -> list[curves.Curve]:
 
 
 def _quarter_turn(tangent: float) -> list[tuple[str, float] | tuple[str, float, float]]:
-    """Clothoid, arc and clothoid that turn by 90° and use up `tangent` metres of both straight lines."""
+    """Clothoid, arc and clothoid that turn by 90° and use up `tangent` meters of both straight lines."""
     spiral_length, arc_length = 2.0 * CLOTHOID, math.pi / 2 - 2.0 * CLOTHOID
     x, y, h = 0.0, 0.0, 0.0
     for start, end, length in ((0.0, 1.0, spiral_length), (1.0, 1.0, arc_length), (1.0, 0.0, spiral_length)):
@@ -282,7 +282,7 @@ def add_lane(side: Element, number: int, spec: LaneSpec) -> Element:
     add_width(lane, [(0.0, spec.width, 0.0, 0.0, 0.0)])
     add_mark(lane, spec.mark)
     if spec.type == "sidewalk":
-        add(lane, "height", sOffset=0.0, inner=KERB, outer=KERB)
+        add(lane, "height", sOffset=0.0, inner=CURB, outer=CURB)
     return lane
 
 
@@ -307,9 +307,9 @@ def write_arm(root: Element, arm: Arm, crossing: Crossing) -> None:
     left = add(section, "left")
     for i in range(len(arm.street.left), 0, -1):
         add_lane(left, i, arm.street.left[i - 1])
-    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
-    add(centre, "link")
-    add_mark(centre, arm.street.centre)
+    center = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(center, "link")
+    add_mark(center, arm.street.center)
     right = add(section, "right")
     for i, spec in enumerate(arm.street.right, start=1):
         add_lane(right, -i, spec)
@@ -320,11 +320,11 @@ def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
     """Crosswalk, stop line, and a stop sign or a traffic light, for the traffic that enters the junction."""
     sign = arm.approach
     end, back = (arm.length, -1.0) if arm.contact == "end" else (0.0, 1.0)
-    kerbs = [side * (arm.street.edge(side) + arm.street.verge(side)) for side in (-1, 1)]
-    inner = min(abs(arm.street.centre_of(lane)) for lane in arm.street.driving(sign)) - LANE / 2
+    curbs = [side * (arm.street.edge(side) + arm.street.verge(side)) for side in (-1, 1)]
+    inner = min(abs(arm.street.center_of(lane)) for lane in arm.street.driving(sign)) - LANE / 2
     lanes = arm.street.driving(sign)
     objects = add(road, "objects")
-    write_area(objects, "0", "crosswalk", end + back * 0.8, end + back * 3.8, kerbs[0], kerbs[1])
+    write_area(objects, "0", "crosswalk", end + back * 0.8, end + back * 3.8, curbs[0], curbs[1])
     write_area(objects, "1", "roadMark", end + back * 5.0, end + back * 5.4, sign * inner, sign * arm.street.edge(sign))
     write_buildings(objects, arm)
     kind = ("1000001", "-1", "yes", 0.86, 0.3, "light") if crossing.lights else ("206", "-1", "no", 0.75, 0.75, "stop")
@@ -353,7 +353,7 @@ def write_furniture(road: Element, arm: Arm, crossing: Crossing) -> None:
 def write_buildings(objects: Element, arm: Arm) -> None:
     """A row of houses on each side, set back from the sidewalk and well away from the junction's corners."""
     for side in (-1, 1):
-        kerb = sum(spec.width for spec in arm.street.side(side))
+        curb = sum(spec.width for spec in arm.street.side(side))
         from_junction = CORNER_CLEARANCE
         for number, (length, depth, height) in enumerate(HOUSES if side > 0 else reversed(HOUSES)):
             middle = from_junction + length / 2
@@ -364,7 +364,7 @@ def write_buildings(objects: Element, arm: Arm) -> None:
                 name=f"house {arm.name} {'left' if side > 0 else 'right'} {number + 1}",
                 type="building",
                 s=arm.length - middle if arm.contact == "end" else middle,
-                t=side * (kerb + SETBACK + depth / 2),
+                t=side * (curb + SETBACK + depth / 2),
                 zOffset=0.0,
                 orientation="none",
                 length=length,
@@ -419,9 +419,9 @@ def write_way(root: Element, number: str, way: Way) -> None:
     lanes = add(road, "lanes")
     add(lanes, "laneOffset", s=0.0, a=LANE / 2, b=0.0, c=0.0, d=0.0)
     section = add(lanes, "laneSection", s=0.0)
-    centre = add(add(section, "center"), "lane", id=0, type="none", level="false")
-    add(centre, "link")
-    add_mark(centre, ("none", "white"))
+    center = add(add(section, "center"), "lane", id=0, type="none", level="false")
+    add(center, "link")
+    add_mark(center, ("none", "white"))
     if way.turn == "ahead" and way.start.street.left[0].type == "bidirectional":
         # The two ways straight on cover half of the middle lane each, which itself ends at the junction.
         left = etree.Element("left")
@@ -439,7 +439,7 @@ def write_way(root: Element, number: str, way: Way) -> None:
 
 
 def write_corner(right: Element, way: Way, length: float) -> None:
-    """Between a right turn's lane and the corner: a margin up to the kerb, then the sidewalk."""
+    """Between a right turn's lane and the corner: a margin up to the curb, then the sidewalk."""
     start = way.start.street.verge(way.start.approach)
     end = way.end.street.verge(-way.end.approach)
     margin = add_lane(right, -2, LaneSpec("shoulder", start, ("curb", "standard")))

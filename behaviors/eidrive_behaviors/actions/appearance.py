@@ -56,7 +56,7 @@ class VisibilityAction(ActionBehaviour):
         sensors = (
             "sensors" if chosen is None else "the sensors " + ", ".join(one.name for one in chosen.sensor_reference)
         )
-        who = (("pictures", self.action.graphics), ("traffic", self.action.traffic), (sensors, self.action.sensors))
+        who = (("images", self.action.graphics), ("traffic", self.action.traffic), (sensors, self.action.sensors))
         return f"seen by {', '.join(name for name, seen in who if seen) or 'nobody'}"
 
 
@@ -82,7 +82,7 @@ class LightStateAction(ActionBehaviour):
         light = replace(
             usual,
             intensity=state.luminous_intensity if state.luminous_intensity is not None else state.intensity,
-            colour=rgb(state.color) if state.color is not None else None,
+            color=rgb(state.color) if state.color is not None else None,
             since=max(context.time, 0.0),
             fade=self.action.transition_time or 0.0,
             on_for=usual.on_for if state.flashing_on_duration is None else state.flashing_on_duration,
@@ -175,14 +175,14 @@ class AnimationAction(ActionBehaviour):
         return f"{kind} {what}{f' to {state.state:g}' if state is not None else ''}"
 
 
-def rgb(colour: model.Color) -> tuple[float, float, float] | None:
-    """Red, green, blue in [0, 1] of a colour; None where it says no numbers and has no name of the standard."""
-    if colour.color_rgb is not None:
-        return colour.color_rgb.red, colour.color_rgb.green, colour.color_rgb.blue
-    if colour.color_cmyk is not None:
-        mixed, rest = colour.color_cmyk, 1.0 - colour.color_cmyk.key
+def rgb(color: model.Color) -> tuple[float, float, float] | None:
+    """Red, green, blue in [0, 1] of a color; None where it says no numbers and has no name of the standard."""
+    if color.color_rgb is not None:
+        return color.color_rgb.red, color.color_rgb.green, color.color_rgb.blue
+    if color.color_cmyk is not None:
+        mixed, rest = color.color_cmyk, 1.0 - color.color_cmyk.key
         return (1.0 - mixed.cyan) * rest, (1.0 - mixed.magenta) * rest, (1.0 - mixed.yellow) * rest
-    if colour.red is not None and colour.green is not None and colour.blue is not None:
-        return colour.red, colour.green, colour.blue
-    name = colour.color_type.value if colour.color_type is not None else (colour.name or "").lower()
+    if color.red is not None and color.green is not None and color.blue is not None:
+        return color.red, color.green, color.blue
+    name = color.color_type.value if color.color_type is not None else (color.name or "").lower()
     return NAMED.get(name)

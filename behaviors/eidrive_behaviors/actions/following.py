@@ -88,7 +88,7 @@ class PathPursuit:
         self.on_path = math.hypot(start.x - pose.x, start.y - pose.y) < ON_PATH
 
     def advance(self, ds: float, dt: float, *, tail_first: bool = False) -> Pose:
-        """Return the pose after `ds` metres of the trajectory (back where negative), driven within dt.
+        """Return the pose after `ds` meters of the trajectory (back where negative), driven within dt.
 
         With `tail_first` the vehicle looks against the trajectory.
         """

@@ -36,11 +36,11 @@ LOOKOUT = 100.0
 
 
 class LaneChangeAction(ActionBehaviour):
-    """Takes the offset from the target lane's centre over to `targetLaneOffset` by the given dynamics.
+    """Takes the offset from the target lane's center over to `targetLaneOffset` by the given dynamics.
 
     A distance is measured along the lane. The actor covers its speed's distance on the slanted way; a demand to go
     sideways faster than forwards is cut to that. A standing actor waits. In the following mode `follow` a vehicle
-    accelerates sideways no more than its front wheels and its tyres allow, which brake as hard as its Performance says.
+    accelerates sideways no more than its front wheels and its tires allow, which brake as hard as its Performance says.
     """
 
     domains = Domain.LATERAL
@@ -67,7 +67,7 @@ class LaneChangeAction(ActionBehaviour):
         self._tracker: RateLimitedValue | None = None
 
     def initialise(self) -> None:
-        """Find the target lane, and see the actor's place as an offset from its centre."""
+        """Find the target lane, and see the actor's place as an offset from its center."""
         here = self.context.location(self.actor.name)
         if here is None:
             raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
@@ -198,5 +198,5 @@ class LaneChangeAction(ActionBehaviour):
             count, name = target.relative_target_lane.value, target.relative_target_lane.entity_ref
             where = f"the lane of {name}" if count == 0 else f"{count:+d} lanes from {name}"
         offset = self.action.target_lane_offset
-        aside = f", {offset:g} m off its centre" if offset else ""
+        aside = f", {offset:g} m off its center" if offset else ""
         return f"change to {where}{aside}, {dynamics_in_words(self._dynamics, 'm/s')}"

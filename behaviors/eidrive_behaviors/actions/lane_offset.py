@@ -24,7 +24,7 @@ SHIFTED = 1e-3
 
 
 class LaneOffsetAction(ActionBehaviour):
-    """Takes the offset from the lane's centre over to its target, as fast as `maxLateralAcc` lets it.
+    """Takes the offset from the lane's center over to its target, as fast as `maxLateralAcc` lets it.
 
     The shape runs over time; without `maxLateralAcc` the target holds at once. With it an actor goes sideways no faster
     than forwards, so that one that stands waits. An offset relative to an entity counts
@@ -46,7 +46,7 @@ class LaneOffsetAction(ActionBehaviour):
         self._lay(motion.location)
 
     def _lay(self, here: LaneLocation) -> None:
-        """Lay the transition from a place, whose offset counts from its lane's centre."""
+        """Lay the transition from a place, whose offset counts from its lane's center."""
         way = self._way(here)
         start, target = here.offset * way, self._target(here) * way
         limit, shape = self.action.lane_offset_action_dynamics.max_lateral_acc, self._shape()
@@ -114,4 +114,4 @@ class LaneOffsetAction(ActionBehaviour):
             relative = target.relative_target_lane_offset
             where = f"{relative.value:g} m beside {relative.entity_ref}"
         held = ", kept up" if self.action.continuous else ""
-        return f"offset from the lane's centre to {where}, {self._shape().value}{held}"
+        return f"offset from the lane's center to {where}, {self._shape().value}{held}"

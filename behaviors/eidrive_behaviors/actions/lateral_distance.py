@@ -23,7 +23,7 @@ REACHED = 0.01
 
 
 class LateralDistanceAction(ActionBehaviour):
-    """Keeps `distance` metres beside an entity, on the side that `displacement` names (any: where the actor is).
+    """Keeps `distance` meters beside an entity, on the side that `displacement` names (any: where the actor is).
 
     Left and right are those of the other as it faces. Within limits an actor goes sideways no faster than forwards.
 
@@ -74,7 +74,7 @@ class LateralDistanceAction(ActionBehaviour):
         return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
 
     def _sideways(self, error: float, dt: float) -> float:
-        """Metres to the left in this step, by the rate of its start (forward Euler)."""
+        """Meters to the left in this step, by the rate of its start (forward Euler)."""
         limits = self.action.dynamic_constraints
         if limits is None or dt == 0.0:
             return error if limits is None else 0.0

@@ -15,7 +15,7 @@ REACHED = 0.1
 
 
 class LongitudinalDistanceAction(ActionBehaviour):
-    """Keeps `distance` metres, or `timeGap` seconds of the other's speed, behind or ahead of an entity.
+    """Keeps `distance` meters, or `timeGap` seconds of the other's speed, behind or ahead of an entity.
 
     Trailing is behind the other as it faces, leading ahead of it, also where the two face each other.
 

@@ -90,7 +90,7 @@ class AcquirePositionAction(ActionBehaviour):
 class RandomRouteAction(ActionBehaviour):
     """Lets the actor drive about: at each fork it takes one of the branches, all as likely, from now on.
 
-    Who drives itself gets a way of that kind of some kilometres as its path. The run's seed decides.
+    Who drives itself gets a way of that kind of some kilometers as its path. The run's seed decides.
     """
 
     immediate = True

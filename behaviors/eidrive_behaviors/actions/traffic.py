@@ -121,7 +121,7 @@ class TrafficSwarmAction(TrafficInstanceAction):
         return traffic.Swarm(
             self.traffic_name,
             self.background.key(self.traffic_name),
-            centre=action.central_object.entity_ref,
+            center=action.central_object.entity_ref,
             inner=action.inner_radius,
             major=action.semi_major_axis,
             minor=action.semi_minor_axis,

@@ -1,4 +1,4 @@
-"""Conditions on how an entity moves: speed, acceleration, standstill, distance travelled."""
+"""Conditions on how an entity moves: speed, acceleration, standstill, distance traveled."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class TraveledDistanceCondition(QuantityCondition):
 
     def what(self) -> str:
         """What is compared."""
-        return "travelled"
+        return "traveled"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
         """The distance covered."""

@@ -94,7 +94,7 @@ class ReferenceDriver(SafetyModel):
         return self._braking(own)
 
     def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
-        """Two seconds and two metres, the headway below which a lead is dangerous."""
+        """Two seconds and two meters, the headway below which a lead is dangerous."""
         return 2.0 + DANGEROUS * own.speed
 
     def _watch(self, seen: list[LeadObject]) -> None:

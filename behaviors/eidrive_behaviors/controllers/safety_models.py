@@ -3,7 +3,7 @@
 Sources: UN Regulation No. 157 with its amendments, cited as R157; S. Shalev-Shwartz et al., On a Formal Model of Safe
 and Scalable Self-driving Cars, arXiv:1708.06374 (RSS); K. Mattas et al., Fuzzy Surrogate Safety Metrics for real-time
 assessment of rear-end collision risk, Accident Analysis & Prevention 148 (2020) 105794 (FSM). Where several values
-would do, they are those of the Joint Research Centre's program JRC-FSM, which compares these models.
+would do, they are those of the Joint Research Center's program JRC-FSM, which compares these models.
 """
 
 from __future__ import annotations

@@ -8,11 +8,11 @@ from eidrive_scenario.checks.road_rules.context import RoadLintContext
 from eidrive_scenario.checks.scenario_rules import Level, Rule
 
 ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
-    Rule("no-such-place", Level.ERROR, "a position that the road network does not have", places.missing_places),
-    Rule("beyond-the-road", Level.WARNING, "an s beyond the end of its road", places.beyond_ends),
+    Rule("unresolvable-position", Level.ERROR, "a position that the road network does not have", places.missing_places),
+    Rule("s-out-of-range", Level.WARNING, "an s beyond the end of its road", places.beyond_ends),
     Rule("no-route", Level.ERROR, "a route between whose waypoints no lanes lead", paths.impossible_routes),
-    Rule("no-such-lane", Level.WARNING, "a change to a lane that no road has", places.missing_lanes),
-    Rule("no-such-signal", Level.WARNING, "a traffic signal that no road has", places.missing_signals),
+    Rule("unknown-lane", Level.WARNING, "a change to a lane that no road has", places.missing_lanes),
+    Rule("unknown-signal", Level.WARNING, "a traffic signal that no road has", places.missing_signals),
     Rule("trajectory-off-road", Level.WARNING, "a trajectory that leaves the road", paths.trajectories_off_road),
     Rule("waypoint-off-road", Level.WARNING, "a waypoint beside the road", paths.waypoints_off_road),
     Rule(
@@ -21,8 +21,15 @@ ROAD_RULES: tuple[Rule[RoadLintContext], ...] = (
         "a conflict area that lies off the road",
         stations.conflict_areas_off_road,
     ),
-    Rule("road-jump", Level.WARNING, "a road whose geometries do not join", road_file.map_warning_rule("road-jump")),
-    Rule("road-kink", Level.WARNING, "a road that bends at a point", road_file.map_warning_rule("road-kink")),
+    Rule(
+        "geometry-gap", Level.WARNING, "a road whose geometries do not join", road_file.map_warning_rule("geometry-gap")
+    ),
+    Rule(
+        "heading-discontinuity",
+        Level.WARNING,
+        "a road that bends at a point",
+        road_file.map_warning_rule("heading-discontinuity"),
+    ),
     Rule("lane-width", Level.WARNING, "a lane without a width, or below 0", road_file.map_warning_rule("lane-width")),
     Rule("lane-side", Level.WARNING, "a lane on the side of the others", road_file.map_warning_rule("lane-side")),
     Rule("road-link", Level.WARNING, "a road that leads to no junction", road_file.map_warning_rule("road-link")),

@@ -1,4 +1,4 @@
-"""Rules on actions: what takes a domain from its neighbour, what is too fast, what never gets anywhere."""
+"""Rules on actions: what takes a domain from its neighbor, what is too fast, what never gets anywhere."""
 
 from __future__ import annotations
 

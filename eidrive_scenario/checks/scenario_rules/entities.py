@@ -107,7 +107,7 @@ def axles_not_apart(context: LintContext) -> Iterator[Diagnostic]:
 
 
 def relations_to_oneself(context: LintContext) -> Iterator[Diagnostic]:
-    """An action that keeps an entity at a distance from itself, or synchronises it with itself."""
+    """An action that keeps an entity at a distance from itself, or synchronizes it with itself."""
     for action, actors in context.performances:
         for element in action.walk():
             if isinstance(element, LateralDistanceAction | LongitudinalDistanceAction):

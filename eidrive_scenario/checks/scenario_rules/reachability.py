@@ -28,7 +28,7 @@ from eidrive_scenario.checks.scenario_rules.truth_intervals import TruthInterval
 from eidrive_scenario.openscenario.model import Act, Condition, ConditionEdge, ConditionGroup, Storyboard, Trigger
 from eidrive_scenario.openscenario.validation.names import CRITERIA
 
-UNOBSERVED_EDGE = "swallowed-edge"
+UNOBSERVED_EDGE = "unobserved-edge"
 
 
 @dataclass(frozen=True)

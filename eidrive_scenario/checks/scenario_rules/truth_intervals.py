@@ -99,7 +99,7 @@ def _of_entities(condition: model.ByEntityCondition, outline: Outline) -> TruthI
     if other is not None and names and all(name == other for name in names) and isinstance(leaf, _PAIRS):
         return never(f"{other!r} is compared with itself")
     if isinstance(leaf, model.TraveledDistanceCondition) and leaf.value <= 0.0 and set(names) <= outline.at_start:
-        return TruthIntervals(steady="no distance at all is travelled at once")
+        return TruthIntervals(steady="no distance at all is traveled at once")
     return _of_quantity(leaf)
 
 
@@ -112,7 +112,7 @@ def partner(leaf: Element) -> str | None:
     if isinstance(leaf, model.TimeToCollisionCondition):
         leaf = leaf.time_to_collision_condition_target
     other = getattr(leaf, "entity_ref", None)
-    name = other.entity_ref if isinstance(other, model.EntityRef) else other
+    name = other.entity_ref if isinstance(other, model.Entitiref) else other
     return name if isinstance(name, str) else None
 
 

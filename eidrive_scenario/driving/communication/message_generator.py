@@ -159,14 +159,14 @@ def own_body(spec: ActorSpec, state: StationState) -> Detections:
     """A station as an object that others can know of, where it says it is."""
     cos, sin = math.cos(state.yaw), math.sin(state.yaw)
     ahead, aside, up = spec.offset
-    centre: Sequence[float] = (
+    center: Sequence[float] = (
         state.x + cos * ahead - sin * aside,
         state.y + sin * ahead + cos * aside,
         state.z + up,
     )
     return Detections(
         state.time,
-        np.array([[*centre, *spec.size, state.yaw]]),
+        np.array([[*center, *spec.size, state.yaw]]),
         np.ones(1),
         (spec.category,),
         np.array([[state.speed * cos, state.speed * sin]]),

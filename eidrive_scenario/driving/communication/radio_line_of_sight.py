@@ -52,7 +52,7 @@ def line_of_sight_states(world: World, places: dict[str, Place], pairs: Sequence
     origins, targets = (np.array(points, dtype=float).reshape(-1, 3) for points in _ends(places, pairs))
     states, heights = np.full(count, LOS), np.full(count, -np.inf)
     found: dict[int, list[str]] = {}
-    tops = view.centres[:, 2] + view.size[:, 2] / 2.0
+    tops = view.centers[:, 2] + view.size[:, 2] / 2.0
     length = np.maximum(np.linalg.norm(targets - origins, axis=1), _BEYOND)
     begun = np.zeros(count)
     open_rays = np.arange(count)

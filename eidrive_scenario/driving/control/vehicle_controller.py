@@ -20,11 +20,11 @@ them near the target, where the error is at most"""
 SPEED_BAND = 1.0
 """[m/s]"""
 LATERAL = Gains(proportional=1.0, integral=0.1)
-"""On the turn towards the path; the integral carries the slip of the tyres in a curve."""
+"""On the turn towards the path; the integral carries the slip of the tires in a curve."""
 CROSS_TRACK_GAIN = 2.0
 """How fast an offset from the path decays [1/s]."""
 LARGEST_APPROACH = 2.0
-"""Of a large offset, the speed towards the path [m/s]: what tyres and steering undo in time before the path."""
+"""Of a large offset, the speed towards the path [m/s]: what tires and steering undo in time before the path."""
 LEARNING = 0.1
 """Up to this turn towards the path the integral learns; beyond it, it would learn the way there [rad]."""
 SOFTENING = 1.0
@@ -130,9 +130,9 @@ def _nearest(points: list[list[float]], x: float, y: float) -> tuple[float, floa
     heading = _heading(points, best)
     (x0, y0), (x1, y1) = points[best], points[best + 1]
     left = ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) / math.hypot(x1 - x0, y1 - y0)
-    neighbour = best + 1 if place > 0.5 else best - 1
-    if 0 <= neighbour < len(points) - 1:
-        heading += abs(place - 0.5) * wrap_angle(_heading(points, neighbour) - heading)
+    neighbor = best + 1 if place > 0.5 else best - 1
+    if 0 <= neighbor < len(points) - 1:
+        heading += abs(place - 0.5) * wrap_angle(_heading(points, neighbor) - heading)
     return heading, left
 
 

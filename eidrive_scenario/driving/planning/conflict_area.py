@@ -17,9 +17,11 @@ from eidrive_scenario.world.actor import ActorSpec
 
 
 class ConflictAreaPlanner(RoutePlanner):
-    """Follows the route, and brakes with a fixed deceleration from the instant in which the centre of any known object
-    lies in the area until `conflict_hold` has gone by since the last such instant. Objects that exist with less than
-    `min_existence` do not count.
+    """Follow the route, and brake while an object is in the conflict area.
+
+    The vehicle brakes with `conflict_deceleration` while the center of a known object lies in the area, and for
+    `conflict_hold_time` [s] after the last such instant. Objects with an existence probability below `min_existence`
+    are ignored.
 
     The rule of EI-Drive's cooperative scenarios: 35 ticks of 0.03 s from the last sighting on, brake 0.25, throttle 0,
     the steering goes on. Which deceleration that brake gives is our choice.
@@ -40,9 +42,11 @@ class ConflictAreaPlanner(RoutePlanner):
         if inside_area:
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
-            return replaced(plan, reason=reason, braking=self.settings.conflict_brake, objects=inside_area)
-        if now - self._last_sighting < self.settings.conflict_hold - 1e-9:
-            return replaced(plan, reason="an object was in the conflict area", braking=self.settings.conflict_brake)
+            return replaced(plan, reason=reason, braking=self.settings.conflict_deceleration, objects=inside_area)
+        if now - self._last_sighting < self.settings.conflict_hold_time - 1e-9:
+            return replaced(
+                plan, reason="an object was in the conflict area", braking=self.settings.conflict_deceleration
+            )
         return plan
 
     def _in_areas(self, objects: Detections) -> tuple[int, ...]:

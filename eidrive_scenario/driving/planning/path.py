@@ -16,7 +16,7 @@ LATERAL_ACCELERATION = 5.0
 APPROACH_DECELERATION = 3.0
 """How the speed falls towards a curve or the end [m/s²]."""
 SMOOTHING_PASSES = 4
-"""Each pass averages a point with its neighbours (1 2 1)/4; four take kinks of a polyline away and move a curve of
+"""Each pass averages a point with its neighbors (1 2 1)/4; four take kinks of a polyline away and move a curve of
 radius R inwards by 1/R m² at most."""
 LEADS_AWAY = 5.0
 """Where a path has come so much farther from a point than it was, its nearest place lies behind: what comes near again

@@ -155,7 +155,7 @@ class RoutePlanner(Planner):
                 self._lane += more
                 onward = bool(more)
             if len(self._lane) > 1:
-                return PlannedPath(self.roads.centres(self._lane), ends=not onward)
+                return PlannedPath(self.roads.centers(self._lane), ends=not onward)
         reach = np.array([[0.0], [float(LOOK_AHEAD)]])
         return PlannedPath(np.array([[x, y]]) + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 

@@ -47,7 +47,7 @@ from eidrive_scenario.randomness import generator
 Quantile = Callable[[float], "float | str"]
 _SMALLEST, _LARGEST = 2.0**-54, 1 - 2.0**-53
 _MOST_EVENTS = 2.0**53
-"""Whole numbers beyond have no neighbours among floating-point numbers."""
+"""Whole numbers beyond have no neighbors among floating-point numbers."""
 
 
 def quantile_of(distribution: StochasticDistribution, findings: DiagnosticCollector) -> Quantile | None:

@@ -38,7 +38,7 @@ class ColorCmyk(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class Color(Element, content=CHOICE):
-    """A colour by name and, if need be, by numbers in [0, 1]."""
+    """A color by name and, if need be, by numbers in [0, 1]."""
 
     name: str | None = attribute(until="1.2", required=True)
     red: float | None = attribute(until="1.2")

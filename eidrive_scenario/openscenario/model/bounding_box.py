@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.element import Element
 
 @dataclass(frozen=True, kw_only=True)
 class Center(Element):
-    """Centre of the box in the object's frame [m]."""
+    """Center of the box in the object's frame [m]."""
 
     x: float
     y: float

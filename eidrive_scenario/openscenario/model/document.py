@@ -24,7 +24,7 @@ from eidrive_scenario.openscenario.model.storyboard import Storyboard
 
 @dataclass(frozen=True, kw_only=True)
 class License(Element):
-    """Under which licence the file stands; its text, if it is here."""
+    """Under which license the file stands; its text, if it is here."""
 
     name: str
     resource: str | None = None

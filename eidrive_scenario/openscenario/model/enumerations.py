@@ -33,7 +33,7 @@ class CloudState(Enumeration):
 
 
 class ColorType(Enumeration):
-    """A colour by name."""
+    """A color by name."""
 
     OTHER = "other"
     RED = "red"
@@ -354,7 +354,7 @@ class StoryboardElementType(Enumeration):
 
 
 class TriggeringEntitiesRule(Enumeration):
-    """Whether all or any of the entities have to fulfil a condition."""
+    """Whether all or any of the entities have to fulfill a condition."""
 
     ALL = "all"
     ANY = "any"

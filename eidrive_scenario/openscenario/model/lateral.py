@@ -36,7 +36,7 @@ class LaneChangeTarget(Element, content=Choice(empty_until="1.2")):
 
 @dataclass(frozen=True, kw_only=True)
 class LaneChangeAction(Element, content=ALL):
-    """Moves an entity to another lane; offset from its centre [m]."""
+    """Moves an entity to another lane; offset from its center [m]."""
 
     target_lane_offset: float | None = None
     lane_change_action_dynamics: TransitionDynamics
@@ -45,7 +45,7 @@ class LaneChangeAction(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class AbsoluteTargetLaneOffset(Element):
-    """An offset from the lane's centre [m]."""
+    """An offset from the lane's center [m]."""
 
     value: float
 

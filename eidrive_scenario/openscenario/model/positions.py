@@ -81,7 +81,7 @@ class RelativeRoadPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class LanePosition(Element, content=ALL):
-    """A point in a lane: s along the road, offset from the lane's centre [m]."""
+    """A point in a lane: s along the road, offset from the lane's center [m]."""
 
     lane_id: str
     road_id: str
@@ -92,7 +92,7 @@ class LanePosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeLanePosition(Element, content=ALL):
-    """A point some lanes off an entity; ds along the road, dsLane along the lane's centre [m]."""
+    """A point some lanes off an entity; ds along the road, dsLane along the lane's center [m]."""
 
     entity_ref: EntityName
     d_lane: int
@@ -119,7 +119,7 @@ class PositionInRoadCoordinates(Element):
 
 @dataclass(frozen=True, kw_only=True)
 class PositionInLaneCoordinates(Element):
-    """A point on the route: distance along it, lane, offset from the lane's centre [m]."""
+    """A point on the route: distance along it, lane, offset from the lane's center [m]."""
 
     lane_id: str
     path_s: float
@@ -172,7 +172,7 @@ class TrajectoryPosition(Element, content=ALL):
 
 @dataclass(frozen=True, kw_only=True)
 class GeoPosition(Element, content=ALL):
-    """A point on the globe: degrees and metres; the older attributes are in radians."""
+    """A point on the globe: degrees and meters; the older attributes are in radians."""
 
     latitude: float | None = attribute(deprecated="1.2", required_until="1.1")
     longitude: float | None = attribute(deprecated="1.2", required_until="1.1")

@@ -46,7 +46,7 @@ def read_document(source: Source) -> OpenScenario:
 def read_root(
     document: Document, findings: DiagnosticCollector, assignments: Mapping[str, Assignment] | None = None
 ) -> ReadDocument | None:
-    """Reads a parsed file; None where it is not even recognisable as one of the versions known."""
+    """Reads a parsed file; None where it is not even recognizable as one of the versions known."""
     version = version_of(document, findings)
     if version is None:
         return None

@@ -81,7 +81,7 @@ class LevelFrame:
 
 
 class Pattern(NamedTuple):
-    """Angles between neighbouring rays, across and up, and that of the highest ring above the horizon [rad].
+    """Angles between neighboring rays, across and up, and that of the highest ring above the horizon [rad].
 
     half_field  half the horizontal field of view, about the sensor's heading [rad]; pi if it looks all around
     """

@@ -19,7 +19,7 @@ CELL = 0.5
 more than MOST_CELLS."""
 MOST_CELLS = 16_000_000
 BEYOND = 20.0
-"""How far the mask goes on beside the lanes' centre lines [m]."""
+"""How far the mask goes on beside the lanes' center lines [m]."""
 UNKNOWN, OFF, ON = -1, 0, 1
 
 

@@ -58,7 +58,7 @@ class LearnedSettings(Settings):
                  a TorchScript model (.pt), which is loaded only where the user allows it; None is what is shipped
     classes, input_size, layout   of an .onnx or .pt: its classes in their order, width and height of its input [px],
                  and how its output is laid out, where the shape does not tell
-    letterbox    of an .onnx or .pt: whether it takes pictures in their own shape, with grey margins; else stretched
+    letterbox    of an .onnx or .pt: whether it takes pictures in their own shape, with gray margins; else stretched
     confidence   below which a box does not count; None is what suits shipped weights best, and 0.35 for others
     threads      of the network's computation, in the whole process
     """

@@ -149,9 +149,9 @@ def _sides(output: Floats, axis: int, expected: int) -> int:
 
 
 def _corners(boxes: Floats) -> Floats:
-    centre, half = boxes[:, :2], boxes[:, 2:] / 2.0
+    center, half = boxes[:, :2], boxes[:, 2:] / 2.0
     with np.errstate(invalid="ignore"):  # boxes that are not finite are left out later
-        return np.concatenate([centre - half, centre + half], axis=1)
+        return np.concatenate([center - half, center + half], axis=1)
 
 
 def _onnx(path: Path, threads: int) -> Callable[[Floats], list[Floats]]:

@@ -20,7 +20,7 @@ Integers = NDArray[np.int64]
 LARGEST_OVERLAP = 0.5
 """Of two boxes of like class that overlap by more, the better one counts."""
 MOST_CANDIDATES = 1000
-MARGIN_GREY = 114
+MARGIN_GRAY = 114
 """What is beside a letterboxed picture, in the networks of Ultralytics and those trained like them."""
 
 
@@ -37,7 +37,7 @@ class ImageNetwork(ABC):
     """Finds objects in pictures of any size, which it takes to its own size.
 
     classes  names in the order of the outputs;  input_size  width and height of the network's input [px]
-    letterbox  whether pictures keep their shape, with grey margins; else they are stretched
+    letterbox  whether pictures keep their shape, with gray margins; else they are stretched
     """
 
     def __init__(
@@ -102,6 +102,6 @@ def letterboxed(picture: NDArray[np.uint8], size: tuple[int, int]) -> tuple[NDAr
     ratio = min(size[0] / width, size[1] / height)
     inner = max(round(width * ratio), 1), max(round(height * ratio), 1)
     left, top = (size[0] - inner[0]) // 2, (size[1] - inner[1]) // 2
-    canvas = np.full((size[1], size[0], 3), MARGIN_GREY, dtype=np.uint8)
+    canvas = np.full((size[1], size[0], 3), MARGIN_GRAY, dtype=np.uint8)
     canvas[top : top + inner[1], left : left + inner[0]] = resized(picture, inner)
     return canvas, np.array([inner[0] / width, inner[1] / height]), np.array([left, top], dtype=float)

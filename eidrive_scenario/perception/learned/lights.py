@@ -14,7 +14,7 @@ from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import STOP_SIGN, light_state
 from eidrive_scenario.perception.learned.lamps import NONE, SHOWN, crops, lamp_network
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colours
+from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors
 from eidrive_scenario.sensing.readings import CameraReading, SignalReading
 from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
 from eidrive_scenario.world.road_objects import signal_heads
@@ -61,9 +61,9 @@ class LightsOnMap:
         self._feet = np.array([head.pose[:3] for head in heads], dtype=float).reshape(-1, 3)
         self._heights = np.array([head.height for head in heads], dtype=float)
         self._facing = np.array([(math.cos(head.pose.h), math.sin(head.pose.h)) for head in heads]).reshape(-1, 2)
-        colours = [set(lamp_colours(head.signal)) for head in heads]
+        colors = [set(lamp_colors(head.signal)) for head in heads]
         self._possible: Booleans = np.array(
-            [[_NEEDS.get(state, set()) <= own for state in SHOWN] for own in colours], dtype=bool
+            [[_NEEDS.get(state, set()) <= own for state in SHOWN] for own in colors], dtype=bool
         ).reshape(-1, len(SHOWN))
 
     def read(

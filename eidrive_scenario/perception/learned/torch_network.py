@@ -56,10 +56,10 @@ def yolo_candidates(anchors: Tensor, outputs: list[Tensor], confidence: float) -
     for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
         anchor, line, column = torch.nonzero(raw[0, ..., 4] >= least, as_tuple=True)
         share = raw[0, anchor, line, column].sigmoid()
-        centre = (2.0 * share[:, :2] - 0.5 + torch.stack([column, line], dim=1)) * stride
+        center = (2.0 * share[:, :2] - 0.5 + torch.stack([column, line], dim=1)) * stride
         size = (2.0 * share[:, 2:4]).square() * anchors[scale][anchor]
         best, number = share[:, 5:].max(dim=1)
-        boxes.append(corners(torch.cat([centre, size], dim=1)))
+        boxes.append(corners(torch.cat([center, size], dim=1)))
         scores.append(share[:, 4] * best)
         classes.append(number)
     box, score, number = torch.cat(boxes), torch.cat(scores), torch.cat(classes)

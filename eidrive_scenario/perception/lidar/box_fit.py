@@ -36,7 +36,7 @@ ABOVE_TOP = 0.3
 
 @dataclass(frozen=True)
 class Fit:
-    """A box x y z l w h yaw in the level frame, its class, the covariance of its centre x y [m²], how well the points
+    """A box x y z l w h yaw in the level frame, its class, the covariance of its center x y [m²], how well the points
     fit the class: the sum of squared deviations of its size from what is usual; and whether something nearer hides its
     left and its right end."""
 
@@ -130,8 +130,8 @@ def fit_box(
     for choice in choices:
         if choice.total < best.total - 1e-9:
             best = choice
-    sizes, centre, covariance = _placed(best, shapeless)
-    x, y = centre
+    sizes, center, covariance = _placed(best, shapeless)
+    x, y = center
     yaw = best.shape.yaw + best.lengthwise * math.pi / 2.0
     if math.cos(yaw) * x + math.sin(yaw) * y < 0.0:
         yaw -= math.pi
@@ -140,14 +140,14 @@ def fit_box(
     return Fit(
         (x, y, ground + height / 2.0, sizes[0], sizes[1], height, yaw),
         best.name,
-        covariance + _doubt(choices, best, centre, shapeless),
+        covariance + _doubt(choices, best, center, shapeless),
         best.cost + 2.0 * math.log(prior.share),
         hidden,
     )
 
 
 def _placed(choice: _Choice, shapeless: bool) -> tuple[list[float], tuple[float, float], Array]:
-    """Length and width, the centre and its covariance (2, 2), if this choice is right."""
+    """Length and width, the center and its covariance (2, 2), if this choice is right."""
     prior = prior_of(choice.name)
     order = (0, 1) if choice.lengthwise == 0 else (1, 0)
     sizes, middles, variances = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
@@ -159,13 +159,13 @@ def _placed(choice: _Choice, shapeless: bool) -> tuple[list[float], tuple[float,
         swing = (HEADING_DEVIATION * sizes[0] / 2.0) ** 2
         variances = [variance + swing for variance in variances]
     cos, sin = math.cos(choice.shape.yaw), math.sin(choice.shape.yaw)
-    centre = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
+    center = cos * middles[0] - sin * middles[1], sin * middles[0] + cos * middles[1]
     turn = np.array([[cos, -sin], [sin, cos]])
-    return sizes, centre, turn @ np.diag(variances) @ turn.T
+    return sizes, center, turn @ np.diag(variances) @ turn.T
 
 
-def _doubt(choices: Sequence[_Choice], best: _Choice, centre: tuple[float, float], shapeless: bool) -> Array:
-    """(2, 2) how far the centre would be elsewhere by the other ways to see an object of this class in the points, each
+def _doubt(choices: Sequence[_Choice], best: _Choice, center: tuple[float, float], shapeless: bool) -> Array:
+    """(2, 2) how far the center would be elsewhere by the other ways to see an object of this class in the points, each
     as likely as its cost says [m²].
 
     Spread of the means of a Gaussian mixture (Bar-Shalom, Li and Kirubarajan 2001, section 1.4.16).
@@ -179,7 +179,7 @@ def _doubt(choices: Sequence[_Choice], best: _Choice, centre: tuple[float, float
         total += weight
         if choice is not best:
             there = _placed(choice, shapeless)[1]
-            off = np.array([there[0] - centre[0], there[1] - centre[1]])
+            off = np.array([there[0] - center[0], there[1] - center[1]])
             spread += weight * np.outer(off, off)
     return spread / total
 

@@ -18,10 +18,10 @@ CELL = 0.1
 NEAREST = 0.5
 """Points within this distance always belong together [m]."""
 COLUMNS = 2.0
-"""Farther away they do within so many gaps between two neighbouring columns of rays."""
+"""Farther away they do within so many gaps between two neighboring columns of rays."""
 NEXT_COLUMN = 1.5
 GRAZING = math.radians(10.0)
-"""Points of neighbouring columns belong together where a surface through both meets the ray at this angle or more."""
+"""Points of neighboring columns belong together where a surface through both meets the ray at this angle or more."""
 DEEPEST = 4.5
 """But not if one lies this much behind the other: less than the length of a car [m]."""
 
@@ -30,7 +30,7 @@ def clusters(points: Array, azimuth_step: float, *, grazing: bool = True) -> lis
     """The rows of each cluster of points (N, 2 or more) seen from above, the sensor at the origin.
 
     Euclidean clustering by a k-d tree (Rusu, Semantic 3D object maps, 2010) with a reach that grows with the distance
-    from the sensor, as the gaps between its columns of rays do. With `grazing`, neighbouring columns are also joined by
+    from the sensor, as the gaps between its columns of rays do. With `grazing`, neighboring columns are also joined by
     the angle between the ray and what joins their points, for surfaces that the rays graze (Bogoslavskyi and Stachniss,
     Fast range image-based segmentation of sparse 3D laser scans, IROS 2016).
     """

@@ -41,13 +41,13 @@ class LidarDetectorSettings(Settings):
     """What the property `detector_settings` may say.
 
     off_road      how far beside the roads of the map an object may be [m]; None looks everywhere
-    least_points  of an object
-    least_score   below which an object is not reported
+    min_points  of an object
+    min_score   below which an object is not reported
     """
 
     off_road: NonNegativeFloat | None = 0.5
-    least_points: PositiveInt = 3
-    least_score: float = Field(default=0.05, ge=0.0, le=1.0)
+    min_points: PositiveInt = 3
+    min_score: float = Field(default=0.05, ge=0.0, le=1.0)
 
 
 class LidarDetector(Detector):
@@ -85,8 +85,8 @@ class LidarDetector(Detector):
             pattern = self._patterns.get(name) or pattern_from_points(reading.points)
             turn = self._turns[name].add(readings.time, reading) if name in self._turns else reading
             scan = Scan(turn, pattern, foot, self._surroundings.near_road if restricted else None)
-            found += [(one, scan.frame) for one in objects(scan, self._surroundings, self.settings.least_points)]
-        found = [(one, frame) for one, frame in found if _score(one) >= self.settings.least_score]
+            found += [(one, scan.frame) for one in objects(scan, self._surroundings, self.settings.min_points)]
+        found = [(one, frame) for one, frame in found if _score(one) >= self.settings.min_score]
         if not found:
             return Detections(readings.time)
         boxes = np.concatenate([frame.boxes_to_world(np.array([one.fit.box])) for one, frame in found])

@@ -38,7 +38,7 @@ def ground_height(points: Array, foot: float) -> Array:
     the lowest points of the bins of each sector. Then the lowest points are followed outwards in each sector, as roads
     are not planes; one that leaves the ground before it faster than roads bend is none. After Himmelsbach, von
     Hundelshausen and Wünsche, Fast segmentation of 3D point clouds for ground vehicles, IV 2010, with lowest points in
-    place of lines. Sectors are centred on the frame's x axis, so that a mirrored scene has mirrored ones.
+    place of lines. Sectors are centered on the frame's x axis, so that a mirrored scene has mirrored ones.
     """
     if not len(points):
         return np.empty(0)

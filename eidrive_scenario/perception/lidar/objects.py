@@ -39,28 +39,28 @@ class FittedObject(NamedTuple):
     fit: Fit
 
 
-def objects(scan: Scan, surroundings: MapContext, least_points: int) -> list[FittedObject]:
+def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[FittedObject]:
     """The objects of a scan that have at least so many points.
 
     A cluster that fits no class is taken apart where its points lie apart; clusters whose boxes overlap are put
     together where one box fits them both.
     """
-    found = _fitted(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), least_points)
+    found = _fitted(scan, surroundings, clusters(scan.points, scan.pattern.azimuth), min_points)
     whole = [one for one in found if one.fit.deviation <= DOUBTFUL]
     for doubtful in (one for one in found if one.fit.deviation > DOUBTFUL):
         parts = clusters(scan.points[doubtful.rows], scan.pattern.azimuth, grazing=False)
         pieces = [doubtful.rows[part] for part in parts]
         good = [
             one
-            for one in (_fitted(scan, surroundings, pieces, least_points) if len(parts) > 1 else [])
+            for one in (_fitted(scan, surroundings, pieces, min_points) if len(parts) > 1 else [])
             if one.fit.deviation <= DOUBTFUL
         ]
         whole += good or [doubtful]
     return [one for one in _joined(scan, whole) if one.fit.deviation <= UNLIKELY and one.fit.name != "pole"]
 
 
-def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], least_points: int) -> list[FittedObject]:
-    groups = [rows for rows in groups if len(rows) >= least_points]
+def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], min_points: int) -> list[FittedObject]:
+    groups = [rows for rows in groups if len(rows) >= min_points]
     headings = np.full(len(groups), np.nan)
     few = [number for number, rows in enumerate(groups) if len(rows) < FEW]
     if few and surroundings.has_map:
@@ -71,15 +71,15 @@ def _fitted(scan: Scan, surroundings: MapContext, groups: list[Integers], least_
         fit = scan.fit(rows, tuple(PRIORS), heading if math.isfinite(heading) else None)
         if fit is not None:
             found.append(FittedObject(rows, fit))
-        elif len(rows) > least_points:
-            found += _taken_apart(scan, rows, least_points)
+        elif len(rows) > min_points:
+            found += _taken_apart(scan, rows, min_points)
     return found
 
 
-def _taken_apart(scan: Scan, rows: Integers, least_points: int) -> list[FittedObject]:
+def _taken_apart(scan: Scan, rows: Integers, min_points: int) -> list[FittedObject]:
     """The pieces of what is larger than any road user."""
     parts = [rows[part] for part in clusters(scan.points[rows], scan.pattern.azimuth, grazing=False)]
-    fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= least_points]
+    fits = [(part, scan.fit(part, tuple(PRIORS))) for part in parts if len(part) >= min_points]
     return [FittedObject(part, fit) for part, fit in fits if fit is not None]
 
 

@@ -62,7 +62,7 @@ _CAR = _hull(
 )
 _TALL = _hull((0.35, 0.47, 0.0), (0.5, 0.5, 0.12), (0.5, 0.5, 0.85), (0.47, 0.47, 1.0))
 _HULLS = {"car": _CAR, "van": _TALL, "truck": _TALL, "bus": _TALL}
-"""Outermost points of bodies, in shares of length, width and height. A picture's box ends at the tyres, the bumpers and
+"""Outermost points of bodies, in shares of length, width and height. A picture's box ends at the tires, the bumpers and
 the roof, not at the corners of the box around the body: bumpers end well above the ground and roofs before the ends."""
 
 
@@ -70,7 +70,7 @@ class ByGround(NamedTuple):
     """What boxes of a picture are in the world.
 
     boxes       (N, 7) in the world frame [m, rad]
-    covariance  (N, 2, 2) of their centres [m²]
+    covariance  (N, 2, 2) of their centers [m²]
     headings    (N, HEADINGS) of the length, that were tried over half a turn [rad]
     costs       (N, HEADINGS) squared errors of the best fit with each, in standard deviations
     """
@@ -196,14 +196,14 @@ class _View:
         count, tried = headings.shape
         place = np.repeat(start[:, None], tried, axis=1)
         damping = np.full((count, tried), 1e-3)
-        error, gradient, information = self._linearised(place, headings, ground)
+        error, gradient, information = self._linearized(place, headings, ground)
         for _ in range(ROUNDS):
             scaled = information + damping[..., None, None] * _diagonal(information)
             step = np.linalg.solve(scaled, gradient[..., None])[..., 0]
             longest = 0.3 * np.linalg.norm(place, axis=-1) + 0.5
             length = np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
             moved = place + step * np.minimum(1.0, longest / length)[..., None]
-            new_error, new_gradient, new_information = self._linearised(moved, headings, ground)
+            new_error, new_gradient, new_information = self._linearized(moved, headings, ground)
             better = new_error < error
             place = np.where(better[..., None], moved, place)
             error = np.where(better, new_error, error)
@@ -212,7 +212,7 @@ class _View:
             damping = np.clip(np.where(better, damping * 0.2, damping * 8.0), 1e-9, 1e6)
         return place, error, information
 
-    def _linearised(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
+    def _linearized(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array, Array]:
         """Squared error, its negative half gradient and its Gauss-Newton matrix at places (N, K, 2)."""
         nudge = 0.01
         tried = place + nudge * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[:, None, None]
@@ -227,7 +227,7 @@ class _View:
         return np.einsum("nke,nke->nk", residual, residual), gradient, information
 
     def _projected(self, place: Array, headings: Array, ground: Array) -> tuple[Array, Array]:
-        """(3, N, K, 4) edges of the projections, and (3, N, K) depths of the centres."""
+        """(3, N, K, 4) edges of the projections, and (3, N, K) depths of the centers."""
         corners = self._hulls * self._sizes[:, None]
         cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
         x = cos * corners[:, None, :, 0] - sin * corners[:, None, :, 1] + place[..., 0:1]
@@ -258,7 +258,7 @@ class _View:
         return np.stack([sides, 1.0 / np.hypot(blur, upwards), sides, 1.0 / lowest], axis=-1)
 
     def _covariance(self, information: Array, heading: Array) -> Array:
-        """(N, 2, 2) of the centres: of the fit, and of half the length and width that are not seen."""
+        """(N, 2, 2) of the centers: of the fit, and of half the length and width that are not seen."""
         values, vectors = np.linalg.eigh(information)
         variances = np.minimum(1.0 / np.maximum(values, 1.0 / LARGEST_VARIANCE), LARGEST_VARIANCE)
         fit = np.einsum("nij,nj,nkj->nik", vectors, variances, vectors)

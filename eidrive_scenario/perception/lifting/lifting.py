@@ -41,7 +41,7 @@ GATE = 3.0
 DOUBTFUL = 9.0
 """Sum of squared deviations from the sizes of its class up to which points suit it."""
 BODY_DEVIATION = 0.15
-"""Of the centre of a body from that of the rectangle around the points on it: bumpers, mirrors and wheel arches [m]."""
+"""Of the center of a body from that of the rectangle around the points on it: bumpers, mirrors and wheel arches [m]."""
 UNLIKELY = 60.0
 """Sum of squared deviations from the sizes of its class beyond which points are not believed to be the object."""
 UNLIKELY_HEADING = 9.0
@@ -146,7 +146,7 @@ def _honest(fit: Fit, scan: Scan, target: _Target, camera: CameraReading) -> Arr
     """
     box = target.box
     spread = fit.covariance * max(1.0, fit.deviation / 3.0) + BODY_DEVIATION**2 * np.eye(2)
-    off = np.array(fit.box[:2]) - target.centre
+    off = np.array(fit.box[:2]) - target.center
     spread += 0.25 * (1.0 - target.agreement(fit)) * np.outer(off, off)
     outline, _ = pixels(box_corners(scan.frame.boxes_to_world(np.array([fit.box])))[0], camera)
     if np.isnan(outline).any():
@@ -174,7 +174,7 @@ class _Target(NamedTuple):
     depth    from the points that are seen of it to its middle, about [m]
     heading  in the level frame, where the points are too few to show one [rad]
     first    of the headings that were tried, evenly over half a turn [rad];  costs  of each, the least is 0
-    centre   where its middle should be (2,) [m];  covariance  of that (2, 2) [m²]; both in the level frame
+    center   where its middle should be (2,) [m];  covariance  of that (2, 2) [m²]; both in the level frame
     cut      whether the picture's border cuts its left or right side off
     """
 
@@ -186,14 +186,14 @@ class _Target(NamedTuple):
     heading: float
     first: float
     costs: list[float]
-    centre: Array
+    center: Array
     covariance: Array
     cut: bool
 
     def agreement(self, fit: Fit) -> float:
         """How well a box agrees with where the object should be, 1 at best: Cauchy's density of the squared distance
         in units of both covariances, as either may be of something else."""
-        off = np.array(fit.box[:2]) - self.centre
+        off = np.array(fit.box[:2]) - self.center
         return 1.0 / (1.0 + 0.5 * float(off @ np.linalg.solve(self.covariance + fit.covariance, off)))
 
     def heading_cost(self, heading: float) -> float:

@@ -33,7 +33,7 @@ SMOOTHING = 0.2
 
 
 class Tracker:
-    """A Kalman filter for each object, gated global nearest neighbours, and the life of tracks.
+    """A Kalman filter for each object, gated global nearest neighbors, and the life of tracks.
 
     Pairs of tracks and boxes are the likeliest together (Hungarian method), each with a squared Mahalanobis distance
     within the gate of the chi-square distribution (Bar-Shalom and Li, Multitarget-multisensor tracking, 1995, section

@@ -10,7 +10,7 @@ from html import escape
 WIDTH, HEIGHT = 1100.0, 300.0
 LEFT, RIGHT, TOP, BOTTOM = 52.0, 140.0, 14.0, 42.0
 INK, GRID, TEXT, PAPER = "var(--axis, #475569)", "var(--line, #e5e7eb)", "var(--text, #334155)", "var(--paper, #fff)"
-"""Colours of the page around it, in which light and dark differ; each with the one for where there is no page."""
+"""Colors of the page around it, in which light and dark differ; each with the one for where there is no page."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class ChartSeries:
     """One line of a chart: points (x, y), and a mark at one of them (its index) if wanted."""
 
     name: str
-    colour: str
+    color: str
     x: tuple[float, ...]
     y: tuple[float, ...]
     dashes: str = ""
@@ -69,12 +69,12 @@ def line_chart(
             continue
         dashes = f' stroke-dasharray="{line.dashes}"' if line.dashes else ""
         parts.append(
-            f'<path d="{path}" fill="none" stroke="{line.colour}" stroke-width="2.2" stroke-linejoin="round"{dashes}/>'
+            f'<path d="{path}" fill="none" stroke="{line.color}" stroke-width="2.2" stroke-linejoin="round"{dashes}/>'
         )
         if line.mark is not None:
             x, y = at(line.x[line.mark], line.y[line.mark])
             parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{line.colour}" style="stroke:{PAPER}" '
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{line.color}" style="stroke:{PAPER}" '
                 'stroke-width="1.5"/>'
             )
         ends.append((at(*last), line))
@@ -103,9 +103,9 @@ def _names(ends: Sequence[tuple[tuple[float, float], ChartSeries]]) -> list[str]
     for (x, y), line in sorted(ends, key=lambda end: end[0][1]):
         last = max(y, last + 16)
         drawn.append(
-            f'<path d="M{x + 3:.1f} {y:.1f}L{WIDTH - RIGHT + 10:.1f} {last:.1f}" stroke="{line.colour}" '
+            f'<path d="M{x + 3:.1f} {y:.1f}L{WIDTH - RIGHT + 10:.1f} {last:.1f}" stroke="{line.color}" '
             'stroke-width="1" fill="none" opacity="0.6"/>'
-            f'<text x="{WIDTH - RIGHT + 14:.1f}" y="{last + 4:.1f}" fill="{line.colour}" font-weight="600">'
+            f'<text x="{WIDTH - RIGHT + 14:.1f}" y="{last + 4:.1f}" fill="{line.color}" font-weight="600">'
             f"{escape(line.name)}</text>"
         )
     return drawn

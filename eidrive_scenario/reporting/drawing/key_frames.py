@@ -19,7 +19,7 @@ from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
 Array = NDArray[np.float64]
 
 NEAR = 3.0
-"""A box whose centre is this near to where the car was then is taken for it [m]."""
+"""A box whose center is this near to where the car was then is taken for it [m]."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,14 @@ class Moment:
 class Story:
     """A run in short: the decisive instants in order, and series over time.
 
-    times (N,) [s], centres and boxes (N,) distance between centres and between bodies [m], speeds (N,) of the ego [m/s]
+    times (N,) [s], centers and boxes (N,) distance between centers and between bodies [m], speeds (N,) of the ego [m/s]
     """
 
     ego: str
     hidden: str
     moments: tuple[Moment, ...]
     times: tuple[float, ...]
-    centres: tuple[float, ...]
+    centers: tuple[float, ...]
     boxes: tuple[float, ...]
     speeds: tuple[float, ...]
     touched: bool
@@ -62,7 +62,7 @@ class KeyFrames:
 
     heard    the ego knows the car from others alone; where it never does:
     hidden   others see the car, and the ego does not (any more)
-    entered  the car's centre enters a conflict area, where there are any
+    entered  the car's center enters a conflict area, where there are any
     braked   the ego brakes with a deceleration that its plan asks for
     closest  the smallest gap between the bodies, or their first touch
 
@@ -74,7 +74,7 @@ class KeyFrames:
         self._knowledge = SnapshotBuilder(ego)
         self._times: list[float] = []
         self._where: list[tuple[float, float]] = []
-        self._centres: list[float] = []
+        self._centers: list[float] = []
         self._boxes: list[float] = []
         self._speeds: list[float] = []
         self._met: list[float] = []
@@ -117,24 +117,24 @@ class KeyFrames:
             self.hidden,
             tuple(moments),
             tuple(self._met),
-            tuple(self._centres),
+            tuple(self._centers),
             tuple(self._boxes),
             tuple(self._speeds),
             self._touched,
         )
 
     def _measure(self, ego: list[float], hidden: list[float], snapshot: StationSnapshot) -> None:
-        centre, box = math.dist(ego[:2], hidden[:2]), box_distance(ego, hidden)
+        center, box = math.dist(ego[:2], hidden[:2]), box_distance(ego, hidden)
         self._met.append(snapshot.time)
-        self._centres.append(centre)
+        self._centers.append(center)
         self._boxes.append(box)
         self._speeds.append(float(snapshot.view.speed[snapshot.view.row(self.ego)]))
         if self._touched:
             return
         pair = {self.ego, self.hidden}
         self._touched = box == 0.0 or any({touch.first, touch.second} == pair for touch in snapshot.view.contacts)
-        if self._touched or (box, centre) < self._least:
-            self._least = (box, centre)
+        if self._touched or (box, center) < self._least:
+            self._least = (box, center)
             title = f"{self.hidden} and {self.ego} collide" if self._touched else f"closest, {box:.2f} m apart"
             self._found["closest"] = (title, snapshot)
 
@@ -154,7 +154,7 @@ class KeyFrames:
                     title = f"{self.ego} knows {self.hidden} from {_listed(list(dict.fromkeys(senders)))} alone"
                     self._found["heard"] = (title, snapshot)
         if "entered" not in self._found and self.areas:
-            at = snapshot.view.centres[snapshot.view.row(self.hidden), :2]
+            at = snapshot.view.centers[snapshot.view.row(self.hidden), :2]
             if any(points_in_polygon(at, area) for area in self.areas):
                 self._found["entered"] = (f"{self.hidden} enters the conflict area", snapshot)
         if "braked" not in self._found and step is not None and step.plan is not None and step.plan.braking is not None:

@@ -71,7 +71,7 @@ def recorded_roads(recording: Recording) -> RoadDrawing:
 
 
 def thinned(points: Array, tolerance: float = TOLERANCE) -> Array:
-    """The points (N, 2) without those that lie within `tolerance` of the line between their kept neighbours
+    """The points (N, 2) without those that lie within `tolerance` of the line between their kept neighbors
     (Douglas and Peucker 1973)."""
     keep = np.zeros(len(points), dtype=bool)
     keep[[0, -1]] = True
@@ -119,7 +119,7 @@ def _stations(start: float, end: float, spacing: float) -> list[float]:
 
 
 def _edge(road: Road, section: LaneSection, lane: Lane, stations: list[float], *, outer: bool) -> Array:
-    """(N, 2) points of a lane's inner or outer edge; lane 0 has its centre line for both."""
+    """(N, 2) points of a lane's inner or outer edge; lane 0 has its center line for both."""
     width = lane.outer if outer else lane.inner
     points = []
     for s in stations:

@@ -33,9 +33,9 @@ def look_at(eye: Point, target: Point) -> Array:
 
 
 def driver_view(view: WorldView, name: str) -> Array:
-    """The camera pose of somebody who sits in that vehicle: above its centre, looking along its heading."""
+    """The camera pose of somebody who sits in that vehicle: above its center, looking along its heading."""
     row = view.row(name)
-    x, y, z = view.centres[row].tolist()
+    x, y, z = view.centers[row].tolist()
     yaw, height = float(view.yaw[row]), float(view.size[row, 2])
     eye = (x, y, z + 0.4 * height)
     return look_at(eye, (x + 20.0 * math.cos(yaw), y + 20.0 * math.sin(yaw), eye[2] - 0.4))
@@ -44,8 +44,8 @@ def driver_view(view: WorldView, name: str) -> Array:
 def helper_view(view: WorldView, name: str, target: str) -> Array:
     """The camera pose on top of one actor, looking at another."""
     row = view.row(name)
-    x, y, z = view.centres[row].tolist()
-    at = view.centres[view.row(target)].tolist()
+    x, y, z = view.centers[row].tolist()
+    at = view.centers[view.row(target)].tolist()
     return look_at((x, y, z + 0.5 * float(view.size[row, 2]) + 0.1), (at[0], at[1], at[2]))
 
 

@@ -58,7 +58,7 @@ class Window:
 
 @dataclass(frozen=True)
 class RoadDrawing:
-    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, colour, polyline (M, 2)) [m]."""
+    """Roads seen from above: lanes (type, polygon (M, 2)) and painted lines (type, color, polyline (M, 2)) [m]."""
 
     lanes: tuple[tuple[str, Array], ...] = ()
     markings: tuple[tuple[str, str, Array], ...] = ()
@@ -72,8 +72,8 @@ def roads_symbol(roads: RoadDrawing, identifier: str) -> str:
         for kind, polygon in roads.lanes
     )
     lines = "".join(
-        f'<path d="{_path(line)}" fill="none" stroke="{PAINT.get(colour, WHITE)}" stroke-width="0.18"{_dashes(kind)}/>'
-        for kind, colour, line in roads.markings
+        f'<path d="{_path(line)}" fill="none" stroke="{PAINT.get(color, WHITE)}" stroke-width="0.18"{_dashes(kind)}/>'
+        for kind, color, line in roads.markings
     )
     return f'<g id="{escape(identifier)}">{lanes}{lines}</g>'
 
@@ -92,7 +92,7 @@ def top_view(
 
     `roads` are drawn into the picture itself; `roads_id` refers to a `roads_symbol` of the same page instead.
     `conflict_areas` are polygons (M, 2) [m]. `labels` maps an actor's name to what is written beside it; an actor
-    without an entry is labelled with its name, one mapped to "" is not labelled.
+    without an entry is labeled with its name, one mapped to "" is not labeled.
     """
     view = snapshot.view
     names = labels or {}
@@ -130,7 +130,7 @@ def _truth(snapshot: StationSnapshot) -> list[str]:
         own = name == snapshot.station
         fill, opacity = (STATION, "1") if own else ("#ffffff", "0.35")
         if max(length, width) < 1.0:
-            x, y = view.centres[row, :2]
+            x, y = view.centers[row, :2]
             drawn.append(
                 f'<circle class="truth" cx="{x:.2f}" cy="{-y:.2f}" r="0.7" fill="#ffffff" stroke="{TRUTH}" '
                 f'stroke-width="0.25"/><circle cx="{x:.2f}" cy="{-y:.2f}" r="0.28" fill="{TRUTH}"/>'
@@ -149,10 +149,10 @@ def _truth(snapshot: StationSnapshot) -> list[str]:
     return drawn
 
 
-def _boxes(detections: Detections, kind: str, colour: str, stroke: float) -> list[str]:
+def _boxes(detections: Detections, kind: str, color: str, stroke: float) -> list[str]:
     """Received boxes have the broader rim, so that both show where two stations report one object."""
     return [
-        f'<path class="{kind}" d="{_path(corners)}Z" fill="{colour}" fill-opacity="0.28" stroke="{colour}" '
+        f'<path class="{kind}" d="{_path(corners)}Z" fill="{color}" fill-opacity="0.28" stroke="{color}" '
         f'stroke-width="{stroke}" stroke-linejoin="round"/>'
         for corners in footprint(detections.boxes)
     ]
@@ -163,16 +163,16 @@ def _links(snapshot: StationSnapshot) -> list[str]:
     drawn: list[str] = []
     if snapshot.station not in view:
         return drawn
-    x1, y1 = view.centres[view.row(snapshot.station), :2]
+    x1, y1 = view.centers[view.row(snapshot.station), :2]
     for event in snapshot.links:
         if event.sender not in view:
             continue
-        x0, y0 = view.centres[view.row(event.sender), :2]
+        x0, y0 = view.centers[view.row(event.sender), :2]
         lost = event.outcome == "lost"
-        colour, dashes = (LOST, ' stroke-dasharray="0.9 0.9"') if lost else (LINK, "")
+        color, dashes = (LOST, ' stroke-dasharray="0.9 0.9"') if lost else (LINK, "")
         drawn.append(
             f'<line class="link {event.outcome}" x1="{x0:.2f}" y1="{-y0:.2f}" x2="{x1:.2f}" y2="{-y1:.2f}" '
-            f'stroke="{colour}" stroke-width="0.22"{dashes}/>'
+            f'stroke="{color}" stroke-width="0.22"{dashes}/>'
         )
     return drawn
 
@@ -184,7 +184,7 @@ def _labels(snapshot: StationSnapshot, window: Window, texts: Mapping[str, str])
     taken: list[tuple[float, ...]] = [tuple(map(float, body)) for body in bodies]
     drawn = []
     for row, name in enumerate(view.names):
-        x, y = view.centres[row, :2].tolist()
+        x, y = view.centers[row, :2].tolist()
         if not texts[name] or not (window.left <= x <= window.right and window.bottom <= y <= window.top):
             continue
         left, bottom, right, top = taken[row]
@@ -245,7 +245,7 @@ def _path(points: Array) -> str:
 
 
 def legend() -> str:
-    """What the colours and lines of a top view mean, as HTML."""
+    """What the colors and lines of a top view mean, as HTML."""
     box = '<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" {}/></svg>'
     line = '<svg viewBox="0 0 26 14"><line x1="1" x2="25" y1="7" y2="7" stroke-width="2" {}/></svg>'
     entries = (
@@ -263,8 +263,8 @@ def legend() -> str:
     return "".join(f"<span>{symbol}{escape(text)}</span>" for symbol, text in entries)
 
 
-def _sample(colour: str) -> str:
+def _sample(color: str) -> str:
     return (
-        f'<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" fill="{colour}" '
-        f'fill-opacity=".3" stroke="{colour}" stroke-width="2"/></svg>'
+        f'<svg viewBox="0 0 26 14"><rect x="2" y="2" width="22" height="10" rx="1" fill="{color}" '
+        f'fill-opacity=".3" stroke="{color}" stroke-width="2"/></svg>'
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import Diagnostic, InputError
-from eidrive_scenario.experiments.statistics import Summary, summarise, wilson
+from eidrive_scenario.experiments.statistics import Summary, summarize, wilson
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.reported_run import ReportedRun, reported
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
@@ -107,7 +107,7 @@ def _varied(runs: Sequence[ReportedRun]) -> tuple[str, ...]:
 def _summary(runs: Sequence[ReportedRun], metric: str) -> Summary | None:
     given = [run.metrics.get(metric) for run in runs]
     values = [value for value in given if value is not None and math.isfinite(value)]
-    return summarise(values) if values else None
+    return summarize(values) if values else None
 
 
 def _number(value: float | None, unit: str) -> str:

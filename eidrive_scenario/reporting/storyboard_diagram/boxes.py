@@ -62,9 +62,9 @@ def story_boxes(storyboard: Storyboard) -> list[Box]:
 def init_boxes(storyboard: Storyboard) -> list[Box]:
     """What Init does: a box for each entity, one for what concerns all."""
     lines: dict[str, list[BoxLine]] = {}
-    for behaviour in storyboard.init.actions:
-        lines.setdefault(behaviour.actor_name or "global actions", []).append(
-            BoxLine(Role.WHAT, "", behaviour.describe())
+    for behavior in storyboard.init.actions:
+        lines.setdefault(behavior.actor_name or "global actions", []).append(
+            BoxLine(Role.WHAT, "", behavior.describe())
         )
     return [Box("init", name, (name,), lines=tuple(dict.fromkeys(found))) for name, found in lines.items()]
 
@@ -146,8 +146,8 @@ def _group_lines(group: ManeuverGroupElement) -> list[BoxLine]:
 
 
 def _action_lines(action: ActionElement) -> list[BoxLine]:
-    made = [behaviour for actor in action.actors for behaviour in action.behaviours(actor)]
-    return [BoxLine(Role.WHAT, "", words) for words in dict.fromkeys(behaviour.describe() for behaviour in made)]
+    made = [behavior for actor in action.actors for behavior in action.behaviours(actor)]
+    return [BoxLine(Role.WHAT, "", words) for words in dict.fromkeys(behavior.describe() for behavior in made)]
 
 
 def has_maneuvers(boxes: list[Box]) -> bool:

@@ -84,7 +84,7 @@ def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
     count = "1 entity" if len(scenario.entities) == 1 else f"{len(scenario.entities)} entities"
     parts = [
         _text(MARGIN, MARGIN + 18, scenario.name, size=22, weight=700),
-        _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {count}", colour=MUTED),
+        _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {count}", color=MUTED),
     ]
     y = MARGIN + 60
     first, *others = stop_lines(storyboard)
@@ -100,7 +100,7 @@ def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], fl
     boxes = init_boxes(storyboard)
     if not boxes:
         return [], y
-    parts = [_text(MARGIN, y + 12, "Init", size=TEXT, weight=700, colour=MUTED)]
+    parts = [_text(MARGIN, y + 12, "Init", size=TEXT, weight=700, color=MUTED)]
     columns = max(1, int((width - MARGIN + GAP) // (INIT_WIDTH + GAP)))
     y += 22.0
     for first in range(0, len(boxes), columns):
@@ -113,24 +113,24 @@ def _init(storyboard: Storyboard, y: float, width: float) -> tuple[list[str], fl
 
 def _columns(layout: DiagramLayout, y: float) -> Iterator[str]:
     for kind, x in layout.columns.items():
-        yield _text(x, y, KINDS[kind][0], size=TEXT, weight=700, colour=KINDS[kind][1])
+        yield _text(x, y, KINDS[kind][0], size=TEXT, weight=700, color=KINDS[kind][1])
 
 
 def _box(placed: Placed) -> list[str]:
-    name, colour = KINDS[placed.box.kind]
+    name, color = KINDS[placed.box.kind]
     x, y, width, height = placed.x, placed.y, placed.width, placed.height
     where = " / ".join(placed.box.path)
     parts = [
         f"<g><title>{escape(f'{name}: {where}')}</title>",
-        f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="5" fill="{colour}" '
-        f'fill-opacity="0.07" stroke="{colour}" stroke-opacity="0.45"/>',
-        f'<path d="M{x + 1.5:.1f} {y + 4:.1f}v{height - 8:.1f}" stroke="{colour}" stroke-width="3"/>',
+        f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="5" fill="{color}" '
+        f'fill-opacity="0.07" stroke="{color}" stroke-opacity="0.45"/>',
+        f'<path d="M{x + 1.5:.1f} {y + 4:.1f}v{height - 8:.1f}" stroke="{color}" stroke-width="3"/>',
     ]
     base = y + PADDING + TITLE - 2
     for number, title in enumerate(placed.title):
         parts.append(_text(x + PADDING, base + number * LEADING, title, size=TITLE, weight=700))
     if placed.box.remark:
-        parts.append(_text(x + width - PADDING, base, placed.box.remark, colour=colour, anchor="end"))
+        parts.append(_text(x + width - PADDING, base, placed.box.remark, color=color, anchor="end"))
     base += LEADING * len(placed.title) + 4
     for number, line in enumerate(placed.lines):
         parts.append(_line(x + PADDING, base + number * LEADING, line))
@@ -138,9 +138,9 @@ def _box(placed: Placed) -> list[str]:
 
 
 def _line(x: float, y: float, line: TextLine) -> str:
-    colour = ROLES[line.source.role]
+    color = ROLES[line.source.role]
     text = _text(x + line.indent, y, line.text, weight=600 if line.source.role is Role.WHO else 400)
-    return (_text(x, y, line.lead, colour=colour, weight=600) if line.lead else "") + text
+    return (_text(x, y, line.lead, color=color, weight=600) if line.lead else "") + text
 
 
 def _wire(parent: Placed, child: Placed) -> str:
@@ -154,7 +154,7 @@ def _wire(parent: Placed, child: Placed) -> str:
     return f'<path d="{way}" fill="none" stroke="{WIRE}" stroke-width="1.5"/>'
 
 
-def _arrow(arrow: Arrow, colour: str) -> str:
+def _arrow(arrow: Arrow, color: str) -> str:
     """Out of the source's lower left, along its lane, into the first line of the target's trigger."""
     source, target = arrow.source, arrow.target
     y0 = source.y + source.height - 9.0
@@ -166,8 +166,8 @@ def _arrow(arrow: Arrow, colour: str) -> str:
     )
     words = f"{target.box.title} waits for {source.box.title}"
     return (
-        f'<g class="arrow"><title>{escape(words)}</title><path d="{way}" fill="none" stroke="{colour}" '
-        f'marker-end="url(#tip)"/><circle cx="{source.x:.1f}" cy="{y0:.1f}" r="2.6" fill="{colour}"/></g>'
+        f'<g class="arrow"><title>{escape(words)}</title><path d="{way}" fill="none" stroke="{color}" '
+        f'marker-end="url(#tip)"/><circle cx="{source.x:.1f}" cy="{y0:.1f}" r="2.6" fill="{color}"/></g>'
     )
 
 
@@ -178,10 +178,10 @@ def _text(
     *,
     size: float = TEXT,
     weight: int = 400,
-    colour: str = INK,
+    color: str = INK,
     anchor: str = "start",
 ) -> str:
     return (
-        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" font-weight="{weight}" fill="{colour}" '
+        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" font-weight="{weight}" fill="{color}" '
         f'text-anchor="{anchor}">{escape(text)}</text>'
     )

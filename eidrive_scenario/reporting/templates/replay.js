@@ -2,9 +2,9 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const element = (id) => document.getElementById(id);
 const canvas = element("street"), pen = canvas.getContext("2d");
-const C = data.colours, INK = "#334155", SELF = "#0f172a", NEAR = 30;
+const C = data.colors, INK = "#334155", SELF = "#0f172a", NEAR = 30;
 let index = 0, playing = false, startedAt = 0, startedFrom = 0;
-let scale = 10, centreX = 0, centreY = 0;
+let scale = 10, centerX = 0, centerY = 0;
 
 function make(tag, text, parent) {
   const made = document.createElement(tag);
@@ -22,11 +22,11 @@ for (const [time, path, after, why] of data.changes) {
   item.title = path + (why ? ": " + why : "");
   item.onclick = () => { pause(); show(data.times.findIndex((t) => t >= time - 1e-6)); };
 }
-for (const [colour, text] of [[C.own, "seen by the station itself (%: probability of existence)"], [C.received, "received from others"], [C.link, "message arrives"], [C.lost, "message lost"]]) {
+for (const [color, text] of [[C.own, "seen by the station itself (%: probability of existence)"], [C.received, "received from others"], [C.link, "message arrives"], [C.lost, "message lost"]]) {
   const entry = make("span", "", element("legend"));
   const patch = make("i", "", entry);
   patch.className = "swatch";
-  patch.style.background = colour;
+  patch.style.background = color;
   patch.style.margin = "0";
   entry.append(text);
 }
@@ -39,7 +39,7 @@ function fit() {
     left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y);
   }
   const area = canvas.getBoundingClientRect();
-  centreX = (left + right) / 2; centreY = (bottom + top) / 2;
+  centerX = (left + right) / 2; centerY = (bottom + top) / 2;
   scale = Math.min(area.width / (right - left + 16), area.height / (top - bottom + 16));
   draw();
 }
@@ -64,13 +64,13 @@ function box([x, y, length, width, yaw], fill, stroke, line, opacity) {
 }
 
 /* A box that somebody knows of; the less likely its object is to exist, the paler and thinner. */
-function perceived(at, colour, line) {
+function perceived(at, color, line) {
   const existence = at.length > 5 ? at[5] : 1;
-  box(at, colour, colour, line * (0.3 + 0.7 * existence), 0.28 * existence);
+  box(at, color, color, line * (0.3 + 0.7 * existence), 0.28 * existence);
   if (existence < 0.995) {
     pen.save();
     pen.translate(at[0], at[1]); pen.scale(1, -1);
-    pen.font = "1.4px sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillStyle = colour;
+    pen.font = "1.4px sans-serif"; pen.textAlign = "center"; pen.textBaseline = "middle"; pen.fillStyle = color;
     pen.fillText(`${Math.round(100 * existence)} %`, 0, 0);
     pen.restore();
   }
@@ -97,17 +97,17 @@ function draw() {
   canvas.height = area.height * ratio;
   const poses = data.poses[index], self = element("station").value;
   const station = self ? data.stations[self][index] : null;
-  const at = (x, y) => [area.width / 2 + (x - centreX) * scale, area.height / 2 - (y - centreY) * scale];
+  const at = (x, y) => [area.width / 2 + (x - centerX) * scale, area.height / 2 - (y - centerY) * scale];
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.fillStyle = C.ground;
   pen.fillRect(0, 0, area.width, area.height);
-  pen.setTransform(scale * ratio, 0, 0, -scale * ratio, (area.width / 2 - centreX * scale) * ratio, (area.height / 2 + centreY * scale) * ratio);
-  for (const [colour, polygon] of data.roads.lanes) {
-    trace(polygon); pen.closePath(); pen.fillStyle = pen.strokeStyle = colour; pen.lineWidth = 0.05; pen.fill(); pen.stroke();
+  pen.setTransform(scale * ratio, 0, 0, -scale * ratio, (area.width / 2 - centerX * scale) * ratio, (area.height / 2 + centerY * scale) * ratio);
+  for (const [color, polygon] of data.roads.lanes) {
+    trace(polygon); pen.closePath(); pen.fillStyle = pen.strokeStyle = color; pen.lineWidth = 0.05; pen.fill(); pen.stroke();
   }
   pen.lineWidth = 0.18;
-  for (const [broken, colour, line] of data.roads.lines) {
-    pen.setLineDash(broken ? [3, 3] : []); pen.strokeStyle = colour; trace(line); pen.stroke();
+  for (const [broken, color, line] of data.roads.lines) {
+    pen.setLineDash(broken ? [3, 3] : []); pen.strokeStyle = color; trace(line); pen.stroke();
   }
   if (station && poses[self]) for (const [sender, delivered] of station.links) if (poses[sender]) {
     pen.setLineDash(delivered ? [] : [0.9, 0.9]);
@@ -198,7 +198,7 @@ canvas.addEventListener("wheel", (event) => { event.preventDefault(); scale *= M
 canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
 canvas.addEventListener("pointermove", (event) => {
   if (!event.buttons) return;
-  centreX -= event.movementX / scale; centreY += event.movementY / scale; draw();
+  centerX -= event.movementX / scale; centerY += event.movementY / scale; draw();
 });
 addEventListener("resize", draw);
 show(0);

@@ -1,4 +1,4 @@
-"""World coordinates to roads and lanes: nearest sample of a lane centre first, Newton's method on the road after."""
+"""World coordinates to roads and lanes: nearest sample of a lane center first, Newton's method on the road after."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from eidrive_scenario.roads.model.location import Array, Integers, LaneLocations
 SPACING = 4.0
 """Distance between samples along a lane [m]."""
 NARROW = 1.0
-"""Lanes narrower than this are found by way of their neighbours [m]."""
+"""Lanes narrower than this are found by way of their neighbors [m]."""
 CANDIDATES = 12
 MANY = 1000
 """More points than this are put in order first."""
@@ -26,7 +26,7 @@ REACH = 30.0
 class Locator:
     """Finds road and lane coordinates of points.
 
-    A point is taken to the road whose lane centre is nearest; where it turns out to lie on none of that road's lanes,
+    A point is taken to the road whose lane center is nearest; where it turns out to lie on none of that road's lanes,
     the roads of the next samples are tried and the one wins that the point lies on, or is nearest to.
     """
 
@@ -51,7 +51,7 @@ class Locator:
         distance, nearest = (np.asarray(part) for part in tree.query(points, k=1, distance_upper_bound=hopeless))
         if len(points) <= MANY and distance.max(initial=0.0) < np.inf:
             return self._located(tree, points, nearest, reach)
-        # Neighbours one after the other: tables are searched faster in order.
+        # Neighbors one after the other: tables are searched faster in order.
         order = np.flatnonzero(distance < np.inf)
         order = order[np.argsort(nearest[order])]
         some = self._located(tree, points[order], nearest[order], reach)
@@ -75,14 +75,14 @@ class Locator:
             road[doubtful], s[doubtful], t[doubtful], row[doubtful], outside[doubtful] = best
         heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
-        centre, _ = self._tables.lane_t(row, s)
+        center, _ = self._tables.lane_t(row, s)
         return LaneLocations(
             roads=self._tables.ids,
             road=np.where(far, -1, road),
             lane=np.where(far, 0, self._tables.lane_id[row]),
             s=s,
             t=t,
-            offset=t - centre,
+            offset=t - center,
             heading=heading,
             outside=outside,
         )

@@ -16,8 +16,8 @@ from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 BEYOND = 0.1
 """How far beyond an end of a road a place may lie and still count as its end [m]."""
 LEAST_STRETCH = 0.05
-"""A lane inside the centre of a bend has no length to speak of, and no heading of its own: so many metres of path count
-per metre of s."""
+"""A lane inside the center of a bend has no length to speak of, and no heading of its own: so many meters of path count
+per meter of s."""
 
 
 def road_pose_at(road: Road, s: float, t: float) -> Pose:
@@ -44,7 +44,7 @@ def lateral_axis(slope: float, roll: float) -> tuple[float, float, float]:
 
 
 class Tangent(NamedTuple):
-    """A point of a lane on a banked road and the change of its place per metre of s.
+    """A point of a lane on a banked road and the change of its place per meter of s.
 
     The axes are those of the reference line seen from above: ahead, to the left, and up [m].
     """
@@ -59,7 +59,7 @@ class Tangent(NamedTuple):
 
 
 def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: float, speed: float) -> Tangent:
-    """Return the place and tangent of a lane at t that changes by `sideways` per metre of s.
+    """Return the place and tangent of a lane at t that changes by `sideways` per meter of s.
 
     `curvature` and `speed` are those of the reference line at s.
     """
@@ -84,7 +84,7 @@ def banked_tangent(road: Road, s: float, t: float, sideways: float, curvature: f
 
 
 def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pose:
-    """The pose at a lane's centre line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
+    """The pose at a lane's center line plus `offset`; heading and pitch are the lane's, in the direction of growing s.
 
     A lane that the map lifts (a sidewalk) is higher than the road beneath it. Raises PositionError.
     """
@@ -117,7 +117,7 @@ def lane_pose_at(road: Road, lane_id: int, s: float, offset: float = 0.0) -> Pos
 
 
 def lane_height(lane: Lane, ds: float, offset: float) -> float:
-    """How much a lane is lifted above the road, `offset` off its centre line, ds behind its section's start [m]."""
+    """How much a lane is lifted above the road, `offset` off its center line, ds behind its section's start [m]."""
     record = None
     for height in lane.heights:
         if height.s_offset <= ds + 1e-9:
@@ -130,12 +130,12 @@ def lane_height(lane: Lane, ds: float, offset: float) -> float:
 
 
 def lane_t(road: Road, section: LaneSection, lane: Lane, s: float) -> tuple[float, float]:
-    """t of a lane's centre line at s, and its derivative."""
+    """t of a lane's center line at s, and its derivative."""
     t, slope = road.lane_offset.value_and_slope(s)
     if lane.id == 0:
         return t, slope
-    centre, centre_slope = lane.centre.value_and_slope(s - section.s)
-    return (t + centre, slope + centre_slope) if lane.id > 0 else (t - centre, slope - centre_slope)
+    center, center_slope = lane.center.value_and_slope(s - section.s)
+    return (t + center, slope + center_slope) if lane.id > 0 else (t - center, slope - center_slope)
 
 
 def lane_at(road: Road, lane_id: int, s: float) -> tuple[LaneSection, Lane]:

@@ -56,7 +56,7 @@ class RoadTables:
         self.lane_id = np.array([lane.id for lane in lanes], dtype=np.int64)
         self.lane_drivable = np.array([lane.drivable for lane in lanes])
         spans = [section.length for section, group in zip(sections, ordered, strict=True) for _ in group]
-        self.centre = PolynomialTable([lane.centre for lane in lanes], spans)
+        self.center = PolynomialTable([lane.center for lane in lanes], spans)
         self.outer = PolynomialTable([lane.outer for lane in lanes], spans)
         self.width = PolynomialTable([lane.width for lane in lanes], spans)
 
@@ -131,7 +131,7 @@ class RoadTables:
         return -sin * slope / steep, np.cos(roll), sin / steep, roll
 
     def lane_poses(self, row: Integers, s: Array, offset: Array) -> Poses:
-        """Poses at the centre lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
+        """Poses at the center lines of lanes (running numbers) plus offset; `poses.lane_pose_at` over arrays."""
         section = self.lane_section[row]
         road = self.section_road[section]
         t, sideways = self.lane_t(row, s)
@@ -178,11 +178,11 @@ class RoadTables:
         return ahead, left, z + t * sin * level, along, aside, climb, lean
 
     def stretch_at(self, road: Integers, s: Array, t: Array, curvature: Array, speed: Array) -> Array:
-        """Return the metres ahead per metre of s at a constant t, (N,), on roads that may be banked."""
+        """Return the meters ahead per meter of s at a constant t, (N,), on roads that may be banked."""
         return self._banked_tangent(road, s, t, np.zeros_like(s), curvature, speed)[3]
 
     def stretch(self, row: Integers, s: Array) -> Array:
-        """Metres of path per metre of s along lanes' centre lines, in plan view."""
+        """Meters of path per meter of s along lanes' center lines, in plan view."""
         t, slope = self.lane_t(row, s)
         road = self.section_road[self.lane_section[row]]
         curvature, speed = self.curves.bend(road, s)
@@ -195,12 +195,12 @@ class RoadTables:
             yield LaneKey(self.ids[road], section - int(self.first_section[road]), lane), row
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:
-        """t of lanes' centre lines and its derivative."""
+        """t of lanes' center lines and its derivative."""
         section = self.lane_section[row]
         t, slope = self.lane_offset.value_and_slope(self.section_road[section], s)
-        centre, centre_slope = self.centre.value_and_slope(row, s - self.section_start[section])
+        center, center_slope = self.center.value_and_slope(row, s - self.section_start[section])
         side = np.sign(self.lane_id[row])
-        return t + side * centre, slope + side * centre_slope
+        return t + side * center, slope + side * center_slope
 
     def lane_beside(self, road: Integers, s: Array, t: Array) -> tuple[Integers, Array]:
         """Running number of the lane at road coordinates, and the distance from the road's edge (0 on the road)."""

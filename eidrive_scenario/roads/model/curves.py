@@ -20,15 +20,15 @@ from eidrive_scenario.roads.model.location import Array, Integers
 from eidrive_scenario.roads.model.polynomials import spread
 
 FLAT_PHASE = 1e7
-"""Above this phase k²/(2c) a spiral is an arc to less than a millimetre, and Fresnel integrals lose their digits."""
+"""Above this phase k²/(2c) a spiral is an arc to less than a millimeter, and Fresnel integrals lose their digits."""
 
 
 MOST_CUBICS = 20_000
-"""Cubics that stand for one poly3; those of a longer one than so many metres are longer than a metre."""
+"""Cubics that stand for one poly3; those of a longer one than so many meters are longer than a meter."""
 
 
 class CurvePoint(NamedTuple):
-    """A point of a reference line: x, y [m], heading [rad], curvature [1/m], metres of path per metre of s."""
+    """A point of a reference line: x, y [m], heading [rad], curvature [1/m], meters of path per meter of s."""
 
     x: float
     y: float
@@ -56,10 +56,10 @@ class Curve(ABC):
 
     @abstractmethod
     def at(self, ds: float) -> CurvePoint:
-        """The point `ds` metres behind the start."""
+        """The point `ds` meters behind the start."""
 
     def bend(self, ds: float) -> tuple[float, float]:
-        """Curvature and metres of path per metre of s there: `at` without the place."""
+        """Curvature and meters of path per meter of s there: `at` without the place."""
         point = self.at(ds)
         return point.curvature, point.speed
 
@@ -173,7 +173,7 @@ def poly3(
     """The curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature; each cubic meets the curve's points and tangents at both
-    of its ends (Hermite), so the error falls with the fourth power of its length and stays far below a millimetre.
+    of its ends (Hermite), so the error falls with the fourth power of its length and stays far below a millimeter.
     """
     a, b, c, d = v
 
@@ -239,7 +239,7 @@ class ReferenceLine:
         return self.curves[index], starts[index] if index > 0 else -math.inf
 
     def bend(self, s: float) -> tuple[float, float]:
-        """Curvature [1/m] and metres of path per metre of s at s [m]."""
+        """Curvature [1/m] and meters of path per meter of s at s [m]."""
         curve = self.curves[bisect_right(self.starts, s, 1) - 1]
         return curve.bend(s - curve.s)
 
@@ -265,7 +265,7 @@ class CurveTable:
         ).reshape(-1, 9)
 
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """x, y, heading, curvature and metres of path per metre of s at s (N,) of lines (N,)."""
+        """x, y, heading, curvature and meters of path per meter of s at s (N,) of lines (N,)."""
         curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         kind = self._kind[curve]
@@ -283,7 +283,7 @@ class CurveTable:
         return self._x[curve] + cos * u - sin * v, self._y[curve] + sin * u + cos * v, h + turn, curvature, speed
 
     def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
-        """Curvature and metres of path per metre of s at s (N,) of lines (N,): `at` without the places."""
+        """Curvature and meters of path per meter of s at s (N,) of lines (N,): `at` without the places."""
         curve = np.maximum(np.searchsorted(self._keys, self.base[line] + s, side="right") - 1, 0)
         ds = s - self._starts[curve]
         curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)

@@ -65,7 +65,7 @@ class Poses(NamedTuple):
 class LaneLocation(NamedTuple):
     """A place in lane coordinates.
 
-    s, t    road coordinates [m]; offset  distance from the lane's centre line, positive in the direction of t [m]
+    s, t    road coordinates [m]; offset  distance from the lane's center line, positive in the direction of t [m]
     """
 
     road: str
@@ -89,7 +89,7 @@ class LaneLocations:
 
     road      index into `roads`, -1 where no road is within reach
     lane      lane id; 0 where no road is within reach
-    s, t      road coordinates [m]; offset  from the lane's centre line, positive in the direction of t [m]
+    s, t      road coordinates [m]; offset  from the lane's center line, positive in the direction of t [m]
     heading   of the reference line at s [rad]
     outside   distance from the edge of the road, 0 on the road [m]; at least `reach` where none is within it
     """

@@ -161,5 +161,5 @@ class PolynomialTable:
 
 
 def spread(spans: Sequence[float]) -> Array:
-    """Where each of several stretches begins on a common axis, one metre apart."""
+    """Where each of several stretches begins on a common axis, one meter apart."""
     return np.fromiter(accumulate((span + 1.0 for span in spans), initial=0.0), dtype=np.float64)[:-1]

@@ -1,6 +1,6 @@
 """What an OpenDRIVE file says, as plain data: roads, lanes, junctions, signals, objects.
 
-Names follow ASAM OpenDRIVE 1.6 to 1.8; lengths in metres, angles in radians, speeds in m/s.
+Names follow ASAM OpenDRIVE 1.6 to 1.8; lengths in meters, angles in radians, speeds in m/s.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Lane:
     width: Polynomials
     inner: Polynomials
     outer: Polynomials
-    centre: Polynomials
+    center: Polynomials
     predecessors: tuple[int, ...] = ()
     successors: tuple[int, ...] = ()
     level: bool = False

@@ -1,7 +1,7 @@
 """What the state of a traffic light means for its lamps.
 
 The standard leaves the text of a state to the tools. Understood are lists of lamps from top to bottom, as esmini has
-them ("on;off;off"), colours ("red", "redYellow", CARLA's "GREEN", tier4's "green solidOn circle"), and the semantic
+them ("on;off;off"), colors ("red", "redYellow", CARLA's "GREEN", tier4's "green solidOn circle"), and the semantic
 states of the standard's user guide ("go", "caution", "stop").
 """
 
@@ -21,10 +21,10 @@ FLASHES_PER_SECOND = 1.0
 
 USUAL = (RED, YELLOW, GREEN)
 """The lamps of a light of which nothing else is known, from top to bottom."""
-_COLOURS: Mapping[int, tuple[str, ...]] = {1: (YELLOW,), 2: (RED, GREEN), 3: USUAL}
+_COLORS: Mapping[int, tuple[str, ...]] = {1: (YELLOW,), 2: (RED, GREEN), 3: USUAL}
 """The lamps of a light with so many of them."""
 _TYPES: Mapping[str, tuple[str, ...]] = {"1000002": (RED, GREEN), "1000009": (RED, YELLOW), "1000013": (RED, GREEN)}
-"""Types of OpenDRIVE's own catalogue with other lamps than red, yellow and green."""
+"""Types of OpenDRIVE's own catalog with other lamps than red, yellow and green."""
 
 _MODES = {"on": ON, "off": OFF, "flashing": FLASHING, "blinking": FLASHING, "true": ON, "false": OFF}
 _WORDS = {
@@ -35,37 +35,37 @@ _WORDS = {
 _FLASHES = frozenset({"flashing", "flash", "blinking", "blink"})
 
 
-def lamp_colours(signal: Signal) -> tuple[str, ...]:
+def lamp_colors(signal: Signal) -> tuple[str, ...]:
     """The lamps of a traffic light, from top to bottom; none for a sign."""
     return _TYPES.get(signal.type, USUAL) if signal.dynamic else ()
 
 
 @lru_cache(maxsize=1024)
-def lamps(state: str, colours: tuple[str, ...] = USUAL) -> tuple[tuple[str, str], ...]:
-    """Colour and mode (on, off, flashing) of each lamp in a state, from top to bottom.
+def lamps(state: str, colors: tuple[str, ...] = USUAL) -> tuple[tuple[str, str], ...]:
+    """Color and mode (on, off, flashing) of each lamp in a state, from top to bottom.
 
     A state that lists another number of lamps than the light is known to have is believed. A state that is not
     understood leaves the lamps dark.
     """
     modes = _listed(state)
-    if modes is not None and (len(modes) > 1 or len(colours) == 1):
-        if len(modes) != len(colours):
-            colours = _COLOURS.get(len(modes), (*USUAL, *[GREEN] * len(modes))[: len(modes)])
-        return tuple(zip(colours, modes, strict=True))
+    if modes is not None and (len(modes) > 1 or len(colors) == 1):
+        if len(modes) != len(colors):
+            colors = _COLORS.get(len(modes), (*USUAL, *[GREEN] * len(modes))[: len(modes)])
+        return tuple(zip(colors, modes, strict=True))
     lit = _named(state)
-    return tuple((colour, lit.get(colour, OFF)) for colour in colours)
+    return tuple((color, lit.get(color, OFF)) for color in colors)
 
 
-def lit(state: str, colours: tuple[str, ...], time: float) -> tuple[bool, ...]:
+def lit(state: str, colors: tuple[str, ...], time: float) -> tuple[bool, ...]:
     """Which lamps shine at `time` [s], from top to bottom."""
     bright = (time * FLASHES_PER_SECOND + 1e-9) % 1.0 < 0.5
-    return tuple(mode == ON or (mode == FLASHING and bright) for _, mode in lamps(state, colours))
+    return tuple(mode == ON or (mode == FLASHING and bright) for _, mode in lamps(state, colors))
 
 
-def must_stop(state: str, colours: tuple[str, ...] = USUAL) -> bool:
+def must_stop(state: str, colors: tuple[str, ...] = USUAL) -> bool:
     """Whether a light in this state tells traffic to stop: red, or yellow alone, unless the yellow flashes."""
-    shown = dict(lamps(state, colours))
-    red, yellow, green = (shown.get(colour, OFF) for colour in (RED, YELLOW, GREEN))
+    shown = dict(lamps(state, colors))
+    red, yellow, green = (shown.get(color, OFF) for color in (RED, YELLOW, GREEN))
     return red != OFF or (yellow == ON and green == OFF)
 
 
@@ -83,7 +83,7 @@ def _named(state: str) -> dict[str, str]:
         if "off" in words:
             continue
         flashes = not _FLASHES.isdisjoint(words)
-        colours: Sequence[str] = [_WORDS[word] for word in words if word in _WORDS]
-        for colour in colours or ([YELLOW] if flashes else []):
-            found[colour] = FLASHING if flashes else ON
+        colors: Sequence[str] = [_WORDS[word] for word in words if word in _WORDS]
+        for color in colors or ([YELLOW] if flashes else []):
+            found[color] = FLASHING if flashes else ON
     return found

@@ -19,7 +19,7 @@ MARK_WIDTHS = {"standard": 0.12, "bold": 0.25}
 ORIGIN = "{eidrive-scenario}origin"
 """Where the section in which a lane stands in the file begins, seen from the section that it was moved to [m]."""
 ZERO = Polynomials()
-CENTRE = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, centre=ZERO)
+CENTER = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, center=ZERO)
 
 
 def read_speed(element: etree._Element, findings: AttributeReader) -> float | None:
@@ -136,7 +136,7 @@ def _read_section(
             number = findings.integer(element, "id")
             wrong = (number > 0) - (number < 0) != sign
             message = f"lane {number} stands under <{side}>"
-            remedy = "left lanes have ids above 0, the centre lane 0, right lanes below 0"
+            remedy = "left lanes have ids above 0, the center lane 0, right lanes below 0"
             if wrong and number and sign:
                 # Its id is what links and positions name it by.
                 kind = "lanes under the wrong side"
@@ -150,8 +150,8 @@ def _read_section(
                 )
             else:
                 found[number] = element
-    centre = found.get(0)
-    lanes = {0: CENTRE if centre is None else _lane(centre, 0, ZERO, ZERO, findings)}
+    center = found.get(0)
+    lanes = {0: CENTER if center is None else _lane(center, 0, ZERO, ZERO, findings)}
     offset = lane_offset.shifted(s)
     for sign in (1, -1):
         edge = ZERO
@@ -161,7 +161,7 @@ def _read_section(
             edge = lane.outer
     if not any(lanes):
         findings.report_error(
-            section, "<laneSection> has no lane beside the centre", "add a lane under <left> or <right>"
+            section, "<laneSection> has no lane beside the center", "add a lane under <left> or <right>"
         )
     return {number: lanes[number] for number in sorted(lanes, reverse=True)}
 
@@ -174,7 +174,7 @@ def _lane(
     if number:
         width, width_from = _read_width(element, number, inner, lane_offset, findings)
     outer = inner if number == 0 else combine([(1.0, inner), (1.0, width)])
-    centre = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
+    center = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
     link = element.find("link")
     speeds = ((findings.number(e, "sOffset") + begin, read_speed(e, findings)) for e in element.iterfind("speed"))
     return Lane(
@@ -183,7 +183,7 @@ def _lane(
         width=width,
         inner=inner,
         outer=outer,
-        centre=centre,
+        center=center,
         predecessors=_linked(link, "predecessor", findings),
         successors=_linked(link, "successor", findings),
         level=findings.flag(element, "level"),

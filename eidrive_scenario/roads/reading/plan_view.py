@@ -15,7 +15,7 @@ KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
 """Length of a road or geometry that is read at all [m]."""
 LONGEST_POLY3 = 2e5
-"""Length of all poly3 of a file, as one that is read takes memory by the metre [m]."""
+"""Length of all poly3 of a file, as one that is read takes memory by the meter [m]."""
 SHORTEST = 1e-9
 """Geometries of no length occur in real maps and are left out [m]."""
 
@@ -41,7 +41,7 @@ def read_reference_line(road: etree._Element, length: float, findings: Attribute
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
         remedy = "correct the length or complete the geometry"
-        findings.report_warning(road, "road-jump", "lengths that are not those of the geometry", what, remedy)
+        findings.report_warning(road, "geometry-gap", "lengths that are not those of the geometry", what, remedy)
         length = covered
     return ReferenceLine(found, length)
 
@@ -71,7 +71,7 @@ def _read_geometry(geometry: etree._Element, findings: AttributeReader) -> Seque
         return [curves.spiral(s, x, y, h, length, start, end, line)]
     if shape.tag == "poly3":
         a, b, c, d = (findings.number(shape, name) for name in "abcd")
-        findings.spend(geometry, "metres of poly3", length, LONGEST_POLY3)
+        findings.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
         return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
     if shape.tag == "paramPoly3":
         return [_read_param_poly3(shape, s, x, y, h, length, findings)]

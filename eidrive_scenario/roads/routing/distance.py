@@ -47,14 +47,14 @@ class RoadDistances:
                 rest = b.s if entered > 0 else self._roads[b.road].length - b.s
                 left = self._roads[a.road].length - a.s if direction * sense > 0 else a.s
                 across = b.t * entered * sense - a.t * direction
-                cost += left * self._per_metre(a.road, by) + rest * self._per_metre(b.road, by)
+                cost += left * self._per_meter(a.road, by) + rest * self._per_meter(b.road, by)
                 options.append((cost, left + gap + rest, sense, across, entered * direction * sense))
         if not options:
             return None
         _, span, sense, across, same = min(options, key=lambda option: option[0])
         return span * sense, across, same
 
-    def _per_metre(self, road: str, by: Chain) -> float:
+    def _per_meter(self, road: str, by: Chain) -> float:
         return 1.0 / self._speed(road) if by == "fastest" else 1.0
 
     def _entering(self, before: str, road: str, by: Chain) -> float:
@@ -63,7 +63,7 @@ class RoadDistances:
         return JUNCTION_COST if by == "leastIntersections" and enters else 0.0
 
     def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
-        """For each road reached by leaving `road` in `direction`: cost and metres between, and direction entered."""
+        """For each road reached by leaving `road` in `direction`: cost and meters between, and direction entered."""
         known = self._found.get((road, direction, by))
         if known is not None:
             return known
@@ -79,7 +79,7 @@ class RoadDistances:
             done.add((number, way))
             reached.setdefault(number, (cost, gap, way))
             length = self._roads[number].length
-            cost += length * self._per_metre(number, by)
+            cost += length * self._per_meter(number, by)
             for other, onward in self._links.beyond_road(number, way):
                 if (other, onward) not in done:
                     heapq.heappush(queue, (cost + self._entering(number, other, by), gap + length, other, onward))

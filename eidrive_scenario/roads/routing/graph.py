@@ -25,9 +25,9 @@ else:
     LaneGraph = nx.DiGraph
 
 LANE_CHANGE_COST = 10.0
-"""Metres of detour that a lane change is worth."""
+"""Meters of detour that a lane change is worth."""
 HASTE_COST = 500.0
-"""A lane change within a section of L metres costs this / L metres more: short sections are bad places for it."""
+"""A lane change within a section of L meters costs this / L meters more: short sections are bad places for it."""
 NARROWEST = 1.0
 """A lane must be this wide in the middle of its section to change to it [m]."""
 HERE = 0.01
@@ -41,9 +41,9 @@ class RouteError(InputError):
 def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
     """Nodes LaneKey with `length` [m], `end` (x, y) and `drivable`; edges with `weight` [m] and `kind`.
 
-    The kind of an edge is 'successor' or 'change'; lengths and ends are those of the lanes' centre lines.
+    The kind of an edge is 'successor' or 'change'; lengths and ends are those of the lanes' center lines.
 
-    An edge leads from a lane to the lanes that traffic enters at its end, and to its neighbours of the same direction.
+    An edge leads from a lane to the lanes that traffic enters at its end, and to its neighbors of the same direction.
     """
     graph: LaneGraph = LaneGraph()
     roads = {road.id: road for road in tables.roads}
@@ -64,7 +64,7 @@ def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
                 graph.add_edge(key, other, weight=length, kind="successor")
     for road in roads.values():
         for section in road.sections:
-            for one, two in _neighbours(section):
+            for one, two in _neighbors(section):
                 if directions[road.id, one] == directions[road.id, two]:
                     cost = LANE_CHANGE_COST + HASTE_COST / max(section.length, 1.0)
                     keys = LaneKey(road.id, section.index, one), LaneKey(road.id, section.index, two)
@@ -74,7 +74,7 @@ def build_graph(tables: RoadTables, links: LaneLinks) -> LaneGraph:
 
 
 def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str, int], int]) -> None:
-    """Give each node the length of its centre line, by Gauss-Legendre quadrature, and where traffic leaves it."""
+    """Give each node the length of its center line, by Gauss-Legendre quadrature, and where traffic leaves it."""
     keys = list(graph)
     row = np.array([graph.nodes[key].pop("row") for key in keys], dtype=np.int64)
     section = tables.lane_section[row]
@@ -85,11 +85,11 @@ def _measure(graph: LaneGraph, tables: RoadTables, directions: Mapping[tuple[str
         length += 0.5 * weight * span * tables.stretch(row, start + 0.5 * (1.0 + node) * span)
     forward = np.array([directions[key.road, key.lane] > 0 for key in keys], dtype=bool)
     ends = tables.lane_poses(row, np.where(forward, start + span, start), np.zeros(len(row)))
-    for key, metres, x, y in zip(keys, length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True):
-        graph.nodes[key].update(length=metres, end=(x, y))
+    for key, meters, x, y in zip(keys, length.tolist(), ends.x.tolist(), ends.y.tolist(), strict=True):
+        graph.nodes[key].update(length=meters, end=(x, y))
 
 
-def _neighbours(section: LaneSection) -> Iterator[tuple[int, int]]:
+def _neighbors(section: LaneSection) -> Iterator[tuple[int, int]]:
     """Pairs of drivable lanes side by side, across lane 0 too."""
     lanes = [lane for number, lane in section.lanes.items() if number]
     for one, two in pairwise(lanes):
@@ -113,7 +113,7 @@ def find_lanes(
     last = graph.nodes[target]["length"] if target in graph else 0.0
 
     def bound(key: LaneKey, _: LaneKey) -> float:
-        # The way counts up to where the target begins; lanes of real maps meet to within a few centimetres.
+        # The way counts up to where the target begins; lanes of real maps meet to within a few centimeters.
         x, y = graph.nodes[LaneKey(*key[:3])]["end"]
         return max(0.99 * (math.hypot(goal[0] - x, goal[1] - y) - last) - 1.0, 0.0)
 

@@ -69,7 +69,7 @@ class Movement:
         visit: int = 0,
         to_end: bool = False,
     ) -> LaneLocation | None:
-        """The place `distance` metres further in the lane's driving direction (back where negative), or None.
+        """The place `distance` meters further in the lane's driving direction (back where negative), or None.
 
         The distance is measured on the path, at the location's offset. Where the lane forks, the route decides, else
         `choose`, else the straightest way on is taken. None says that the lane ends; with `to_end` the result is the
@@ -189,14 +189,14 @@ def _section_behind(road: Road, section: LaneSection, lane: Lane, s: float, dire
 def _along(
     road: Road, section: LaneSection, lane: Lane, s: float, offset: float, direction: int, remaining: float
 ) -> tuple[float, float]:
-    """s after `remaining` metres of path or at the section's end, and the metres that are left (0 if none).
+    """s after `remaining` meters of path or at the section's end, and the meters that are left (0 if none).
 
     On a line or arc, where the lane keeps its distance from it, exact; elsewhere by the midpoint rule.
     """
     end = section.end if direction > 0 else section.s
     if section.index == len(road.sections) - 1 and direction > 0:
         end = road.length
-    steady = road.lane_offset.is_constant and (lane.id == 0 or lane.centre.is_constant)
+    steady = road.lane_offset.is_constant and (lane.id == 0 or lane.center.is_constant)
     while remaining > 0.0:
         room = (end - s) * direction
         if room <= 0.0:
@@ -229,7 +229,7 @@ def _along(
 
 
 def _stretch(road: Road, section: LaneSection, lane: Lane, s: float, offset: float) -> float:
-    """Metres of path at an offset from a lane's centre per metre of s; in banked bends as if they were level."""
+    """Meters of path at an offset from a lane's center per meter of s; in banked bends as if they were level."""
     t, slope = lane_t(road, section, lane, s)
     curvature, speed = road.reference.bend(s)
     across = speed * (1.0 - curvature * (t + offset))

@@ -21,7 +21,7 @@ from eidrive_scenario.roads.routing.movement import Branch, driving_direction
 GRAIN = 0.25
 """Distance between the points by which a route's course is kept [m]."""
 LANE_CHANGE_LENGTH = 40.0
-"""Metres over which a lane change stretches where its section has room for it."""
+"""Meters over which a lane change stretches where its section has room for it."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +91,11 @@ class Route:
 
     @property
     def length(self) -> float:
-        """Metres from start to end along the lanes' centre lines."""
+        """Meters from start to end along the lanes' center lines."""
         return float(self._course[1][-1])
 
     def polyline(self, spacing: float = 1.0) -> Array:
-        """(M, 3) points of the lanes' centre lines from start to end, at most `spacing` apart [m].
+        """(M, 3) points of the lanes' center lines from start to end, at most `spacing` apart [m].
 
         Where a broken map has lanes jump, there are no more points than the lanes have in themselves.
         """
@@ -109,7 +109,7 @@ class Route:
         return np.column_stack([np.interp(distance, along, points[:, axis]) for axis in range(3)])
 
     def location_at(self, distance: float) -> LaneLocation:
-        """The place at a distance along the route, on its centre line."""
+        """The place at a distance along the route, on its center line."""
         _, along, owner, places = self._course
         index = min(max(bisect_right(along, distance) - 1, 0), len(along) - 2)
         leg = self.legs[int(owner[index + 1])]
@@ -160,7 +160,7 @@ class Route:
         return along * sense, (b.t * there[1] - a.t * here[1]) * sense
 
     def _passes(self, location: LaneLocation) -> tuple[float, int] | None:
-        """Where the route (or its lap, after it) passes a place: metres of reference line, and in which direction."""
+        """Where the route (or its lap, after it) passes a place: meters of reference line, and in which direction."""
         done = 0.0
         for leg in self.legs:
             low, high = min(leg.s, leg.s_end), max(leg.s, leg.s_end)
@@ -173,7 +173,7 @@ class Route:
     def project(self, x: float, y: float, near: float | None = None, window: float = 30.0) -> tuple[float, float]:
         """The distance along the route that is nearest to a point, and how far left of the route the point lies [m].
 
-        `near` narrows the search to `window` metres around a distance known before.
+        `near` narrows the search to `window` meters around a distance known before.
         """
         points, along, _, _ = self._course
         low, high = 0, len(along) - 1

@@ -140,7 +140,7 @@ class EntityCondition(Condition):
         return held if held is True or held is False else truth(self, held)
 
     def explain(self, context: RuntimeContext) -> str:
-        """What is true of those that fulfil it, or of all."""
+        """What is true of those that fulfill it, or of all."""
         names = self.fulfilled or self.entities
         return ", ".join(
             self.explain_for(context, name) if name in context.view else f"{name} is not in the world" for name in names

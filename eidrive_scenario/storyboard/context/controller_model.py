@@ -61,7 +61,7 @@ def build_controller_models(
     Raises SettingError for a stand-in that nobody registers, RegistryError for one that is none.
     """
     found = []
-    kinds = {name: known.load(stand_in, ControllerModel) for name, stand_in in wanted.items()}
+    kinds = {name: known.load(controller_model, ControllerModel) for name, controller_model in wanted.items()}
     for actor in actors.values():
         for controller in actor.controllers:
             if controller.name in kinds:

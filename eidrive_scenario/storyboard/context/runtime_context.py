@@ -117,7 +117,7 @@ class RuntimeContext:
         self.traffic = BackgroundTrafficPort(
             roads,
             seed=seed,
-            centre=self._centre,
+            center=self._center,
             taken=frozenset(self.actors),
             must_stop=self.signals.must_stop,
         )
@@ -173,7 +173,7 @@ class RuntimeContext:
         row = self.view.rows.get(name)
         return self.view.states[row].speed if row is not None else self.actors[name].motion.speed
 
-    def _centre(self, name: str) -> CentralObject | None:
+    def _center(self, name: str) -> CentralObject | None:
         """Where an entity is and moves, for the traffic around it; None while it is not in the world."""
         actor = self.actors.get(name)
         if actor is None or not actor.present:

@@ -33,7 +33,7 @@ class ResolvedPosition(NamedTuple):
 
 
 class LateralStep(NamedTuple):
-    """The lateral motion of one step: the offset from the centre of its lane at the end of the step [m].
+    """The lateral motion of one step: the offset from the center of its lane at the end of the step [m].
 
     offset   left of the lane's driving direction positive
     heading  angle to the lane's direction after the step [rad]; None follows from the motion
@@ -89,7 +89,7 @@ class Motion:
         self._route, self._visit = route, 0
 
     def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
-        """The place so many metres further along the lane [m], by the way that it takes; None where the lane ends."""
+        """The place so many meters further along the lane [m], by the way that it takes; None where the lane ends."""
         assert self.roads is not None
         return self.roads.advance(place, distance, route=self._route, choose=self.branch_selector, visit=self._visit)
 
@@ -259,7 +259,7 @@ class Motion:
             self.route = lap
 
     def _turn(self, steering: LateralStep, left: float, distance: float, total: float, dt: float) -> float:
-        """The angle to the lane where `distance` along it and `left` make up a step of `total` metres in dt seconds."""
+        """The angle to the lane where `distance` along it and `left` make up a step of `total` meters in dt seconds."""
         if steering.heading is not None:
             return steering.heading
         if steering.rate is not None:

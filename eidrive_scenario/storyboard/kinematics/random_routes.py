@@ -19,7 +19,7 @@ def uniform_branch_selector(generator: np.random.Generator) -> BranchSelector:
 
 
 def random_route(roads: RoadNetwork, start: LaneLocation, length: float, choose: BranchSelector) -> Route:
-    """A way from a place on, at least `length` metres long unless the road ends before."""
+    """A way from a place on, at least `length` meters long unless the road ends before."""
     road = roads.road(start.road)
     direction = roads.driving_direction(start.road, start.lane)
     key = LaneKey(start.road, road.section_at(start.s).index, start.lane)

@@ -13,7 +13,7 @@ SHORTEST = 1.0
 
 
 class LaneChange(NamedTuple):
-    """From lane to lane within one lane section: where it begins, over how many metres, and the offset that stays."""
+    """From lane to lane within one lane section: where it begins, over how many meters, and the offset that stays."""
 
     road: str
     section: int
@@ -38,7 +38,7 @@ class RouteLanes:
         self._change = None
 
     def step(self, here: LaneLocation, distance: float, route: Route, visit: int) -> tuple[int, float, bool] | None:
-        """The lane to count from, the offset to have in it after `distance` metres, and whether that is all.
+        """The lane to count from, the offset to have in it after `distance` meters, and whether that is all.
 
         None where the lane is to be kept. The actor moves with the traffic, on the route's road number `visit`.
         """

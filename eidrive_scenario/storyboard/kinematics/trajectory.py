@@ -265,7 +265,7 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
 
     The curve passes through its first and last control points only, and the standard does not say where on it the time
     of another one holds. As in esmini (its NurbsShape) that is where its basis function is largest, on as many even
-    steps of the parameter as the control polygon has metres; between, the parameter grows evenly with time. Which of
+    steps of the parameter as the control polygon has meters; between, the parameter grows evenly with time. Which of
     the two steps around the peak counts its traces alone tell: the one before.
     """
     weights = [1.0 if point.weight is None else point.weight for point in shape.control_point]
@@ -283,8 +283,8 @@ def _nurbs(shape: model.Nurbs, closed: bool, resolve: Resolve) -> TrajectoryCurv
     times = _times([point.time for point in shape.control_point])
     if times is None:
         return TrajectoryCurve(tuple(s), tuple(poses), None, closed, given, tangents=tangents)
-    metres = 1 + int(rough)
-    stations = [math.floor((number + 1) / count * metres) / metres * count for number in curve.peaks(count)]
+    meters = 1 + int(rough)
+    stations = [math.floor((number + 1) / count * meters) / meters * count for number in curve.peaks(count)]
     clock = np.interp(np.arange(count + 1), stations, times)
     return TrajectoryCurve(tuple(s), tuple(poses), tuple(clock.tolist()), closed, given, tangents=tangents)
 

@@ -12,7 +12,7 @@ from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
-"""x y z of the centre, length, width, height [m], yaw [rad]"""
+"""x y z of the center, length, width, height [m], yaw [rad]"""
 
 INSTANT = 1e-3
 """A time in which nobody's motion along a road changes [s]."""
@@ -28,12 +28,12 @@ def entity_box(context: RuntimeContext, name: str) -> Box:
     """The bounding box of an actor where it stands now."""
     pose = context.pose(name)
     bounds = context.actors[name].entity.bounding_box
-    centre, size = bounds.center, bounds.dimensions
+    center, size = bounds.center, bounds.dimensions
     cos, sin = math.cos(pose.h), math.sin(pose.h)
     return (
-        pose.x + centre.x * cos - centre.y * sin,
-        pose.y + centre.x * sin + centre.y * cos,
-        pose.z + centre.z,
+        pose.x + center.x * cos - center.y * sin,
+        pose.y + center.x * sin + center.y * cos,
+        pose.z + center.z,
         size.length,
         size.width,
         size.height,
@@ -240,10 +240,10 @@ def _reach(context: RuntimeContext, name: str, axis: float, frame: str, kind: st
     x, y = bounds.center.x, bounds.center.y
     length, width = 0.5 * bounds.dimensions.length, 0.5 * bounds.dimensions.width
     if kind == "longitudinal":
-        centre, half = x * cos - y * sin, abs(length * cos) + abs(width * sin)
+        center, half = x * cos - y * sin, abs(length * cos) + abs(width * sin)
     else:
-        centre, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
-    return centre - half, centre + half
+        center, half = x * sin + y * cos, abs(length * sin) + abs(width * cos)
+    return center - half, center + half
 
 
 def _reach_along(

@@ -75,7 +75,7 @@ def relative_lane_position(
 def along_reference(
     roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
 ) -> LaneLocation | None:
-    """The place `ds` metres further along the reference line, in the same or the connected lane, at the same offset.
+    """The place `ds` meters further along the reference line, in the same or the connected lane, at the same offset.
 
     At forks the route decides. A lane that the road does not have at its end is replaced by that at the same t.
     """

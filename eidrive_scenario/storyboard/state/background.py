@@ -16,7 +16,7 @@ from eidrive_scenario.world.view import WorldView
 class BackgroundTrafficPort:
     """Background traffic of one run; without an instance there is none, and it costs nothing.
 
-    centre     where an entity is and moves, None while it is not in the world
+    center     where an entity is and moves, None while it is not in the world
     taken      names that no car may have
     must_stop  whether the traffic light of an id tells traffic to stop
     """
@@ -26,13 +26,13 @@ class BackgroundTrafficPort:
         roads: RoadNetwork | None,
         *,
         seed: int,
-        centre: Callable[[str], CentralObject | None],
+        center: Callable[[str], CentralObject | None],
         taken: frozenset[str],
         must_stop: Callable[[str], bool],
     ) -> None:
         self._roads = roads
         self._seed = seed
-        self._centre = centre
+        self._center = center
         self._taken = taken
         self._must_stop = must_stop
         self._started = False
@@ -43,7 +43,7 @@ class BackgroundTrafficPort:
         assert self._roads is not None
         self._started = True
         return BackgroundTraffic(
-            self._roads, seed=self._seed, centre=self._centre, taken=self._taken, must_stop=self._must_stop
+            self._roads, seed=self._seed, center=self._center, taken=self._taken, must_stop=self._must_stop
         )
 
     @property

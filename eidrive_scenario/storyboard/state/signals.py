@@ -9,7 +9,7 @@ from types import MappingProxyType
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.roads.model.signal_states import USUAL, lamp_colours, must_stop
+from eidrive_scenario.roads.model.signal_states import USUAL, lamp_colors, must_stop
 from eidrive_scenario.storyboard.state.signal_cycles import SignalCycle, cycle_errors, cycle_warnings, signal_cycles
 
 SAME_PLACE = 2.0
@@ -24,8 +24,8 @@ class Signals:
 
     def __init__(self, declared: model.TrafficSignals | None, roads: RoadNetwork | None) -> None:
         self._roads = roads
-        self._colours: Mapping[str, tuple[str, ...]] = {
-            signal.id: lamp_colours(signal) for signal in (roads.signals.values() if roads is not None else ())
+        self._colors: Mapping[str, tuple[str, ...]] = {
+            signal.id: lamp_colors(signal) for signal in (roads.signals.values() if roads is not None else ())
         }
         controllers = declared.traffic_signal_controller if declared is not None else ()
         self.cycles: Mapping[str, SignalCycle] = signal_cycles(controllers, roads)
@@ -44,7 +44,7 @@ class Signals:
     def must_stop(self, name: str) -> bool:
         """Whether a signal tells traffic to stop."""
         state = self.state(name)
-        return state is not None and must_stop(state, self._colours.get(name) or USUAL)
+        return state is not None and must_stop(state, self._colors.get(name) or USUAL)
 
     def set_state(self, name: str, state: str) -> None:
         """Let a signal show a state, until its controller's next phase begins or somebody sets it again."""
@@ -78,9 +78,9 @@ class Signals:
 
     def unknown(self, name: str, element: model.Element) -> Diagnostic | None:
         """What is odd about the name of a signal; its state is kept by that name all the same."""
-        if self.identify(name) in self._colours:
+        if self.identify(name) in self._colors:
             return None
-        remedy = suggestion(name, self._colours) if self._colours else "the road network has no signals"
+        remedy = suggestion(name, self._colors) if self._colors else "the road network has no signals"
         message = f"the road network has no signal {name!r}: its state is kept, and nowhere to be seen"
         return Diagnostic(message, remedy, element.source, element.line)
 

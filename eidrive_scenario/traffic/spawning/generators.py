@@ -46,7 +46,7 @@ class GeneratorContext(Protocol):
     time: float
     dt: float
     ground: SpawnAreas
-    centre: Callable[[str], CentralObject | None]
+    center: Callable[[str], CentralObject | None]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ class Swarm(TrafficGenerator):
     front, rear, left, right  shares of the sectors around the entity, None for any
     """
 
-    centre: str
+    center: str
     inner: float
     major: float
     minor: float
@@ -145,45 +145,45 @@ class Swarm(TrafficGenerator):
 
     def step(self, traffic: GeneratorContext) -> None:
         """Take out who has left, fill up."""
-        centre = traffic.centre(self.centre)
-        if centre is None:
+        center = traffic.center(self.center)
+        if center is None:
             return
         if self.members:
             names = list(self.members)
             x, y = traffic.positions(names)
-            _, share = self._place(centre, x, y)
+            _, share = self._place(center, x, y)
             for name in [names[n] for n in np.flatnonzero(share > 1.0)]:
                 traffic.despawn(name)
         failures = 0
         while self.is_due(traffic) and failures < (1 if self._filled else 5):
-            if not self._bring_one(traffic, centre):
+            if not self._bring_one(traffic, center):
                 failures += 1
         if failures:
             self._again = traffic.time + RETRY
         self._filled = True
 
-    def _place(self, centre: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
+    def _place(self, center: CentralObject, x: Array, y: Array) -> tuple[Array, Array]:
         """Distance from the middle [m], and the share of the ellipse's axes at which places lie."""
-        cos, sin = math.cos(centre.heading), math.sin(centre.heading)
-        dx, dy = x - centre.x - self.offset * cos, y - centre.y - self.offset * sin
+        cos, sin = math.cos(center.heading), math.sin(center.heading)
+        dx, dy = x - center.x - self.offset * cos, y - center.y - self.offset * sin
         ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
         return np.hypot(ahead, left), np.hypot(ahead / max(self.major, 1e-9), left / max(self.minor, 1e-9))
 
-    def _bring_one(self, traffic: GeneratorContext, centre: CentralObject) -> bool:
+    def _bring_one(self, traffic: GeneratorContext, center: CentralObject) -> bool:
         rng = self.rng(traffic)
         participant = self.mixture.draw(rng)
         sites = traffic.ground.for_body(participant)
-        distance, share = self._place(centre, sites.x, sites.y)
+        distance, share = self._place(center, sites.x, sites.y)
         fit = (distance >= self.inner) & (share <= 1.0)
-        fit &= self._direction(rng, centre, sites) & self._sector(rng, centre, sites)
+        fit &= self._direction(rng, center, sites) & self._sector(rng, center, sites)
         speed = traffic.starting_speed(sites, participant)
         if self.speeds is not None:
             speed = np.full(len(sites), rng.uniform(*self.speeds))
         choices = [fit]
         if self._filled:
-            vx = speed * np.cos(sites.heading) - centre.speed * math.cos(centre.heading)
-            vy = speed * np.sin(sites.heading) - centre.speed * math.sin(centre.heading)
-            inwards = (sites.x - centre.x) * vx + (sites.y - centre.y) * vy < 0.0
+            vx = speed * np.cos(sites.heading) - center.speed * math.cos(center.heading)
+            vy = speed * np.sin(sites.heading) - center.speed * math.sin(center.heading)
+            inwards = (sites.x - center.x) * vx + (sites.y - center.y) * vy < 0.0
             rim = fit & (share >= RIM)
             choices = [rim & inwards, rim, fit]
         given = None if self.speeds is None else float(speed[0]) if len(speed) else None
@@ -193,18 +193,18 @@ class Swarm(TrafficGenerator):
             if choice.any()
         )
 
-    def _direction(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
+    def _direction(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Flags:
         if self.directions is None:
             return np.ones(len(sites), dtype=bool)
         same, opposite = self.directions
-        with_it: Flags = np.cos(sites.heading - centre.heading) >= 0.0
+        with_it: Flags = np.cos(sites.heading - center.heading) >= 0.0
         return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
 
-    def _sector(self, rng: np.random.Generator, centre: CentralObject, sites: SpawnSites) -> Flags:
+    def _sector(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Flags:
         """Quarters of the plane around the entity, 90° each."""
         if self.sectors is None:
             return np.ones(len(sites), dtype=bool)
-        bearing = np.arctan2(sites.y - centre.y, sites.x - centre.x) - centre.heading
+        bearing = np.arctan2(sites.y - center.y, sites.x - center.x) - center.heading
         quarter = np.round(bearing / (math.pi / 2)).astype(np.int64) % 4
         front, rear, left, right = self.sectors
         shares = np.cumsum([front, left, rear, right])

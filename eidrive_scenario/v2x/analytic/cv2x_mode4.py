@@ -68,12 +68,12 @@ def cv2x_mode4_errors(
 ) -> ErrorTable:
     """Causes of loss over `distance` (D,) [m]: half_duplex, sensing, propagation, collision. Packets have 190 bytes.
 
-    density  vehicles per metre;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
+    density  vehicles per meter;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
     """
     height = ANTENNA - environment_height
 
-    def received(metres: Array) -> Array:
-        return power - winner_b1(metres, FREQUENCY, height, height)
+    def received(meters: Array) -> Array:
+        return power - winner_b1(meters, FREQUENCY, height, height)
 
     blocks, ratios, block_errors = CODINGS[subchannels]
     noise = NOISE - 10.0 * np.log10(BLOCKS / blocks)

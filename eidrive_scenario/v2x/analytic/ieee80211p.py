@@ -66,12 +66,12 @@ def ieee80211p_errors(
 ) -> ErrorTable:
     """Causes of loss over `distance` (D,) [m]: sensing, busy, propagation, collision.
 
-    density  vehicles per metre;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
+    density  vehicles per meter;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
     """
     height = ANTENNA - environment_height
 
-    def received(metres: Array) -> Array:
-        return power - winner_b1(metres, FREQUENCY, height, height)
+    def received(meters: Array) -> Array:
+        return power - winner_b1(meters, FREQUENCY, height, height)
 
     duration = airtime(size, bit_rate)
     sensed = sensed_share(received(np.arange(-REACH, REACH + 1.0)), SENSING, SHADOWING)  # (13)

@@ -33,7 +33,7 @@ def signal(power: Array, spread: float, threshold: float) -> Array:
     """(D, L) distribution of the power of packets that are sensed, for mean powers (D,) [dBm]."""
     density = np.exp(-0.5 * ((LEVELS - power[:, None]) / spread) ** 2)
     density[:, threshold > LEVELS] = 0.0
-    return _normalised(density)
+    return _normalized(density)
 
 
 def noise_alone(noise: float) -> Array:
@@ -50,7 +50,7 @@ def interference(power: Array, spread: float, noise: float) -> Array:
     exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / spread) ** 2
     density = np.zeros((len(power), len(LEVELS)))
     density[:, noise < LEVELS] = total / alone * np.exp(exponent)
-    return _normalised(density)
+    return _normalized(density)
 
 
 def errors_over(packets: Array, curve: Array) -> Array:
@@ -70,6 +70,6 @@ def autocorrelation(values: Array) -> Array:
     return correlated
 
 
-def _normalised(density: Array) -> Array:
+def _normalized(density: Array) -> Array:
     shares: Array = density / density.sum(axis=1, keepdims=True)
     return shares

@@ -24,7 +24,7 @@ Power = Annotated[float, Field(ge=-30.0, le=50.0)]
 class Ieee80211pLoss(Settings):
     """The losses of IEEE 802.11p among other vehicles, by distance (Sepulcre et al. 2021).
 
-    density    vehicles per metre of road
+    density    vehicles per meter of road
     rate, size, power_dbm, data_rate_mbps   what all of them send: packets per second, bytes, dBm, Mbit/s
     environment_height   taken off the antennas' 1.5 m in the path loss [m]
     """
@@ -57,7 +57,7 @@ class Ieee80211pLoss(Settings):
 class Cv2xMode4Loss(Settings):
     """The losses of C-V2X Mode 4 among other vehicles that send 190 bytes, by distance (Gonzalez-Martín et al. 2019).
 
-    density    vehicles per metre of road
+    density    vehicles per meter of road
     rate, power_dbm   what all of them send: packets per second (published for 10 and 20; at most
                      one in each subframe), dBm
     subchannels   4 (QPSK, r = 0.7) or 2 (r = 0.5)

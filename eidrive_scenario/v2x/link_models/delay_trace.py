@@ -26,7 +26,7 @@ class TraceDelay(Settings):
     file     a CSV file, relative to the profile, with
     column   the name of its column in the first row, or its number from 0 on, and
     unit     `s` or `ms`
-    replay   false: drawn from the values, with straight lines between neighbouring ones; true: message n of a link
+    replay   false: drawn from the values, with straight lines between neighboring ones; true: message n of a link
              takes value n, and begins anew at the end
     """
 

@@ -27,7 +27,7 @@ TYPES = {"cam": "CAM", "cpm": "CPM"}
 
 _STATION_TYPES = {"pedestrian": 1, "bicycle": 2, "motorbike": 4, "car": 5, "bus": 6, "van": 7, "truck": 8, "misc": 15}
 _SUBCLASSES = {"car": 3, "motorbike": 2, "bus": 4, "van": 5, "truck": 6}
-_METRES_PER_DEGREE = 111_319.49
+_METERS_PER_DEGREE = 111_319.49
 """Along the equator, about which the plane of the world is put."""
 
 
@@ -252,8 +252,8 @@ def _header(number: int, sender: str) -> dict[str, int]:
 def _position(state: StationState) -> dict[str, Any]:
     """The plane of the world about latitude and longitude 0."""
     return {
-        "latitude": _within(state.y / _METRES_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
-        "longitude": _within(state.x / _METRES_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
+        "latitude": _within(state.y / _METERS_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
+        "longitude": _within(state.x / _METERS_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
         "positionConfidenceEllipse": {
             "semiMajorConfidence": 4095,
             "semiMinorConfidence": 4095,
@@ -268,8 +268,8 @@ def _heading(yaw: float) -> dict[str, int]:
     return {"headingValue": _tenths_of_degrees(math.pi / 2.0 - yaw), "headingConfidence": 127}
 
 
-def _distance(metres: float) -> dict[str, int]:
-    return {"value": _within(100.0 * metres, -132768, 132767), "confidence": 102}
+def _distance(meters: float) -> dict[str, int]:
+    return {"value": _within(100.0 * meters, -132768, 132767), "confidence": 102}
 
 
 def _tenths_of_degrees(angle: float) -> int:

@@ -163,7 +163,7 @@ class LinkBudget:
         return shadow, blockage
 
     def _distance_of(self, loss: float) -> float:
-        """From where on an open path loses at least so much [dB], in metres."""
+        """From where on an open path loses at least so much [dB], in meters."""
         near, far = 1.0, 1e9
         for _ in range(100):
             middle = math.sqrt(near * far)

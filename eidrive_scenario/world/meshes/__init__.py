@@ -32,7 +32,7 @@ BUILDERS: Mapping[str, Callable[[BodyDimensions], Mesh]] = {
 
 
 def actor_mesh(spec: ActorSpec, motion: str = "") -> Mapping[str, Array]:
-    """Material to triangles (K, 3, 3) of an actor: origin at the centre of its box on the ground, x forward [m].
+    """Material to triangles (K, 3, 3) of an actor: origin at the center of its box on the ground, x forward [m].
 
     A truck without a front axle is a trailer. A pedestrian stands, walks or lies as its motion says, in the standard's
     words.

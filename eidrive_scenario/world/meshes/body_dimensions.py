@@ -12,7 +12,7 @@ from eidrive_scenario.world.meshes.solids import Mesh, cylinder
 
 @dataclass(frozen=True)
 class BodyDimensions:
-    """The bounding box of an actor: origin at its centre on the ground, x forward; all in metres.
+    """The bounding box of an actor: origin at its center on the ground, x forward; all in meters.
 
     front, rear  x of the axles
     """
@@ -40,32 +40,32 @@ class BodyDimensions:
         return self.width / 2
 
 
-def add_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tyre: float, *, axles: tuple[float, ...] = ()) -> None:
-    """Wheels, `tyre` wide, with rims and dark arches, whose outer faces lie at y = ±side.
+def add_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tire: float, *, axles: tuple[float, ...] = ()) -> None:
+    """Wheels, `tire` wide, with rims and dark arches, whose outer faces lie at y = ±side.
 
     Without `axles` those of all axles: the body then hides what lies further in.
     """
     for x in axles or (frame.front, frame.rear):
-        _add_pair(mesh, x, frame.wheel_radius, side, tyre)
+        _add_pair(mesh, x, frame.wheel_radius, side, tire)
     for axle in () if axles else frame.extra_axles:
-        _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, side, tyre)
+        _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, side, tire)
 
 
-def add_extra_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tyre: float, steered: float | None = None) -> None:
+def add_extra_wheels(mesh: Mesh, frame: BodyDimensions, side: float, tire: float, steered: float | None = None) -> None:
     """The wheels of the further axles below a body, on their own track, as far as that lies within y = ±side.
 
-    tyre  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
+    tire  width of a wheel, or of two side by side; steered  the same for an axle that steers, where it differs
     """
     for axle in frame.extra_axles:
-        wide = steered if steered is not None and axle.max_steering > 0.0 else tyre
+        wide = steered if steered is not None and axle.max_steering > 0.0 else tire
         outer = min((axle.track + wide) / 2, side) if axle.track > 0.0 else side
         _add_pair(mesh, axle.x, axle.wheel_radius or frame.wheel_radius, max(outer, wide), wide)
 
 
-def _add_pair(mesh: Mesh, x: float, radius: float, side: float, tyre: float) -> None:
-    arch = cylinder((x, side - tyre, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
+def _add_pair(mesh: Mesh, x: float, radius: float, side: float, tire: float) -> None:
+    arch = cylinder((x, side - tire, radius), (x, side - 0.012, radius), 1.16 * radius, sides=18)
     arch[..., 2] = np.maximum(arch[..., 2], 0.5 * radius)
     mesh.add_mirrored("trim", arch)
-    mesh.add_mirrored("tyre", cylinder((x, side - tyre, radius), (x, side, radius), radius, sides=18))
+    mesh.add_mirrored("tire", cylinder((x, side - tire, radius), (x, side, radius), radius, sides=18))
     mesh.add_mirrored("rim", cylinder((x, side - 0.05, radius), (x, side + 0.006, radius), 0.64 * radius, sides=12))
     mesh.add_mirrored("trim", cylinder((x, side, radius), (x, side + 0.01, radius), 0.18 * radius, sides=8))

@@ -14,7 +14,7 @@ _PROUD = 0.03
 
 
 def building(size: Vector3) -> dict[str, Array]:
-    """Material to triangles of a building of this length, width and height; origin at its centre on the ground."""
+    """Material to triangles of a building of this length, width and height; origin at its center on the ground."""
     length, width, height = size
     mesh = Mesh()
     mesh.add("wall", box((0, 0, height / 2 - 0.1), (length - 2 * _PROUD, width - 2 * _PROUD, height - 0.2)))
@@ -27,15 +27,15 @@ def building(size: Vector3) -> dict[str, Array]:
             low = 0.5 + storey * STOREY + 0.9
             high = min(low + WINDOW[1], height - 0.4)
             for column in range(columns):
-                centre = (column - (columns - 1) / 2) * PITCH
+                center = (column - (columns - 1) / 2) * PITCH
                 for sign in (-1.0, 1.0):
-                    mesh.add("window", _window(centre, sign * (reach - _PROUD / 2), low, high, turned))
+                    mesh.add("window", _window(center, sign * (reach - _PROUD / 2), low, high, turned))
     return mesh.materials()
 
 
-def _window(centre: float, at: float, low: float, high: float, turned: bool) -> Array:
+def _window(center: float, at: float, low: float, high: float, turned: bool) -> Array:
     half = WINDOW[0] / 2 * (1.0 if at < 0.0 else -1.0)
-    corners = [(centre - half, low), (centre + half, low), (centre + half, high), (centre - half, high)]
+    corners = [(center - half, low), (center + half, low), (center + half, high), (center - half, high)]
     if turned:
         return polygon([(at, -along, up) for along, up in corners])
     return polygon([(along, at, up) for along, up in corners])

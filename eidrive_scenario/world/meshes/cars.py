@@ -81,7 +81,7 @@ def _face(bottom: Array, top: Array) -> Array:
 
 
 def _pane(face: Array, left: float, right: float, low: float, high: float) -> Array:
-    """A window in a face, between shares of its width and height, lifted off the face by a centimetre."""
+    """A window in a face, between shares of its width and height, lifted off the face by a centimeter."""
     p00, p10, p01, p11 = face
     normal = np.cross(p10 - p00, p01 - p00)
     lift = 0.012 * normal / np.linalg.norm(normal)

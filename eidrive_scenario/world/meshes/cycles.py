@@ -63,7 +63,7 @@ def bicycle(frame: BodyDimensions) -> Mesh:
 
 
 def _wheel(mesh: Mesh, x: float, radius: float, wide: float, rim: float) -> None:
-    mesh.add("tyre", cylinder((x, -wide / 2, radius), (x, wide / 2, radius), radius, sides=18))
+    mesh.add("tire", cylinder((x, -wide / 2, radius), (x, wide / 2, radius), radius, sides=18))
     mesh.add("rim", cylinder((x, -wide / 2 - 0.006, radius), (x, wide / 2 + 0.006, radius), rim * radius, sides=18))
     mesh.add("trim", cylinder((x, -wide / 2 - 0.01, radius), (x, wide / 2 + 0.01, radius), 0.2 * radius, sides=8))
 

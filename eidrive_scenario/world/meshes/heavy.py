@@ -1,4 +1,4 @@
-"""Lorries, fire engines and buses."""
+"""Trucks, fire engines and buses."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def trailer(frame: BodyDimensions) -> Mesh:
     _tail(mesh, frame, floor)
     mesh.add("trim", box((0.0, 0, floor - 0.15), (0.96 * frame.length, 0.9 * frame.side, 0.28)))
     leg = (frame.x(0.8), 0.6 * frame.side, floor / 2 + 0.1)
-    mesh.add_mirrored("grey", box(leg, (0.14, 0.14, floor - 0.2)))
+    mesh.add_mirrored("gray", box(leg, (0.14, 0.14, floor - 0.2)))
     add_extra_wheels(mesh, frame, 0.985 * frame.side, 0.55, steered=0.32)
     return mesh
 
 
 def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> None:
-    """A closed body over `cargo` metres from the rear end on, with seams and a stripe."""
+    """A closed body over `cargo` meters from the rear end on, with seams and a stripe."""
     x, side = frame.x, frame.side
     middle = x(0.0) + cargo / 2
     mesh.add(
@@ -49,7 +49,7 @@ def _cargo(mesh: Mesh, frame: BodyDimensions, cargo: float, floor: float) -> Non
     for share in range(1, 6):
         seam = x(0.0) + cargo * share / 6
         mesh.add_mirrored(
-            "grey", box((seam, side, (floor + frame.height) / 2), (0.03, 0.012, 0.96 * (frame.height - floor)))
+            "gray", box((seam, side, (floor + frame.height) / 2), (0.03, 0.012, 0.96 * (frame.height - floor)))
         )
     mesh.add_mirrored("paint", box((middle, side, floor + 0.35 * (frame.height - floor)), (cargo, 0.016, 0.22)))
 
@@ -68,15 +68,15 @@ def firetruck(frame: BodyDimensions) -> Mesh:
     wide = body / count
     axles = (frame.rear, *(axle.x for axle in frame.extra_axles))
     for index in range(count):
-        centre = x(0.0) + (index + 0.5) * wide
-        above_wheel = any(abs(centre - axle) <= 0.8 * wide for axle in axles)
+        center = x(0.0) + (index + 0.5) * wide
+        above_wheel = any(abs(center - axle) <= 0.8 * wide for axle in axles)
         low = floor + 0.42 if above_wheel else floor + 0.12
         high = roof - 0.22
-        mesh.add_mirrored("steel", box((centre, 0.99 * side, (low + high) / 2), (0.84 * wide, 0.02, high - low)))
+        mesh.add_mirrored("steel", box((center, 0.99 * side, (low + high) / 2), (0.84 * wide, 0.02, high - low)))
         for line in range(1, 7):
             at = low + (high - low) * line / 7
-            mesh.add_mirrored("grey", box((centre, 0.994 * side, at), (0.82 * wide, 0.02, 0.018)))
-        mesh.add_mirrored("trim", box((centre, 0.996 * side, low + 0.06), (0.5 * wide, 0.03, 0.035)))
+            mesh.add_mirrored("gray", box((center, 0.994 * side, at), (0.82 * wide, 0.02, 0.018)))
+        mesh.add_mirrored("trim", box((center, 0.996 * side, low + 0.06), (0.5 * wide, 0.03, 0.035)))
     mesh.add_mirrored("white", box((x(0.5), 0.992 * side, floor + 0.05), (0.97 * frame.length, 0.02, 0.16)))
     mesh.add_mirrored("yellow", box((x(0.5), 0.992 * side, floor + 0.17), (0.97 * frame.length, 0.02, 0.06)))
     for sign in (-1, 1):
@@ -176,20 +176,20 @@ def _cab(mesh: Mesh, frame: BodyDimensions, length: float, top: float, material:
     )
     doors = ((0.30, 0.34), (0.72, 0.34)) if crew else ((0.42, 0.50),)
     for back, wide in doors:
-        centre = nose - back * length
+        center = nose - back * length
         mesh.add_mirrored(
             "glass",
             tapered_box(
-                (centre, 0.925 * side, (glass_low + glass_high) / 2),
+                (center, 0.925 * side, (glass_low + glass_high) / 2),
                 (wide * length, 0.10 * side, glass_high - glass_low),
                 (0.92 * wide * length, 0.02 * side),
             ),
         )
         mesh.add_mirrored(
             "trim",
-            box((centre - 0.56 * wide * length, 0.982 * side, (floor + sill) / 2 + 0.2), (0.02, 0.012, sill - floor)),
+            box((center - 0.56 * wide * length, 0.982 * side, (floor + sill) / 2 + 0.2), (0.02, 0.012, sill - floor)),
         )
-        mesh.add_mirrored("chrome", box((centre - 0.42 * wide * length, 0.985 * side, sill - 0.12), (0.20, 0.03, 0.04)))
+        mesh.add_mirrored("chrome", box((center - 0.42 * wide * length, 0.985 * side, sill - 0.12), (0.20, 0.03, 0.04)))
     mesh.add("trim", box((nose - 0.01, 0, floor + 0.30 * high), (0.05, 1.3 * side, 0.22 * high)))
     mesh.add("plastic", bevelled_box((nose - 0.12, 0, floor + 0.06), (0.28, 1.96 * side, 0.30), 0.05))
     mesh.add("plate", box((nose + 0.005, 0, floor + 0.05), (0.05, 0.52, 0.11)))
@@ -212,12 +212,12 @@ def _tail(mesh: Mesh, frame: BodyDimensions, floor: float) -> None:
 
 
 def _chassis(mesh: Mesh, frame: BodyDimensions) -> None:
-    """Frame, tank and wheels; twin tyres at the rear."""
+    """Frame, tank and wheels; twin tires at the rear."""
     radius, side = frame.wheel_radius, frame.side
     mesh.add("trim", box((-0.02, 0, 1.3 * radius), (0.94 * frame.length, 0.9 * side, 0.6 * radius)))
     middle = (frame.front + frame.rear) / 2
     mesh.add_mirrored(
-        "grey",
+        "gray",
         cylinder((middle - 0.5, 0.72 * side, 1.15 * radius), (middle + 0.5, 0.72 * side, 1.15 * radius), 0.55 * radius),
     )
     add_wheels(mesh, frame, 0.985 * side, 0.32, axles=(frame.front,))

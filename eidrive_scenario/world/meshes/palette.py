@@ -1,17 +1,17 @@
-"""Colours of the materials, and paint by name."""
+"""Colors of the materials, and paint by name."""
 
 from __future__ import annotations
 
 import hashlib
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
-MATERIALS: dict[str, Colour] = {
+MATERIALS: dict[str, Color] = {
     "glass": (0.09, 0.12, 0.16),
     "window": (0.32, 0.42, 0.50),
     "trim": (0.07, 0.07, 0.08),
     "plastic": (0.16, 0.16, 0.17),
-    "tyre": (0.05, 0.05, 0.05),
+    "tire": (0.05, 0.05, 0.05),
     "rim": (0.62, 0.64, 0.66),
     "chrome": (0.75, 0.76, 0.78),
     "headlight": (0.96, 0.96, 0.88),
@@ -26,7 +26,7 @@ MATERIALS: dict[str, Colour] = {
     "white": (0.93, 0.93, 0.92),
     "red": (0.74, 0.05, 0.04),
     "yellow": (0.93, 0.76, 0.08),
-    "grey": (0.50, 0.51, 0.52),
+    "gray": (0.50, 0.51, 0.52),
     "steel": (0.60, 0.62, 0.64),
     "cargo": (0.86, 0.86, 0.84),
     "skin": (0.80, 0.60, 0.47),
@@ -53,22 +53,22 @@ MATERIALS: dict[str, Colour] = {
     "marking_yellow": (0.90, 0.70, 0.12),
 }
 
-PAINTS: tuple[Colour, ...] = (
+PAINTS: tuple[Color, ...] = (
     (0.90, 0.90, 0.89), (0.12, 0.13, 0.15), (0.55, 0.57, 0.59), (0.63, 0.09, 0.09), (0.10, 0.22, 0.48),
     (0.30, 0.33, 0.36), (0.16, 0.34, 0.26), (0.72, 0.66, 0.54), (0.80, 0.44, 0.10), (0.34, 0.52, 0.66),
 )  # fmt: skip
 """Body paints, of which each actor gets one by its name."""
 
-CLOTHES: tuple[Colour, ...] = (
+CLOTHES: tuple[Color, ...] = (
     (0.70, 0.16, 0.14), (0.16, 0.36, 0.62), (0.24, 0.46, 0.28),
     (0.86, 0.74, 0.30), (0.42, 0.24, 0.46), (0.85, 0.84, 0.80),
 )  # fmt: skip
 
-FACADES: tuple[Colour, ...] = (
+FACADES: tuple[Color, ...] = (
     (0.72, 0.62, 0.50), (0.66, 0.40, 0.32), (0.74, 0.72, 0.66), (0.55, 0.57, 0.60), (0.80, 0.74, 0.60),
 )  # fmt: skip
 
-FIXED_PAINT: dict[str, Colour] = {
+FIXED_PAINT: dict[str, Color] = {
     "firetruck": MATERIALS["red"],
     "ambulance": MATERIALS["white"],
     "bus": (0.86, 0.62, 0.10),
@@ -78,13 +78,13 @@ FIXED_PAINT: dict[str, Colour] = {
 """Paint that goes with the shape and not with the name."""
 
 
-def paint(name: str, shape: str) -> Colour:
-    """The paint of an actor without a colour of its own, the same in every process."""
+def paint(name: str, shape: str) -> Color:
+    """The paint of an actor without a color of its own, the same in every process."""
     if shape in FIXED_PAINT:
         return FIXED_PAINT[shape]
     return by_name(name, CLOTHES if shape in ("pedestrian", "bicycle", "motorbike") else PAINTS)
 
 
-def by_name(name: str, colours: tuple[Colour, ...]) -> Colour:
-    """One of the colours, by a hash of the name."""
-    return colours[int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little") % len(colours)]
+def by_name(name: str, colors: tuple[Color, ...]) -> Color:
+    """One of the colors, by a hash of the name."""
+    return colors[int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little") % len(colors)]

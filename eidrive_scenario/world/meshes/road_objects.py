@@ -21,18 +21,18 @@ def road_object_mesh(
 
 
 @lru_cache(maxsize=64)
-def traffic_light(colours: tuple[str, ...], width: float, height: float) -> Mapping[str, Array]:
+def traffic_light(colors: tuple[str, ...], width: float, height: float) -> Mapping[str, Array]:
     """A head with lamps from top to bottom, looking along +x; origin at the middle of its lower edge.
 
     The lamps are materials of their own: `lamp_red 0`, … numbered from the top.
     """
     mesh = Mesh()
-    deep, cell = 0.5 * width, height / max(len(colours), 1)
+    deep, cell = 0.5 * width, height / max(len(colors), 1)
     lens = min(0.36 * width, 0.40 * cell)
     mesh.add("plastic", box((-deep / 2, 0, height / 2), (deep, width, height)))
-    for number, colour in enumerate(colours):
+    for number, color in enumerate(colors):
         z = height - (number + 0.5) * cell
-        mesh.add(f"lamp_{colour} {number}", cylinder((0.0, 0, z), (0.012, 0, z), lens, sides=12))
+        mesh.add(f"lamp_{color} {number}", cylinder((0.0, 0, z), (0.012, 0, z), lens, sides=12))
         mesh.add("plastic", _visor(z, lens))
     return mesh.materials()
 
@@ -99,7 +99,7 @@ def _obstacle(mesh: Mesh, name: str, length: float, width: float, height: float,
         mesh.add("orange", cylinder((0, 0, 0.04), (0, 0, height), 0.38 * min(length, width), 0.03, sides=10))
         return
     if radius:
-        mesh.add("grey", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
+        mesh.add("gray", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
         return
     mesh.add(
         "steel" if "post" in name.lower() or "pole" in name.lower() else "cargo",

@@ -11,7 +11,7 @@ from eidrive_scenario.roads import Signal
 
 class SignFace(NamedTuple):
     """shape   octagon, triangle (point up), yield (point down), disc, diamond or board
-    fill, border  colours: red, white, yellow, blue, black, or none
+    fill, border  colors: red, white, yellow, blue, black, or none
     text    digits and letters in its middle
     """
 
@@ -46,7 +46,7 @@ _GERMAN: tuple[tuple[range, SignFace], ...] = (
     (range(306, 307), PRIORITY),
     (range(310, 440), INFORMATION),
 )
-"""Numbers of the German catalogue (VzKat), which OpenDRIVE's own signals follow."""
+"""Numbers of the German catalog (VzKat), which OpenDRIVE's own signals follow."""
 _AMERICAN: Mapping[str, SignFace] = {"R1-1": STOP, "R1-2": YIELD, "R2-1": SignFace("board", "white", "black")}
 _SWEDISH: Mapping[str, SignFace] = {
     "a": WARNING, "b1": YIELD, "b2": STOP, "b4": PRIORITY, "c1": NO_ENTRY, "c": PROHIBITION, "d": MANDATORY,

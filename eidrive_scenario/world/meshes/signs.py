@@ -66,7 +66,7 @@ def _outline(shape: str, width: float, height: float) -> Array:
 
 
 def _inner(shape: str, height: float) -> float:
-    """Height of a triangle's centre."""
+    """Height of a triangle's center."""
     return height / 3 if shape == "triangle" else 2 * height / 3
 
 

@@ -16,7 +16,7 @@ _BOX_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 
 
 @dataclass
 class Mesh:
-    """Triangles by the name of their material, in the frame of the bounding box's centre on the ground."""
+    """Triangles by the name of their material, in the frame of the bounding box's center on the ground."""
 
     triangles: dict[str, list[Array]] = field(default_factory=dict)
 
@@ -56,14 +56,14 @@ def hexahedron(corners: Sequence[Point] | Array) -> Array:
     return np.concatenate([polygon(points[list(face)]) for face in _BOX_FACES])
 
 
-def box(centre: Point, size: Point) -> Array:
+def box(center: Point, size: Point) -> Array:
     """An upright cuboid."""
-    return tapered_box(centre, size, size[:2])
+    return tapered_box(center, size, size[:2])
 
 
-def tapered_box(centre: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
+def tapered_box(center: Point, size: Point, top: Point, shift: float = 0.0) -> Array:
     """A frustum of length, width and height `size` whose top is `top` long and wide and `shift` further ahead."""
-    x, y, z = centre
+    x, y, z = center
     length, width, height = size
     signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     bottom = [(x + sx * length / 2, y + sy * width / 2, z - height / 2) for sx, sy in signs]
@@ -71,9 +71,9 @@ def tapered_box(centre: Point, size: Point, top: Point, shift: float = 0.0) -> A
     return hexahedron(bottom + upper)
 
 
-def bevelled_box(centre: Point, size: Point, bevel: float) -> Array:
+def bevelled_box(center: Point, size: Point, bevel: float) -> Array:
     """An upright cuboid whose edges are cut off by `bevel`, as sheet metal looks from some way off."""
-    x, y, z = centre
+    x, y, z = center
     length, width, height = (extent / 2 for extent in size)
 
     def ring(at: float, inset: float) -> Array:
@@ -118,13 +118,13 @@ def cylinder(start: Point, end: Point, radius: float, end_radius: float | None =
     return loft([begin + radius * circle, finish + last * circle])
 
 
-def ball(centre: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array:
+def ball(center: Point, radius: Point, rings: int = 6, sides: int = 10) -> Array:
     """An ellipsoid with its half-axes along x, y, z."""
     tilt = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[:, None, None]
     turn = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)[None, :, None]
     level = np.cos(tilt)
     unit = np.concatenate(np.broadcast_arrays(level * np.cos(turn), -level * np.sin(turn), np.sin(tilt)), axis=-1)
-    return loft(unit * np.asarray(radius) + np.asarray(centre))
+    return loft(unit * np.asarray(radius) + np.asarray(center))
 
 
 def moved(solid: Array, by: Point) -> Array:
@@ -134,5 +134,5 @@ def moved(solid: Array, by: Point) -> Array:
 
 
 def _fan(ring: Array) -> Array:
-    centre = np.broadcast_to(ring.mean(axis=0), ring.shape)
-    return np.stack([centre, ring, np.roll(ring, -1, axis=0)], axis=1)
+    center = np.broadcast_to(ring.mean(axis=0), ring.shape)
+    return np.stack([center, ring, np.roll(ring, -1, axis=0)], axis=1)

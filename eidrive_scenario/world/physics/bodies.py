@@ -45,7 +45,7 @@ class Body(ABC):
     @property
     def box(self) -> tuple[float, ...]:
         """(7,) x y z l w h yaw of the bounding box."""
-        return (self.centre_x, self.centre_y, self.centre_z, *self.spec.size, self.yaw)
+        return (self.center_x, self.center_y, self.center_z, *self.spec.size, self.yaw)
 
     @property
     def state(self) -> ActorState:
@@ -74,7 +74,7 @@ class Body(ABC):
         self.x, self.y, self.z, self.yaw, self.pitch, self.roll = x, y, z, yaw, pitch, roll
         ox, oy, oz = self.spec.offset
         cos, sin = math.cos(yaw), math.sin(yaw)
-        self.centre_x, self.centre_y, self.centre_z = x + cos * ox - sin * oy, y + sin * ox + cos * oy, z + oz
+        self.center_x, self.center_y, self.center_z = x + cos * ox - sin * oy, y + sin * ox + cos * oy, z + oz
 
     def _along_heading(self, speed: float) -> Vector3:
         if self.pitch == 0.0:
@@ -91,8 +91,8 @@ class Body(ABC):
             (velocity[2] - old[2]) / dt,
         )
 
-    def _create(self, centre: Vector3, at: Vector3, mass: float, inertia: float, group: int, meets: int) -> None:
-        """Make the rigid body, whose box has its centre there in the frame of the centre of gravity.
+    def _create(self, center: Vector3, at: Vector3, mass: float, inertia: float, group: int, meets: int) -> None:
+        """Make the rigid body, whose box has its center there in the frame of the center of gravity.
 
         What must not be moved is added as a static body and gets its huge mass only then: pybullet does not integrate
         it, yet collisions see the velocity that it is given, which that of a static body they do not.
@@ -102,7 +102,7 @@ class Body(ABC):
         shape = bullet.createCollisionShape(
             bullet.GEOM_BOX,
             halfExtents=(length / 2, width / 2, height / 2),
-            collisionFramePosition=centre,
+            collisionFramePosition=center,
             **here,
         )
         self.handle = bullet.createMultiBody(

@@ -74,18 +74,18 @@ def _near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[Body, Body]]:
         yield from _near_pairs_of_many(bodies)
         return
     for index, first in enumerate(bodies):
-        x, y, radius, moved = first.centre_x, first.centre_y, first.radius + PARTED, first.moved
+        x, y, radius, moved = first.center_x, first.center_y, first.radius + PARTED, first.moved
         for other in range(index + 1, len(bodies)):
             second = bodies[other]
             if moved or second.moved:
-                dx, dy, reach = second.centre_x - x, second.centre_y - y, radius + second.radius
+                dx, dy, reach = second.center_x - x, second.center_y - y, radius + second.radius
                 if dx * dx + dy * dy <= reach * reach:
                     yield first, second
 
 
 def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
-    """The same by sweeping along x: only neighbours in the order of x can be near."""
-    x, y, radius, moved = np.array([(b.centre_x, b.centre_y, b.radius, b.moved) for b in bodies]).T
+    """The same by sweeping along x: only neighbors in the order of x can be near."""
+    x, y, radius, moved = np.array([(b.center_x, b.center_y, b.radius, b.moved) for b in bodies]).T
     order = np.argsort(x, kind="stable")
     sorted_x = x[order]
     last = np.searchsorted(sorted_x, sorted_x + radius[order] + radius.max() + PARTED, side="right")
@@ -101,7 +101,7 @@ def _near_pairs_of_many(bodies: Sequence[Body]) -> Iterable[tuple[Body, Body]]:
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:
-    """The middle of the corners of each box inside the other; of the centres, where boxes cross without such."""
+    """The middle of the corners of each box inside the other; of the centers, where boxes cross without such."""
     boxes = np.array([first.box, second.box])
     corners = box_corners(boxes)
     inside = [corners[0][points_in_box(corners[0], boxes[1])], corners[1][points_in_box(corners[1], boxes[0])]]

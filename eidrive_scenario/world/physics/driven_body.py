@@ -1,4 +1,4 @@
-"""The bodies of vehicles that drive: they move by the forces of their tyres, and by what hits them.
+"""The bodies of vehicles that drive: they move by the forces of their tires, and by what hits them.
 
 pybullet's gravity and damping are off; it integrates the velocities and resolves collisions.
 """
@@ -33,7 +33,7 @@ class DrivenBody(Body):
         self._ground = ground
         self._lever = self.track.to_reference
         self._motion = (0.0, 0.0, 0.0)
-        """Velocity x y of the centre of gravity [m/s] and yaw rate [rad/s], as of the rigid body."""
+        """Velocity x y of the center of gravity [m/s] and yaw rate [rad/s], as of the rigid body."""
         self._create(
             (spec.offset[0] - self._lever, spec.offset[1], 0.0),
             (self.x, self.y, self.z),
@@ -129,7 +129,7 @@ class DrivenBody(Body):
         bullet.resetBaseVelocity(self.handle, (vx, vy, rise), (0.0, 0.0, rate), self.client)
 
     def _arrive(self, x: float, y: float, yaw: float, motion: Vector3) -> None:
-        """Take over place and heading of the centre of gravity and its motion; the ground gives the rest."""
+        """Take over place and heading of the center of gravity and its motion; the ground gives the rest."""
         vx, vy, rate = self._motion = motion
         arm_x, arm_y, _ = self._arm(yaw)
         x, y = x - arm_x, y - arm_y
@@ -142,7 +142,7 @@ class DrivenBody(Body):
         self._accelerate_to((vx + arm_y * rate, vy - arm_x * rate, -math.tan(pitch) * level))
 
     def _arm(self, yaw: float) -> Vector3:
-        """From the reference point to the centre of gravity, at half the height of the box, in the world [m]."""
+        """From the reference point to the center of gravity, at half the height of the box, in the world [m]."""
         lever, height = self._lever, self.spec.offset[2]
         cy, sy = math.cos(yaw), math.sin(yaw)
         if self.pitch == 0.0 and self.roll == 0.0:

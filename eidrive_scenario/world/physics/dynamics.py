@@ -1,7 +1,7 @@
-"""How a driven vehicle moves: a single-track model with tyre and drivetrain limits.
+"""How a driven vehicle moves: a single-track model with tire and drivetrain limits.
 
 Single-track model: R. Rajamani, Vehicle Dynamics and Control, 2nd ed., Springer 2012, section 2.3, with the axle
-loads at standstill. Tyre: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller
+loads at standstill. Tire: the brush model of E. Fiala in the form of R. Hindiyeh and J. C. Gerdes, "A controller
 framework for autonomous drifting", ASME J. Dyn. Syst. Meas. Control 136 (2014), whose largest side force is what the
 friction circle leaves beside the longitudinal force. Drive, brakes, rolling resistance and air drag:
 Rajamani, ch. 4. Vehicles with more than two axles: `multi_axle`.
@@ -26,7 +26,7 @@ PROPERTIES = (
     "power",
     "drag_area",
     "rolling_resistance",
-    "tyre_friction",
+    "tire_friction",
     "cornering_stiffness_front",
     "cornering_stiffness_rear",
     "weight_front",
@@ -64,7 +64,7 @@ class VehicleParameters:
     weight_front: float
     """Share of the weight on the front axle at standstill [0.55; of n front and m rear axles 0.55 n to 0.45 m]."""
     yaw_inertia: float
-    """About the centre of gravity [kg m²; mass times the product of its distances from the axles]."""
+    """About the center of gravity [kg m²; mass times the product of its distances from the axles]."""
     max_steering: float
     """[rad]"""
     steering_rate: float
@@ -84,8 +84,8 @@ class VehicleParameters:
     """Drag coefficient times frontal area [m²; 0.3 times width times height]."""
     rolling_resistance: float
     """Force over weight [0.012]."""
-    tyre_friction: float
-    """Largest tyre force over load, on a dry road [1.0]."""
+    tire_friction: float
+    """Largest tire force over load, on a dry road [1.0]."""
     cornering_stiffness_front: float
     """Of the whole axle [N/rad; 14 per rad times its load]."""
     cornering_stiffness_rear: float
@@ -126,7 +126,7 @@ class VehicleParameters:
             drive_front=_number(spec, "drive_front", 1.0, zero=True, below=1.0 + 1e-9),
             drag_area=_number(spec, "drag_area", 0.3 * spec.size[1] * spec.size[2], zero=True),
             rolling_resistance=_number(spec, "rolling_resistance", 0.012, zero=True),
-            tyre_friction=_number(spec, "tyre_friction", 1.0),
+            tire_friction=_number(spec, "tire_friction", 1.0),
             cornering_stiffness_front=_number(spec, "cornering_stiffness_front", 14.0 * weight * weight_front),
             cornering_stiffness_rear=_number(spec, "cornering_stiffness_rear", 18.0 * weight * (1.0 - weight_front)),
             rear=rear,
@@ -169,7 +169,7 @@ class Demand(NamedTuple):
     """1 forwards, -1 backwards."""
     grip_front: float
     grip_rear: float
-    """Largest forces of the tyres [N]."""
+    """Largest forces of the tires [N]."""
     traction_front: float
     traction_rear: float
     """Largest forces along the wheels [N]."""
@@ -180,9 +180,9 @@ class Demand(NamedTuple):
 class SingleTrack:
     """The forces on one vehicle, turned into the change of its velocities over short steps of `step` seconds.
 
-    At low speed the slip of a tyre is no longer defined by its ratio of velocities. There the side force is bounded by
+    At low speed the slip of a tire is no longer defined by its ratio of velocities. There the side force is bounded by
     the one that just ends the side slip of its axle within the step, so that the model passes into the kinematic one
-    and comes to a stable rest, and yet a blow from the side finds no more than the tyres' grip.
+    and comes to a stable rest, and yet a blow from the side finds no more than the tires' grip.
     """
 
     def __init__(self, parameters: VehicleParameters, step: float) -> None:
@@ -192,7 +192,7 @@ class SingleTrack:
         self.to_front = (1.0 - p.weight_front) * p.wheelbase
         self.to_rear = p.weight_front * p.wheelbase
         self.to_reference = p.rear + self.to_rear
-        """From the reference point, on the rear axle, ahead to the centre of gravity [m]."""
+        """From the reference point, on the rear axle, ahead to the center of gravity [m]."""
         self._cos, self._sin = 1.0, 0.0
         self._turn = p.steering_rate * step
         self._load_front = p.mass * GRAVITY * p.weight_front
@@ -211,10 +211,10 @@ class SingleTrack:
         self._slowest_rear = step * p.cornering_stiffness_rear / inertia_rear
 
     def demand(self, control: Control, friction: float, pitch: float) -> Demand:
-        """What a control asks for; `friction` scales the tyres' grip, `pitch` (positive nose down) is the road's,
+        """What a control asks for; `friction` scales the tires' grip, `pitch` (positive nose down) is the road's,
         whose slope pulls the vehicle."""
         p = self.parameters
-        grip = p.tyre_friction * friction
+        grip = p.tire_friction * friction
         grip_front, grip_rear = grip * self._load_front, grip * self._load_rear
         brake = min(max(control.brake, 0.0), 1.0) * self._full_brake
         return Demand(
@@ -232,7 +232,7 @@ class SingleTrack:
     def advance(self, forward: float, left: float, yaw_rate: float, demand: Demand) -> tuple[float, float, float]:
         """Velocities forward and to the left [m/s] and yaw rate [rad/s] after one step.
 
-        The velocities are those of the centre of gravity in the vehicle's axes, those of the beginning of the step.
+        The velocities are those of the center of gravity in the vehicle's axes, those of the beginning of the step.
         """
         p = self.parameters
         if self.steering != demand.steering:
@@ -266,7 +266,7 @@ class SingleTrack:
         self._cos, self._sin = math.cos(self.steering), math.sin(self.steering)
 
     def _longitudinal(self, forward: float, demand: Demand) -> tuple[float, float, float]:
-        """Forces along the wheels at the front and the rear axle, and those that need no tyre [N]."""
+        """Forces along the wheels at the front and the rear axle, and those that need no tire [N]."""
         p = self.parameters
         free = demand.slope - self._drag * forward * abs(forward)
         front = rear = 0.0
@@ -303,7 +303,7 @@ def fiala(slip: float, stiffness: float, largest: float) -> float:
 
 
 def left_by(grip: float, along: float) -> float:
-    """Side force that tyres of this grip have left beside a force along them [N]."""
+    """Side force that tires of this grip have left beside a force along them [N]."""
     return math.sqrt(grip * grip - along * along) if along else grip
 
 

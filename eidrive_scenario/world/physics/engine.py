@@ -20,7 +20,7 @@ Touches = dict[tuple[str, str], Touch]
 
 _ROLL = Control()
 _BLOW = 20.0
-"""Speed that a collision may add within a tick, as far as the search for neighbours goes [m/s]."""
+"""Speed that a collision may add within a tick, as far as the search for neighbors goes [m/s]."""
 _HARDEST = 20.0
 """Acceleration of any part of a vehicle that nothing hits, at most [m/s²]."""
 _MARGIN = 0.1
@@ -143,10 +143,10 @@ class Physics:
             return [], watched
         reaches = {name: body.radius + travels[name] + _BLOW * self._dt for name, body in bodies.items()}
         for name, body in driven.items():
-            x, y, own = body.centre_x, body.centre_y, reaches[name]
+            x, y, own = body.center_x, body.center_y, reaches[name]
             near = self._stands_near(name, x, y, own)
             for other_name, other in bodies.items():
-                dx, dy, reach = other.centre_x - x, other.centre_y - y, own + reaches[other_name]
+                dx, dy, reach = other.center_x - x, other.center_y - y, own + reaches[other_name]
                 if dx * dx + dy * dy <= reach * reach and other is not body:
                     near = True
                     if isinstance(other, ScriptedBody) and other.moved:
@@ -157,12 +157,12 @@ class Physics:
 
     def _may_meet(self, body: DrivenBody, bodies: Mapping[str, Body], travels: Mapping[str, float]) -> bool:
         """Whether a driven body may touch anything in this tick."""
-        x, y, radius, own = body.centre_x, body.centre_y, body.radius, travels[body.name]
+        x, y, radius, own = body.center_x, body.center_y, body.radius, travels[body.name]
         if self._stands_near(body.name, x, y, radius + own):
             return True
         for name, other in bodies.items():
             way = own + travels[name]
-            dx, dy, reach = other.centre_x - x, other.centre_y - y, radius + other.radius + way
+            dx, dy, reach = other.center_x - x, other.center_y - y, radius + other.radius + way
             if dx * dx + dy * dy <= reach * reach and other is not body and box_distance(body.box, other.box) <= way:
                 return True
         return False

@@ -20,7 +20,7 @@ class _Wheels:
     """One axle as the model rolls it."""
 
     lever: float
-    """Ahead of the centre of gravity [m]."""
+    """Ahead of the center of gravity [m]."""
     front: bool
     gain: float
     """Tangent of its steering angle over that of the front axle."""

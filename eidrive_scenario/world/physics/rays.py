@@ -19,8 +19,8 @@ GROUND, NOTHING = -1, -2
 
 _BATCH = 16_000
 _STEP_IN = 0.01
-"""How far a ray is moved into a body that it may pass [m]. From a millimetre inside, pybullet sees the body again; from
-a centimetre in 0.3 % of directions, those along its surface, which then go in twice as far each time."""
+"""How far a ray is moved into a body that it may pass [m]. From a millimeter inside, pybullet sees the body again; from
+a centimeter in 0.3 % of directions, those along its surface, which then go in twice as far each time."""
 _STEPS = 12
 """So often for each body that may be passed: 40 m after the last."""
 

@@ -26,13 +26,13 @@ STOREY = 3.2
 
 @dataclass(frozen=True)
 class Building:
-    """A box that stands on the ground: centre [m], length, width, height [m], heading [rad]."""
+    """A box that stands on the ground: center [m], length, width, height [m], heading [rad]."""
 
     name: str
-    centre: Vector3
+    center: Vector3
     size: Vector3
     yaw: float
-    colour: Vector3 | None = None
+    color: Vector3 | None = None
 
 
 class Scenery:
@@ -59,18 +59,16 @@ class Scenery:
             for placed in placed_objects(roads):
                 if placed.object.type == "building" and placed.object.id not in entities:
                     building = _building(roads, placed)
-                    self.add_building(building.name, building.centre, building.size, building.yaw)
+                    self.add_building(building.name, building.center, building.size, building.yaw)
 
-    def add_building(
-        self, name: str, centre: Vector3, size: Vector3, yaw: float, colour: Vector3 | None = None
-    ) -> None:
+    def add_building(self, name: str, center: Vector3, size: Vector3, yaw: float, color: Vector3 | None = None) -> None:
         """Put up a building that stops vehicles and rays."""
-        self.buildings.append(Building(name, centre, size, yaw, colour))
+        self.buildings.append(Building(name, center, size, yaw, color))
         radius = math.hypot(size[0], size[1]) / 2
-        self._nearby.add((centre[0], centre[1], radius), grid_cells(centre[0], centre[1], radius))
+        self._nearby.add((center[0], center[1], radius), grid_cells(center[0], center[1], radius))
         half = (size[0] / 2, size[1] / 2, size[2] / 2)
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client)
-        self._add_static(shape, centre, yaw, STATIC, RAYS | DRIVEN, name)
+        self._add_static(shape, center, yaw, STATIC, RAYS | DRIVEN, name)
 
     def raise_ground(self) -> bool:
         """Make the ground that rays meet, where there is none yet; True if it was made now.

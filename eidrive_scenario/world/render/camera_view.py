@@ -43,8 +43,8 @@ class CameraView:
 
 @lru_cache(maxsize=32)
 def _own_rays(pinhole: Pinhole) -> tuple[Floats, Floats, Floats]:
-    columns = (np.arange(pinhole.width) + 0.5 - pinhole.centre_x) / pinhole.focal
-    rows = (np.arange(pinhole.height) + 0.5 - pinhole.centre_y) / pinhole.focal
+    columns = (np.arange(pinhole.width) + 0.5 - pinhole.center_x) / pinhole.focal
+    rows = (np.arange(pinhole.height) + 0.5 - pinhole.center_y) / pinhole.focal
     x, y = (grid.ravel().astype(np.float32) for grid in np.meshgrid(columns, rows))
     return x, y, np.sqrt(x * x + y * y + np.float32(1.0))
 

@@ -78,8 +78,8 @@ def cull_and_project(instances: Sequence[MeshInstance], pose: Array, pinhole: Pi
     # Corner by corner, axis by axis: (3, 3, N).
     (x, y, depth), whose = _cut(np.ascontiguousarray(corners.transpose(2, 1, 0), dtype=np.float64), pinhole.near)
     nearness = 1.0 / depth
-    x = pinhole.focal * x * nearness + pinhole.centre_x
-    y = pinhole.focal * y * nearness + pinhole.centre_y
+    x = pinhole.focal * x * nearness + pinhole.center_x
+    y = pinhole.focal * y * nearness + pinhole.center_y
     return VisibleGeometry(x, y, nearness, whose, normal, albedo, finish, label, glow)
 
 
@@ -95,8 +95,8 @@ _NOTHING = _Chosen(
 
 def _sides(pinhole: Pinhole) -> Array:
     """(5, 3) inward unit normals of the planes through the eye and the picture's edges, and of the near plane."""
-    left, right = -pinhole.centre_x / pinhole.focal, (pinhole.width - pinhole.centre_x) / pinhole.focal
-    top, bottom = -pinhole.centre_y / pinhole.focal, (pinhole.height - pinhole.centre_y) / pinhole.focal
+    left, right = -pinhole.center_x / pinhole.focal, (pinhole.width - pinhole.center_x) / pinhole.focal
+    top, bottom = -pinhole.center_y / pinhole.focal, (pinhole.height - pinhole.center_y) / pinhole.focal
     planes = np.array([(1, 0, -left), (-1, 0, right), (0, 1, -top), (0, -1, bottom), (0, 0, 1)], dtype=float)
     found: Array = planes / np.linalg.norm(planes, axis=1, keepdims=True)
     return found
@@ -108,10 +108,10 @@ def _in_sight(
     """The instances whose spheres reach into the picture, and how many pixels these cover across."""
     if not instances:
         return []
-    centres = (np.array([instance.centre for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
+    centers = (np.array([instance.center for instance in instances]) - pose[:3, 3]) @ pose[:3, :3]
     radii = np.array([instance.model.radius for instance in instances])
-    seen = (centres @ sides.T >= -radii[:, None]).all(axis=1) & (centres[:, 2] - radii <= pinhole.far)
-    distance = np.maximum(np.sqrt((centres**2).sum(axis=1)), 1e-6)
+    seen = (centers @ sides.T >= -radii[:, None]).all(axis=1) & (centers[:, 2] - radii <= pinhole.far)
+    distance = np.maximum(np.sqrt((centers**2).sum(axis=1)), 1e-6)
     pixels = (2.0 * pinhole.focal * radii / distance).tolist()
     return [(instances[row], pixels[row]) for row in np.flatnonzero(seen).tolist()]
 
@@ -123,9 +123,9 @@ def _facing(instance: MeshInstance, pose: Array, pinhole: Pinhole, sides: Array,
     shift = pose[:3, :3].T @ (instance.position - pose[:3, 3])
     eye = -(to_camera.T @ shift).astype(np.float32)
     if model.cells is not None:
-        centres = model.cells.centre @ to_camera.T + shift
-        near = (centres @ sides.T >= -model.cells.radius[:, None]).all(axis=1)
-        near &= centres[:, 2] - model.cells.radius <= pinhole.far
+        centers = model.cells.center @ to_camera.T + shift
+        near = (centers @ sides.T >= -model.cells.radius[:, None]).all(axis=1)
+        near &= centers[:, 2] - model.cells.radius <= pinhole.far
         rows = model.cells.rows(near)
         rows = rows[model.normals[rows] @ eye > model.plane[rows]]
     elif instance.label >= 0 and pixels < _COARSE_PIXELS:

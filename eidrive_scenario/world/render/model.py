@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.meshes.palette import MATERIALS, Colour
+from eidrive_scenario.world.meshes.palette import MATERIALS, Color
 from eidrive_scenario.world.render.materials import finish_of
 
 Floats = NDArray[np.float32]
@@ -30,7 +30,7 @@ class Model:
     """Triangles (K, 3, 3) in a frame of their own [m], each flat and seen from its front. Each equals only itself.
 
     normals (K, 3) unit, plane (K,) = normal · corner, albedo (K, 3) linear, finish (K,) index of FINISHES,
-    material (K,) index of `materials`, coarse indices of the triangles that matter from afar; centre (3,), half (3,)
+    material (K,) index of `materials`, coarse indices of the triangles that matter from afar; center (3,), half (3,)
     extents and radius around it
     """
 
@@ -42,7 +42,7 @@ class Model:
     material: NDArray[np.int16]
     materials: tuple[str, ...]
     coarse: Integers
-    centre: Array
+    center: Array
     half: Array
     radius: float
 
@@ -58,11 +58,11 @@ class Model:
 
 class Cells(NamedTuple):
     """The squares of a grid on the ground by which a large model is sorted: the first triangle of each, their numbers,
-    and the spheres (centre, radius) around them."""
+    and the spheres (center, radius) around them."""
 
     first: Integers
     counts: Integers
-    centre: Array
+    center: Array
     radius: Array
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
@@ -87,25 +87,25 @@ class MeshInstance:
     glow: Mapping[str, Light] = field(default_factory=dict)
 
     @cached_property
-    def centre(self) -> Array:
+    def center(self) -> Array:
         """(3,) of the sphere of radius `model.radius` around it, in the world [m]."""
-        found: Array = self.rotation @ self.model.centre + self.position
+        found: Array = self.rotation @ self.model.center + self.position
         return found
 
 
-def linear(colour: Colour) -> Light:
-    """A colour as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
-    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+def linear(color: Color) -> Light:
+    """A color as screens show it, as a share of reflected light: the inverse of sRGB's curve (IEC 61966-2-1)."""
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color)
     return red, green, blue
 
 
-def model(mesh: Mapping[str, Array], colours: Mapping[str, Colour]) -> Model:
-    """A model of triangles (K, 3, 3) by material; colours not given are those of the palette."""
+def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
+    """A model of triangles (K, 3, 3) by material; colors not given are those of the palette."""
     triangles, albedo, finish, material = [], [], [], []
     for number, (name, solid) in enumerate(mesh.items()):
-        colour = linear(colours[name] if name in colours else MATERIALS[name])
+        color = linear(colors[name] if name in colors else MATERIALS[name])
         triangles.append(solid)
-        albedo.append(np.broadcast_to(np.array(colour, dtype=np.float32), (len(solid), 3)))
+        albedo.append(np.broadcast_to(np.array(color, dtype=np.float32), (len(solid), 3)))
         finish.append(np.full(len(solid), finish_of(name), dtype=np.uint8))
         material.append(np.full(len(solid), number, dtype=np.int16))
     corners = np.concatenate(triangles)
@@ -186,7 +186,7 @@ def _model(
     kept = int(np.searchsorted(np.cumsum(area[order]), _COARSE_SHARE * area.sum())) + 1
     corners = triangles.reshape(-1, 3).astype(np.float64)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    centre = (low + high) / 2
+    center = (low + high) / 2
     return Model(
         triangles,
         normals,
@@ -196,7 +196,7 @@ def _model(
         material,
         materials,
         np.sort(order[:kept]),
-        centre,
+        center,
         (high - low) / 2,
-        float(np.sqrt(((corners - centre) ** 2).sum(axis=1).max())),
+        float(np.sqrt(((corners - center) ** 2).sum(axis=1).max())),
     )

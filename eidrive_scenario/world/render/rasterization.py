@@ -59,9 +59,9 @@ class _Spans(NamedTuple):
 def rasterize(x: Array, y: Array, nearness: Array, width: int, height: int) -> Cover:
     """Cover a picture with triangles, given by x, y [px] and nearness (3, N) of their corners.
 
-    A pixel shows a triangle that holds its centre, the one of greatest nearness there. Nearness must be positive and
-    linear across the picture: 1 / depth in perspective. Of equals the later one wins. A centre on an edge belongs to
-    the triangle right of or below that edge, so that neighbours neither overlap nor leave gaps.
+    A pixel shows a triangle that holds its center, the one of greatest nearness there. Nearness must be positive and
+    linear across the picture: 1 / depth in perspective. Of equals the later one wins. A center on an edge belongs to
+    the triangle right of or below that edge, so that neighbors neither overlap nor leave gaps.
     """
     found = rasterize_reference(x, y, nearness, width, height)
     if found.triangle.shape == (height, width):
@@ -128,7 +128,7 @@ class _Small(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """All rows that hold centres of pixels, and the part of the picture in which they lie."""
+    """All rows that hold centers of pixels, and the part of the picture in which they lie."""
 
     large: list[_Large]
     small: _Small
@@ -191,7 +191,7 @@ def _slopes(corners: _Corners) -> tuple[Array, Array]:
 
 
 def _spans(corners: _Corners, first: Integers, last: Integers, width: int) -> _Spans:
-    """The rows of all triangles that hold centres of pixels."""
+    """The rows of all triangles that hold centers of pixels."""
     (x0, x1, x2), (y0, y1, y2), _ = corners
     counts = last - first
     whose = np.repeat(np.arange(len(counts)), counts)
@@ -212,7 +212,7 @@ def _block(one: _Large, top: int, left: int) -> tuple[tuple[slice, slice], Float
     """The lines and columns that a triangle spans, nearness there, and which of it lies inside."""
     first, last = int(one.line[0]), int(one.line[-1]) + 1
     begin, end = int(one.left.min()), int(one.right.max())
-    # Where a tip is thinner than a pixel, some of its lines hold no centre of one.
+    # Where a tip is thinner than a pixel, some of its lines hold no center of one.
     rows = one.line - first
     levels = np.zeros(last - first)
     levels[rows] = one.level

@@ -252,7 +252,7 @@ def _scenery(subjects: Subjects, at: _Circumstances) -> _Kept:
 
 
 def _renewed(known: _Kept, subjects: Subjects, beams: Sequence[Beam], at: _Circumstances, ground: float) -> _Canvas:
-    """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbours too."""
+    """The picture, drawn anew where actors are, shade or dim; and all of it where light comes from neighbors too."""
     eye = at.eye
     staged = cull_and_project(subjects.actors, eye.pose, eye.pinhole)
     seen = rasterize_reference(staged.x, staged.y, staged.nearness, eye.pinhole.width, eye.pinhole.height)

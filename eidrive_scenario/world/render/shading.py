@@ -23,7 +23,7 @@ from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather
 
 _STREET_LAMP = np.array([1.08, 1.0, 0.78])
-"""Colour of lamps along streets, linear sRGB."""
+"""Color of lamps along streets, linear sRGB."""
 _GLINT = 350.0
 """Exponent of the sun's image in a car's paint: a spot of some four degrees."""
 
@@ -129,7 +129,7 @@ def shade(
         shone = lamplight.received * np.float32(1.0 / math.pi) + lamplight.across * RETURNS[finish]
         lamp_lit = np.flatnonzero(shone)
         albedo = among.surfaces.albedo.take(triangle[lamp_lit], axis=1)
-        luminance[:, lamp_lit] += albedo * shone[lamp_lit] * lamps.colour()[:, None]
+        luminance[:, lamp_lit] += albedo * shone[lamp_lit] * lamps.color()[:, None]
     _add_grain(luminance, points, finish, place, weather)
     _add_mirrors(luminance, points, among.surfaces, light, sky, lit, finish)
     return luminance
@@ -196,7 +196,7 @@ def _add_mirrors(
             if lit is not None:
                 lobe *= lit[rows[glinting]]
             seen[:, glinting] += lobe * _column(light.sun)
-    # A mirror-like surface shows less of its own colour, as what is thrown back does not get in.
+    # A mirror-like surface shows less of its own color, as what is thrown back does not get in.
     own = luminance[:, rows]
     seen -= own * np.minimum(base, np.float32(0.5))
     seen *= share
@@ -208,8 +208,8 @@ _DULL = 0.93
 """Cosine of the angle to the sun's image beyond which it adds less than 1e-11 of its peak."""
 
 
-def _column(colour: Array) -> Floats:
-    found: Floats = colour.astype(np.float32)[:, None]
+def _column(color: Array) -> Floats:
+    found: Floats = color.astype(np.float32)[:, None]
     return found
 
 

@@ -66,11 +66,11 @@ def variation(x: Floats, y: Floats, distance: Floats) -> Floats:
     return found
 
 
-def _looked_up(table: Floats, x: Floats, y: Floats, per_metre: float) -> Floats:
+def _looked_up(table: Floats, x: Floats, y: Floats, per_meter: float) -> Floats:
     """The values of a table that repeats, at places [m]."""
     mask = np.int32(SIZE - 1)
-    at = (y * np.float32(per_metre)).astype(np.int32)
+    at = (y * np.float32(per_meter)).astype(np.int32)
     at &= mask
     at *= np.int32(SIZE)
-    at += (x * np.float32(per_metre)).astype(np.int32) & mask
+    at += (x * np.float32(per_meter)).astype(np.int32) & mask
     return table.ravel().take(at)

@@ -12,7 +12,7 @@ Floats = NDArray[np.float32]
 LUMA: Floats = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 """Luminance of linear sRGB (IEC 61966-2-1)."""
 HEADROOM = 4.0
-"""Luminance that comes out as white, in units of that which comes out as middle light grey before the shoulder."""
+"""Luminance that comes out as white, in units of that which comes out as middle light gray before the shoulder."""
 BRIGHTNESS = 0.85
 """Share of the published key, which lets white road markings keep below white."""
 DARKEST = 0.03

@@ -68,8 +68,8 @@ def mirrored(
     right, down, forward = (pose[:3, k].astype(np.float32) for k in range(3))
     depth = np.maximum(x * forward[0] + y * forward[1] + z * forward[2], np.float32(1e-3))
     scale = np.float32(pinhole.focal) / depth
-    u = (x * right[0] + y * right[1] + z * right[2]) * scale + np.float32(pinhole.centre_x)
-    v = (x * down[0] + y * down[1] + z * down[2]) * scale + np.float32(pinhole.centre_y)
+    u = (x * right[0] + y * right[1] + z * right[2]) * scale + np.float32(pinhole.center_x)
+    v = (x * down[0] + y * down[1] + z * down[2]) * scale + np.float32(pinhole.center_y)
     inside = np.flatnonzero((u >= 0) & (u < pinhole.width) & (v >= 0) & (v < pinhole.height) & (depth > 0.3))
     target = v[inside].astype(np.int64) * pinhole.width + u[inside].astype(np.int64)
     key = (np.float32(1.0) / depth[inside]).view(np.uint32).astype(np.uint64) << np.uint64(32)

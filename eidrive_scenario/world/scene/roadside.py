@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from eidrive_scenario.geometry import rotation_matrix
-from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colours, lamps, lit
+from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
 from eidrive_scenario.world.meshes.road_objects import road_object_mesh, traffic_light
 from eidrive_scenario.world.meshes.sign_faces import sign_face
 from eidrive_scenario.world.meshes.signs import sign
@@ -74,17 +74,17 @@ def _placed(part: Array, poses: Array) -> Array:
 
 
 def _head_model(head: SignalHead) -> Model:
-    colours = lamp_colours(head.signal)
-    if not colours:
+    colors = lamp_colors(head.signal)
+    if not colors:
         return model(sign(sign_face(head.signal), head.width, head.height), {})
-    dark = {f"lamp_{colour} {number}": UNLIT[colour] for number, colour in enumerate(colours)}
-    return model(traffic_light(colours, head.width, head.height), dark)
+    dark = {f"lamp_{color} {number}": UNLIT[color] for number, color in enumerate(colors)}
+    return model(traffic_light(colors, head.width, head.height), dark)
 
 
 def _glow(head: SignalHead, state: str | None, time: float) -> Mapping[str, Light]:
     """What the lamps of a light emit."""
-    colours = lamp_colours(head.signal)
-    if state is None or not colours:
+    colors = lamp_colors(head.signal)
+    if state is None or not colors:
         return {}
-    shining = {colour for (colour, _), on in zip(lamps(state, colours), lit(state, colours, time), strict=True) if on}
-    return {f"lamp_{c} {number}": LAMPS[c] for number, c in enumerate(colours) if c in shining}
+    shining = {color for (color, _), on in zip(lamps(state, colors), lit(state, colors, time), strict=True) if on}
+    return {f"lamp_{c} {number}": LAMPS[c] for number, c in enumerate(colors) if c in shining}

@@ -52,7 +52,7 @@ def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float)
     for name, light in _lights(spec, appearance, weather).items():
         brightness = light.brightness(time)
         for material, luminance in _SHINES.get(name, ()) if brightness > 0.0 else ():
-            shown = _coloured(luminance, light, brightness)
+            shown = _colored(luminance, light, brightness)
             found[material] = _brighter(found.get(material), shown)
     return found
 
@@ -73,10 +73,10 @@ def _lights(spec: ActorSpec, appearance: Appearance, weather: Weather) -> Mappin
     return lights
 
 
-def _coloured(luminance: Light, light: LightState, brightness: float) -> Light:
-    """In the light's own colour where it has one, as bright as before."""
-    if light.colour is not None:
-        red, green, blue = linear(light.colour)
+def _colored(luminance: Light, light: LightState, brightness: float) -> Light:
+    """In the light's own color where it has one, as bright as before."""
+    if light.color is not None:
+        red, green, blue = linear(light.color)
         most = max(red, green, blue)
         scale = max(luminance) / most if most > 0.0 else 0.0
         luminance = (red * scale, green * scale, blue * scale)

@@ -17,7 +17,7 @@ from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.meshes import actor_mesh
 from eidrive_scenario.world.meshes.buildings import building as building_mesh
-from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Colour, by_name, paint
+from eidrive_scenario.world.meshes.palette import FACADES, MATERIALS, Color, by_name, paint
 from eidrive_scenario.world.meshes.solids import polygon
 from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.ground import GroundUnder
@@ -112,7 +112,7 @@ class Visuals:
         parts: list[Model] = []
         if self._scenery.roads is not None:
             meshes = surface_meshes(self._scenery.roads)
-            parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.colour}) for mesh in meshes]
+            parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
             points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
             low, high = points.min(axis=0), points.max(axis=0)
         (x0, y0, z), (x1, y1, _) = (low - _BESIDE_ROADS).tolist(), (high + _BESIDE_ROADS).tolist()
@@ -142,8 +142,8 @@ def _actor_instance(row: int, body: Body, emitted: Mapping[str, Light], motion: 
     return MeshInstance(shape, rotation, foot, row, emitted)
 
 
-def _paint(spec: ActorSpec) -> Colour:
-    return spec.colour or paint(spec.name, spec.shape)
+def _paint(spec: ActorSpec) -> Color:
+    return spec.color or paint(spec.name, spec.shape)
 
 
 @lru_cache(maxsize=256)
@@ -152,16 +152,16 @@ def _actor_model(
     size: tuple[float, float, float],
     offset: tuple[float, float, float],
     axles: tuple[float, float, tuple[ExtraAxle, ...]],
-    colour: Colour,
+    color: Color,
     motion: str,
 ) -> Model:
     wheelbase, radius, extra = axles
     spec = ActorSpec("", shape, "", size, offset, wheelbase=wheelbase, wheel_radius=radius, extra_axles=extra)
-    return model(actor_mesh(spec, motion), {"paint": colour})
+    return model(actor_mesh(spec, motion), {"paint": color})
 
 
 def _stance(body: Body) -> tuple[Array, Array]:
-    """Rotation (3, 3) of an actor, and the centre of the bottom of its box in the world."""
+    """Rotation (3, 3) of an actor, and the center of the bottom of its box in the world."""
     ox, oy, oz = body.spec.offset
     rotation = rotation_matrix(body.yaw, body.pitch, body.roll)
     foot: Array = np.array([body.x, body.y, body.z]) + rotation @ (ox, oy, oz - body.spec.size[2] / 2)
@@ -170,7 +170,7 @@ def _stance(body: Body) -> tuple[Array, Array]:
 
 def _building_model(building: Building) -> Model:
     """A building; behind some of its windows, by its name, somebody has a light on."""
-    own = building.colour or by_name(building.name, FACADES)
+    own = building.color or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))
     windows = mesh.pop("window", None)
     if windows is not None and len(windows):
@@ -178,7 +178,7 @@ def _building_model(building: Building) -> Model:
         draws = np.random.Generator(np.random.Philox(key=int.from_bytes(digest, "little")))
         lit = np.repeat(draws.random(len(windows) // 2) < _LIT_WINDOWS, 2)
         mesh |= {name: part for name, part in (("window", windows[~lit]), ("window_lit", windows[lit])) if len(part)}
-    colours = {"wall": own, "window_lit": MATERIALS["window"]}
-    foot = np.array([*building.centre[:2], building.centre[2] - building.size[2] / 2])
+    colors = {"wall": own, "window_lit": MATERIALS["window"]}
+    foot = np.array([*building.center[:2], building.center[2] - building.size[2] / 2])
     turn = rotation_matrix(building.yaw, 0.0, 0.0)
-    return placed(model(mesh, colours), turn, foot)
+    return placed(model(mesh, colors), turn, foot)

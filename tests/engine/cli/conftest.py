@@ -27,5 +27,5 @@ def eidrive(monkeypatch: pytest.MonkeyPatch) -> Eidrive:
 
 @pytest.fixture
 def passing_by() -> Path:
-    """The Ego passes a parked car at 5 m between the centres; `--param OtherY=0` makes them collide."""
+    """The Ego passes a parked car at 5 m between the centers; `--param OtherY=0` makes them collide."""
     return Path(__file__).parents[2] / "data" / "passing_by.xosc"

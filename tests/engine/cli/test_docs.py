@@ -1,4 +1,4 @@
-"""What docs/why.md shows of scenario 1 is what comes."""
+"""What docs/explanations.md shows of scenario 1 is what comes."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from typer.testing import Result
 from eidrive_scenario.recording.text.csv_writer import COLUMNS
 
 Eidrive = Callable[..., Result]
-PAGE = Path(__file__).parents[3] / "docs" / "why.md"
+PAGE = Path(__file__).parents[3] / "docs" / "explanations.md"
 
 
 @pytest.fixture(scope="module")

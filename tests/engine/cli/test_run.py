@@ -21,7 +21,7 @@ Eidrive = Callable[..., Result]
 def test_passed(eidrive: Eidrive, passing_by: Path) -> None:
     result = eidrive("run", passing_by)
     assert result.exit_code == 0, result.output
-    assert "Ego and Parked came within 5.00 m (centre to centre) at 2.00 s" in result.stdout
+    assert "Ego and Parked came within 5.00 m (center to center) at 2.00 s" in result.stdout
     assert "end: stop trigger at 3.00 s" in result.stdout
     assert re.search(r"trace [0-9a-f]{64}", result.stdout)
 
@@ -53,7 +53,7 @@ def test_json_is_one_object_per_run_and_nothing_else(eidrive: Eidrive, passing_b
     assert set(first["criteria"][0]) == {"name", "passed", "value", "limit", "unit", "reason"}
     assert first["passed"] is True
     assert first["end_reason"] == "stop trigger"
-    assert first["metrics"]["min_distance.Ego.Parked.centre"] == pytest.approx(5.0)
+    assert first["metrics"]["min_distance.Ego.Parked.center"] == pytest.approx(5.0)
     assert first["metrics"]["min_distance.Ego.Parked.box"] == pytest.approx(3.0)
 
 
@@ -106,8 +106,8 @@ def test_out_of_its_time_limit(eidrive: Eidrive, passing_by: Path) -> None:
         (["{file}", "--param", "OtherY"], "--param 'OtherY' assigns nothing; write --param NAME=VALUE"),
         (["{file}", "--param", "OthreY=1"], "did you mean 'OtherY'?"),
         (["{file}", "--user-value", "mood"], "--user-value 'mood' assigns nothing; write --user-value NAME=VALUE"),
-        (["{file}", "--stand-in", "ALKSController"], "--stand-in 'ALKSController' assigns nothing"),
-        (["{file}", "--stand-in", "ALKSController=alk"], "unknown controller 'alk'; did you mean 'alks'?"),
+        (["{file}", "--controller", "ALKSController"], "--controller 'ALKSController' assigns nothing"),
+        (["{file}", "--controller", "ALKSController=alk"], "unknown controller 'alk'; did you mean 'alks'?"),
         (["{file}", "--channel", "latencyy"], "no channel profile 'latencyy'"),
         (["{file}", "--dt", "0"], "--dt is 0"),
     ],
@@ -180,7 +180,7 @@ def test_a_narrow_terminal_wraps_reasons_alone(
 
 
 def test_values_and_stand_ins_for_nobody_are_told(eidrive: Eidrive, passing_by: Path) -> None:
-    result = eidrive("run", passing_by, "--no-record", "--user-value", "mood=3", "--stand-in", "ALKS=alks")
+    result = eidrive("run", passing_by, "--no-record", "--user-value", "mood=3", "--controller", "ALKS=alks")
     assert result.exit_code == 0, result.output
     assert "warning: no UserDefinedValueCondition asks for 'mood'; none is known here" in result.stderr
     assert "warning: the stand-in for 'ALKS' found no controller of that name" in result.stderr
@@ -199,6 +199,6 @@ def test_what_is_slower_than_real_time_is_said_to_be_so(capsys: pytest.CaptureFi
 
 def test_nothing_stands_in_for_a_controller_of_ours(eidrive: Eidrive) -> None:
     short = ("run", "coop/scenario_1", "--no-record", "--time-limit", "0.1")
-    warned = eidrive(*short, "--stand-in", "EgoStack=alks").stderr
+    warned = eidrive(*short, "--controller", "EgoStack=alks").stderr
     assert "warning: nothing stands in for 'EgoStack', which is a controller of ours" in warned
     assert eidrive(*short).stderr == ""

@@ -18,7 +18,7 @@ SUBSTEPS = 10
 
 @dataclass
 class Vehicle:
-    """The reference point is the rear axle; the model moves the centre of gravity."""
+    """The reference point is the rear axle; the model moves the center of gravity."""
 
     x: float = 0.0
     y: float = 0.0

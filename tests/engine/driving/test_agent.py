@@ -186,14 +186,14 @@ def test_the_ego_does_not_stand_in_its_own_way(car: ActorSpec, latency: float) -
     talk = Conversation(car, f"{{delay: {{kind: constant, seconds: {latency}}}}}")
     for tick in range(30):
         x = 15.0 * tick * DT
-        centre = (x + car.offset[0], car.offset[1])
-        step = talk.step({"RSU": (centre, HIDDEN)}, ego_at=(x, 0.0))["Ego"]
+        center = (x + car.offset[0], car.offset[1])
+        step = talk.step({"RSU": (center, HIDDEN)}, ego_at=(x, 0.0))["Ego"]
         assert known(step) in ([], [HIDDEN])
     assert known(step) == [HIDDEN]
 
 
 def test_a_car_close_beside_or_behind_is_not_taken_for_the_ego(car: ActorSpec) -> None:
-    """Half a metre of air between the bodies: centres 2.3 m apart across, 5.4 m along."""
+    """Half a meter of air between the bodies: centers 2.3 m apart across, 5.4 m along."""
     x = car.offset[0]
     for place in ((x, 2.337), (x, -2.337), (x - 5.392, 0.0), (x + 5.392, 0.0)):
         talk = Conversation(car, "{model: composed}")
@@ -241,7 +241,7 @@ def test_a_heard_object_in_the_area_brakes_exactly_as_asked(car: ActorSpec) -> N
         planner="conflict_area",
         target_speed=8.0,
         conflict_area=[29, 31, 18, 22],
-        conflict_brake=4.5,
+        conflict_deceleration=4.5,
     )
     first = talk.step({"RSU": (HIDDEN,)})["Ego"]
     second = talk.step({"RSU": (HIDDEN,)})["Ego"]

@@ -28,7 +28,7 @@ def test_the_defaults() -> None:
     found = settings()
     assert (found.detector, found.planner, found.cooperates_with) == ("oracle", None, None)
     assert found.fusion == "covariance_intersection"
-    assert (found.report_timeout, found.conflict_brake, found.conflict_hold) == (1.0, 5.0, 1.05)
+    assert (found.report_timeout, found.conflict_deceleration, found.conflict_hold_time) == (1.0, 5.0, 1.05)
     assert found.rig_sensors(frozenset({"truth"})) == {"truth": TruthSettings()}
     assert found.rig_sensors(frozenset({"camera"})) == {"camera": CameraSettings()}
 
@@ -129,5 +129,5 @@ def test_a_wrong_property_says_where_and_what_would_be_right(entries: list[tuple
 
 def test_all_findings_come_at_once() -> None:
     with pytest.raises(SettingError) as caught:
-        settings(("detector", "x"), ("colour", "red"), ("range", "-1"))
+        settings(("detector", "x"), ("color", "red"), ("range", "-1"))
     assert [problem.line for problem in caught.value.diagnostics] == [12, 14, 13]

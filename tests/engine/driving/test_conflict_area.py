@@ -59,11 +59,11 @@ def test_never_without_a_sighting_and_at_once_in_the_first_tick(car: ActorSpec) 
 
 @pytest.mark.parametrize(("hold", "last"), [(0.0, 10), (0.05, 10), (0.1, 11), (0.3, 15), (2.0, 49)])
 def test_hold(car: ActorSpec, hold: float, last: int) -> None:
-    assert braking_ticks(planner(car, conflict_hold=hold), {10}) == list(range(10, last + 1))
+    assert braking_ticks(planner(car, conflict_hold_time=hold), {10}) == list(range(10, last + 1))
 
 
 def test_the_plan_goes_on_and_says_why_it_brakes(car: ActorSpec) -> None:
-    rule = planner(car, conflict_brake=4.0)
+    rule = planner(car, conflict_deceleration=4.0)
     free = rule.plan(EGO, objects(0.0, SEEN_OUT), None, 0.0)
     braked = rule.plan(EGO, objects(0.05, SEEN_OUT, SEEN_IN, kind="truck"), None, 0.05)
     held = rule.plan(EGO, objects(0.1), None, 0.1)
@@ -75,8 +75,8 @@ def test_the_plan_goes_on_and_says_why_it_brakes(car: ActorSpec) -> None:
     np.testing.assert_array_equal(braked.speeds, free.speeds)
 
 
-def test_the_centre_counts_not_the_outline(car: ActorSpec) -> None:
-    """A car whose centre is 0.1 m outside reaches 2.3 m into the area, and is not in it."""
+def test_the_center_counts_not_the_outline(car: ActorSpec) -> None:
+    """A car whose center is 0.1 m outside reaches 2.3 m into the area, and is not in it."""
     assert planner(car).plan(EGO, objects(0.0, (28.9, 7.0)), None, 0.0).braking is None
     assert planner(car).plan(EGO, objects(0.0, (29.1, 7.0)), None, 0.0).braking == 5.0
 

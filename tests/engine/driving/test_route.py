@@ -31,7 +31,7 @@ def test_speed_in_a_curve_is_the_root_of_five_radii() -> None:
     np.testing.assert_allclose(path.limits[8:-8], math.sqrt(5.0 * 20.0), rtol=0.02)
 
 
-def test_before_a_curve_the_speed_falls_with_three_metres_per_second_squared() -> None:
+def test_before_a_curve_the_speed_falls_with_three_meters_per_second_squared() -> None:
     angles = np.linspace(0.0, math.pi / 2, 100)[1:]
     straight = np.stack([np.linspace(-60.0, 0.0, 61), np.zeros(61)], axis=1)
     curve = np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1)
@@ -48,7 +48,7 @@ def test_the_end_is_a_stop_and_the_horizon_is_not() -> None:
     assert PlannedPath(line, ends=False).limits.min() > 100.0
 
 
-def test_points_are_a_metre_apart_and_doubled_ones_do_no_harm() -> None:
+def test_points_are_a_meter_apart_and_doubled_ones_do_no_harm() -> None:
     path = PlannedPath(np.array([[0.0, 0.0], [0.0, 0.0], [4.0, 3.0], [4.0, 3.0], [8.0, 6.0]]), ends=True)
     np.testing.assert_allclose(np.hypot(*np.diff(path.points, axis=0).T), 1.0)
     assert len(path) == 11
@@ -56,7 +56,7 @@ def test_points_are_a_metre_apart_and_doubled_ones_do_no_harm() -> None:
         PlannedPath(np.zeros((3, 2)), ends=True)
 
 
-def test_smoothing_keeps_a_curve_within_a_decimetre() -> None:
+def test_smoothing_keeps_a_curve_within_a_decimeter() -> None:
     angles = np.linspace(0.0, math.pi, 200)
     path = PlannedPath(np.stack([10.0 * np.sin(angles), 10.0 * (1.0 - np.cos(angles))], axis=1), ends=False)
     radius = np.hypot(path.points[:, 0], path.points[:, 1] - 10.0)
@@ -93,7 +93,7 @@ def planner(car: ActorSpec, roads: RoadNetwork | None, **settings: float) -> Rou
 
 
 def distance_from_lane(points: np.ndarray) -> np.ndarray:
-    """From the centre of the right lane, 1.75 m right of the reference line."""
+    """From the center of the right lane, 1.75 m right of the reference line."""
     x, y = points.T
     straight = np.abs(y + 1.75)
     arc = np.abs(np.hypot(x - 100.0, y - 30.0) - 31.75)
@@ -184,7 +184,7 @@ def test_a_vehicle_that_is_where_it_shall_go_stands(car: ActorSpec, roads: RoadN
 
 
 def test_a_way_that_turns_back_between_two_points_of_the_path(car: ActorSpec) -> None:
-    """4.5 m ahead and back: the fifth metre's point lies where the fourth's does."""
+    """4.5 m ahead and back: the fifth meter's point lies where the fourth's does."""
     route = planner(car, None, target_speed=10.0)
     goal = Goal(path=np.array([[0.0, 0.0, 0.0], [4.5, 0.0, 0.0], [0.0, 0.0, 0.0]]))
     for x in (0.0, 3.9, 4.2, 3.0):

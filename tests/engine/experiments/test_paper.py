@@ -22,12 +22,12 @@ from eidrive_scenario.experiments.paper import (
     tabulate,
 )
 from eidrive_scenario.experiments.repetitions import Job, jobs_of
-from eidrive_scenario.experiments.statistics import summarise
+from eidrive_scenario.experiments.statistics import summarize
 from eidrive_scenario.experiments.tables import render
 from eidrive_scenario.simulation import RunResult, RunSettings
 
 
-def result(scenario: str, seed: int, centre: float, box: float) -> RunResult:
+def result(scenario: str, seed: int, center: float, box: float) -> RunResult:
     return RunResult(
         scenario=scenario,
         seed=seed,
@@ -37,7 +37,7 @@ def result(scenario: str, seed: int, centre: float, box: float) -> RunResult:
         exit_code=0 if box > 0 else 1,
         criteria=(),
         metrics={
-            "min_distance.Ego.Incoming.centre": centre,
+            "min_distance.Ego.Incoming.center": center,
             "min_distance.Ego.Incoming.box": box,
             "collision.count": float(box == 0),
         },
@@ -48,15 +48,15 @@ def result(scenario: str, seed: int, centre: float, box: float) -> RunResult:
 
 
 def episodes(shift_of_own: float = 0.0) -> list[tuple[Job, RunResult]]:
-    """The paper's own episodes as if they were runs of ours; a body gap of centre - 3.4 m."""
+    """The paper's own episodes as if they were runs of ours; a body gap of center - 3.4 m."""
     runs = []
     for (scenario, name), published in PUBLISHED.items():
         arm = next(arm for arm in ARMS if arm.name == name)
         for channel, shift in {arm.own: shift_of_own, arm.links: 0.0}.items():
             for seed, episode in enumerate(published.episodes):
-                centre = episode + shift
+                center = episode + shift
                 job = Job(scenario, channel, seed, RunSettings(channel=channel))
-                runs.append((job, result(scenario, seed, centre, max(0.0, centre - 3.4))))
+                runs.append((job, result(scenario, seed, center, max(0.0, center - 3.4))))
     return runs
 
 
@@ -69,7 +69,7 @@ def table() -> Table:
 def test_raw_episodes_give_the_printed_mean_and_population_sd(key: tuple[str, str]) -> None:
     """One mean is cut instead of rounded in print: 4.3258 m stands there as 4.32."""
     published = PUBLISHED[key]
-    summary = summarise(published.episodes)
+    summary = summarize(published.episodes)
     assert round(summary.population_sd, 2) == published.sd
     printed = 4.33 if key == ("coop/scenario_2", "error") else published.mean
     assert round(summary.mean, 2) == printed
@@ -94,7 +94,7 @@ def test_jobs_come_seed_by_seed() -> None:
 def test_cells_count_collision_free_runs(table: Table) -> None:
     cell = table.cell("coop/scenario_1", "error")
     assert (cell.collision_free.successes, cell.collision_free.trials) == (3, 5)
-    assert cell.centre.smallest == 1.8226
+    assert cell.center.smallest == 1.8226
     assert cell.box.smallest == 0.0
 
 
@@ -106,7 +106,7 @@ def test_a_run_without_the_metric_is_named() -> None:
     (job, run), *rest = episodes()
     bare = dataclasses.replace(run, metrics={"collision.count": 0.0})
     with pytest.raises(
-        SimulationError, match=r"scenario_1 with seed 0 measured no min_distance\.Ego\.Incoming\.centre"
+        SimulationError, match=r"scenario_1 with seed 0 measured no min_distance\.Ego\.Incoming\.center"
     ):
         tabulate([(job, bare), *rest], LINKS)
 

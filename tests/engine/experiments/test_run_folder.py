@@ -122,7 +122,7 @@ def test_an_explicit_folder_with_other_settings_is_refused(tmp_path: Path) -> No
         run_and_save(PASSING_BY, seed=2, settings=RunSettings(**SHORT), out=tmp_path)
 
 
-def test_a_locked_folder_gets_a_neighbour_with_a_number(tmp_path: Path) -> None:
+def test_a_locked_folder_gets_a_neighbor_with_a_number(tmp_path: Path) -> None:
     settings = ResolvedSettings(scenario="x")
     with run_folder(tmp_path, settings, own=True) as first, run_folder(tmp_path, settings, own=True) as second:
         assert second.path.name == f"{first.path.name}-2"
@@ -209,7 +209,10 @@ def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path:
     ("source", "options"),
     [
         (PASSING_BY, ["--param", "OtherY=0", "--seed", "7", "--dt", "0.1"]),
-        (PASSING_BY, ["--param", "OtherY=0", "--user-value", "it's=a b", "--stand-in", "X=alks", "--weather", "storm"]),
+        (
+            PASSING_BY,
+            ["--param", "OtherY=0", "--user-value", "it's=a b", "--controller", "X=alks", "--weather", "storm"],
+        ),
         ("coop/scenario_1", ["--channel", "{delay: {kind: constant, seconds: 0.3}}", "--cooperate", "none"]),
         ("coop/scenario_1", ["--channel", "late.yaml", "--time-limit", "1.5"]),
     ],

@@ -14,7 +14,7 @@ from eidrive_scenario.simulation import RunSettings
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 CRITERIA = """
     collision: {of: Ego, with: Parked}
-    min_distance: {of: Ego, to: Parked, at_least: 3.0, measure: centre}
+    min_distance: {of: Ego, to: Parked, at_least: 3.0, measure: center}
 """
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from eidrive_scenario.experiments.statistics import paired_difference, paired_outcomes, summarise, wilson
+from eidrive_scenario.experiments.statistics import paired_difference, paired_outcomes, summarize, wilson
 
 
 @pytest.mark.parametrize(
@@ -45,14 +45,14 @@ def test_wilson_refuses_what_is_no_share(successes: int, trials: int) -> None:
 
 
 def test_summary_knows_both_standard_deviations() -> None:
-    summary = summarise([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0])
+    summary = summarize([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0])
     assert (summary.mean, summary.population_sd) == (5.0, 2.0)
     assert summary.sample_sd == pytest.approx(math.sqrt(32 / 7))
     assert (summary.count, summary.smallest, summary.largest) == (8, 2.0, 9.0)
 
 
 def test_summary_of_one_value_has_no_sample_sd() -> None:
-    summary = summarise([3.5])
+    summary = summarize([3.5])
     assert summary.population_sd == 0.0
     assert math.isnan(summary.sample_sd)
 
@@ -60,7 +60,7 @@ def test_summary_of_one_value_has_no_sample_sd() -> None:
 @pytest.mark.parametrize("values", [[], [1.0, math.nan], [math.inf]])
 def test_summary_refuses_what_has_no_mean(values: list[float]) -> None:
     with pytest.raises(ValueError, match="finite"):
-        summarise(values)
+        summarize(values)
 
 
 def test_paired_difference_of_a_constant_shift_has_no_width() -> None:

@@ -72,7 +72,7 @@ def test_a_lone_box_stays_as_it_is() -> None:
     assert fused.classes == ("car", "truck")
 
 
-def test_the_gate_is_four_metres() -> None:
+def test_the_gate_is_four_meters() -> None:
     assert len(fuse(report("A", (10, 0)), report("B", (13.99, 0)))) == 1
     assert len(fuse(report("A", (10, 0)), report("B", (14.0, 0)))) == 2
 

@@ -18,11 +18,11 @@ Fuse = Callable[..., Detections]
 
 DRAWS = 1000
 UPPER = 1.09
-"""Of the mean of 1,000 normalised squared errors per dimension, if they are those of the covariance: a chi-square with
+"""Of the mean of 1,000 normalized squared errors per dimension, if they are those of the covariance: a chi-square with
 2,000 degrees of freedom, over 2,000, is below 1.0 + 2.8 · sqrt(2 / 2000) with 99.7 %."""
 
 
-def normalised(fused: Detections, truth: np.ndarray) -> np.ndarray:
+def normalized(fused: Detections, truth: np.ndarray) -> np.ndarray:
     """Squared errors (N,) in units of the covariance, per dimension."""
     nearest = np.argmin(np.linalg.norm(fused.boxes[:, None, :2] - truth, axis=2), axis=0)
     error = fused.boxes[nearest, :2] - truth
@@ -54,7 +54,7 @@ def test_two_stations_whose_errors_depend_on_each_other(
         first, second = truth + errors[:, :2], truth + errors[:, 2:]
         fused = fuse([report("A", 0.0, first, covariance=a), report("B", 0.0, second, covariance=b)], 0.0)
         assert len(fused) == len(truth)
-        found.append(normalised(fused, truth))
+        found.append(normalized(fused, truth))
         information = np.linalg.inv(a) + np.linalg.inv(b)
         both = errors[:, :2] @ np.linalg.inv(a) + errors[:, 2:] @ np.linalg.inv(b)
         blind.append(np.einsum("ni,ij,nj->n", both, np.linalg.inv(information), both) / 2.0)
@@ -84,7 +84,7 @@ def test_positions_over_time_brought_to_now(report: Make, fuse: Fuse) -> None:
                 velocity = velocity + noise[..., 1]
         fused = fuse(reports, 1.3)
         assert len(fused) == len(truth)
-        found.append(normalised(fused, place))
+        found.append(normalized(fused, place))
     assert 0.9 < np.mean(found) < UPPER
 
 
@@ -103,5 +103,5 @@ def test_a_sender_that_is_not_where_it_says(report: Make, fuse: Fuse) -> None:
                    covariance=0.01, state=state)
             for tick in range(10)
         ]  # fmt: skip
-        found.append(normalised(fuse(reports, 0.45), truth))
+        found.append(normalized(fuse(reports, 0.45), truth))
     assert 0.85 < np.mean(found) < UPPER

@@ -125,7 +125,7 @@ def test_a_message_0_3_s_late_costs_less_than_half_with_prediction(tracked: bool
 
 
 def test_a_car_in_a_bend_is_carried_on_along_the_bend(report: Make, fuse: Fuse) -> None:
-    """8 m/s on a radius of 10 m: straight on, 0.3 s are 0.29 m off; along the arc, a few centimetres."""
+    """8 m/s on a radius of 10 m: straight on, 0.3 s are 0.29 m off; along the arc, a few centimeters."""
     reports = []
     for time in np.arange(0.0, 1.001, 0.05).tolist():
         angle = 0.8 * time

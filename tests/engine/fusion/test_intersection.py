@@ -83,7 +83,7 @@ def test_hearing_the_same_twice_tells_nothing_new() -> None:
 def test_consistent_for_any_correlation_where_the_naive_rule_is_not(
     correlation: float, expected: float, naive: float
 ) -> None:
-    """Errors of diag(1, 4) and diag(4, 1) that depend on each other as far as that goes: normalised squared error.
+    """Errors of diag(1, 4) and diag(4, 1) that depend on each other as far as that goes: normalized squared error.
 
     With A = diag(1, 4), B = diag(4, 1) and cross-covariance c sqrt(A) sqrt(B) = 2 c I, the error of the result has the
     variance (w² a⁻¹ + (1-w)² b⁻¹ + 4 c w (1-w) / (a b)) p² per axis, p² = 2.56: 0.8 + 0.64 c, of 1.6; and

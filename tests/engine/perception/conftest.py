@@ -30,7 +30,7 @@ WHEELS = frozenset({"car", "truck", "van", "bus"})
 
 @dataclass(frozen=True)
 class Thing:
-    """An object by its box centre and heading."""
+    """An object by its box center and heading."""
 
     name: str
     x: float

@@ -84,7 +84,7 @@ def test_classes_and_boxes_of_whole_objects(name: str, size: tuple[float, float,
 
 
 def test_a_rear_alone_is_completed_away_from_the_sensor() -> None:
-    """Only the rear of a car straight ahead, 1.85 m wide at x = 15: the centre lies half a usual length behind it."""
+    """Only the rear of a car straight ahead, 1.85 m wide at x = 15: the center lies half a usual length behind it."""
     rear = np.column_stack([np.full(19, 15.0), np.linspace(-0.925, 0.925, 19)])
     found = fitted(standing(rear, 1.5))
     assert found.name == "car"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.perception.learned.external_network import ExternalNetwork
-from eidrive_scenario.perception.learned.image_network import MARGIN_GREY, Candidates, ImageNetwork, letterboxed
+from eidrive_scenario.perception.learned.image_network import MARGIN_GRAY, Candidates, ImageNetwork, letterboxed
 
 ONNX = Path(__file__).parents[2] / "data" / "red_boxes.onnx"
 CLASSES = ("truck", "car")
@@ -84,8 +84,8 @@ def test_a_letterboxed_picture_keeps_its_shape_and_its_boxes_their_place() -> No
     assert small.shape == (64, 96, 3)
     np.testing.assert_allclose((scale, corner), [(0.32, 0.32), (0, 24)])
     assert (small[24:40] == 7).all()
-    assert (small[:24] == MARGIN_GREY).all()
-    assert (small[40:] == MARGIN_GREY).all()
+    assert (small[:24] == MARGIN_GRAY).all()
+    assert (small[40:] == MARGIN_GRAY).all()
 
 
 def test_weights_that_do_not_fit_are_told_with_a_remedy(tmp_path: Path) -> None:

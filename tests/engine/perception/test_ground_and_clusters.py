@@ -32,7 +32,7 @@ def test_a_plane_is_ground_whatever_its_slope(slope: tuple[float, float]) -> Non
 
 
 def test_what_stands_on_it_is_not() -> None:
-    """Two walls among the rings: all but their lowest quarter of a metre stands out, and no ring does."""
+    """Two walls among the rings: all but their lowest quarter of a meter stands out, and no ring does."""
     ground, things = rings(1.9), np.concatenate([wall(12.0, -3, 3, 0.0, 2.0), wall(-20.0, -6, 6, 0.3, 3.0)])
     points = np.concatenate([ground, things])
     above = points[:, 2] - ground_height(points, 0.0) > CLEARANCE
@@ -69,7 +69,7 @@ def test_points_near_each_other_belong_together() -> None:
 
 
 def test_farther_away_gaps_between_rays_are_larger() -> None:
-    """Columns two degrees apart: neighbours on a wall 40 m away are 1.4 m apart, at 10 m that would be two things."""
+    """Columns two degrees apart: neighbors on a wall 40 m away are 1.4 m apart, at 10 m that would be two things."""
     step = math.radians(2.0)
     far = np.array([[40.0, 0.0], [40.0, 1.4]])
     near = np.array([[10.0, 0.0], [10.0, 1.4]])
@@ -88,7 +88,7 @@ def test_a_surface_that_rays_graze_is_one() -> None:
 
 def test_the_order_of_points_does_not_matter() -> None:
     rng = np.random.default_rng(1)
-    points = np.concatenate([rng.normal(centre, 0.2, (20, 2)) for centre in ((10, 0), (12, 6), (-15, 3))])
+    points = np.concatenate([rng.normal(center, 0.2, (20, 2)) for center in ((10, 0), (12, 6), (-15, 3))])
     order = rng.permutation(len(points))
     shuffled = sorted(sorted(int(order[row]) for row in rows) for rows in clusters(points[order], 0.01))
     assert shuffled == groups(points) == [list(range(20)), list(range(20, 40)), list(range(40, 60))]

@@ -46,7 +46,7 @@ def car(name: str) -> ActorSpec:
         (4.6, 1.85, 1.5),
         (1.35, 0.0, 0.75),
         wheelbase=2.7,
-        colour=(0.6, 0.1, 0.1),
+        color=(0.6, 0.1, 0.1),
         wheel_radius=0.33,
     )
 
@@ -131,7 +131,7 @@ def test_weights_are_small_and_have_a_card(name: str) -> None:
     assert tuple(card["classes"]) == IMAGE_CLASSES
     assert {"date", "torch", "data", "training", "validation_ap50", "held_out"} <= set(card)
     assert card["data"]["seed"] == 1
-    assert card["held_out"]["pictures"] >= 1000
+    assert card["held_out"]["images"] >= 1000
 
 
 def test_all_classes_are_objects_or_signals() -> None:

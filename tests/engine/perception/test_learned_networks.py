@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch", reason="needs the extra 'learned'")
 
 from eidrive_scenario.perception.learned.classes import IMAGE_CLASSES  # noqa: E402
 from eidrive_scenario.perception.learned.networks.blocks import fold  # noqa: E402
-from eidrive_scenario.perception.learned.networks.boxes import centred, complete_iou, corners, pairwise_iou  # noqa: E402
+from eidrive_scenario.perception.learned.networks.boxes import centered, complete_iou, corners, pairwise_iou  # noqa: E402
 from eidrive_scenario.perception.learned.networks.ssd import (  # noqa: E402
     BOXES_PER_CELL,
     STRIDES,
@@ -82,15 +82,15 @@ def test_shapes_and_sizes() -> None:
 def test_overlap_measures_by_hand() -> None:
     a, b = torch.tensor([[5.0, 5.0, 10.0, 10.0]]), torch.tensor([[10.0, 5.0, 10.0, 10.0]])
     assert pairwise_iou(corners(a), corners(b)).item() == pytest.approx(1 / 3)
-    # same shape, centres 5 apart, hull 15 x 10: CIoU = 1/3 - 25/325
+    # same shape, centers 5 apart, hull 15 x 10: CIoU = 1/3 - 25/325
     assert complete_iou(a, b).item() == pytest.approx(1 / 3 - 25 / 325, abs=1e-6)
     assert complete_iou(a, a).item() == pytest.approx(1.0, abs=1e-6)
-    # same centre and area, 10 x 10 and 20 x 5: iou 50/150, v = 4/pi² (atan 4 - atan 1)²
+    # same center and area, 10 x 10 and 20 x 5: iou 50/150, v = 4/pi² (atan 4 - atan 1)²
     other = torch.tensor([[5.0, 5.0, 20.0, 5.0]])
     unlike = 4 / math.pi**2 * (math.atan(4.0) - math.atan(1.0)) ** 2
     expected = 1 / 3 - unlike * unlike / (1 - 1 / 3 + unlike)
     assert complete_iou(a, other).item() == pytest.approx(expected, abs=1e-6)
-    torch.testing.assert_close(centred(corners(other)), other)
+    torch.testing.assert_close(centered(corners(other)), other)
 
 
 def test_encoding_and_decoding_of_boxes() -> None:
@@ -124,7 +124,7 @@ def test_a_cell_that_answers_can_say_the_box() -> None:
             assert classes.item() == 2
             whole = network.decode(raw)[0]
             torch.testing.assert_close(whole[whole[:, 4] > 0.5][0, :4], target.boxes[0, 0], atol=1e-3, rtol=0.0)
-    # centre 7.625, 5.625 in cells of 8: its own cell and the ones to the right and below, for both anchors of like size
+    # center 7.625, 5.625 in cells of 8: its own cell and the ones to the right and below, for both anchors of like size
     fine = assign(target, network.anchors[0], 8, 16, 32)
     cells = {(int(line), int(column)) for line, column in zip(fine.line, fine.column, strict=True)}
     assert cells == {(5, 7), (5, 8), (6, 7)}
@@ -167,7 +167,7 @@ def test_ignored_objects_ask_nothing_of_their_cells() -> None:
 
 
 def picture_and_targets() -> tuple[torch.Tensor, Targets]:
-    """Two coloured rectangles on two noisy grounds."""
+    """Two colored rectangles on two noisy grounds."""
     draws = torch.Generator().manual_seed(3)
     picture = 0.2 * torch.rand(2, 3, 128, 256, generator=draws)
     for left, top, right, bottom, channel in ((20, 25, 60, 55, 0), (90, 65, 110, 115, 1)):

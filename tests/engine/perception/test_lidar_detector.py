@@ -65,7 +65,7 @@ def test_what_stands_around_is_found(street: Any, noise: float) -> None:
 @pytest.mark.parametrize("distance", [8.0, 16.0, 24.0, 32.0])
 @pytest.mark.parametrize("degrees", [0, 35, 90])
 def test_a_car_is_found_at_all_distances(street: Any, distance: float, degrees: float) -> None:
-    """The far side is not seen: the centre is off by half of what the car is longer than the usual 4.6 m, of which
+    """The far side is not seen: the center is off by half of what the car is longer than the usual 4.6 m, of which
     three standard deviations are 0.5 m."""
     car = street.thing("Car", distance, 2.0, math.radians(degrees))
     found = detected(street.readings([street.thing("Ego", 0, 0), car], {"roof": LidarSettings()}))

@@ -107,7 +107,7 @@ def test_objects_of_usual_size_are_found_by_the_ground(name: str, distance: floa
 
 
 def test_from_a_mast_the_ground_decides() -> None:
-    """A camera 7 m up that looks down by 20 degrees; boxes off by a pixel: errors stay below a metre."""
+    """A camera 7 m up that looks down by 20 degrees; boxes off by a pixel: errors stay below a meter."""
     view = camera(z=7.0, pitch=math.radians(20), yaw=-0.5)
     rng = np.random.default_rng(3)
     errors = []

@@ -149,9 +149,9 @@ def independent(series: np.ndarray) -> float:
 
 
 def test_it_knows_how_wrong_it_is_in_the_world() -> None:
-    """Twelve drives of 20 s of the single-track model with its slipping tyres, through the simulated sensors.
+    """Twelve drives of 20 s of the single-track model with its slipping tires, through the simulated sensors.
 
-    NEES of x, y, yaw and speed, 4 degrees, after 2 s. Neighbouring instants tell the same: the mean over runs and time
+    NEES of x, y, yaw and speed, 4 degrees, after 2 s. Neighboring instants tell the same: the mean over runs and time
     is worth as many draws as its correlation leaves, and has the 99 % bounds of chi-square for these. The position is
     better than a fix.
     """

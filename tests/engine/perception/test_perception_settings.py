@@ -54,7 +54,7 @@ def line_of(path: Path, word: str) -> int:
         ("localization", "slam", "'oracle' or 'ekf'"),
         ("detector_latency", "-0.1", "greater than or equal to 0"),
         ("obey_signals", "sometimes", "valid boolean"),
-        ("detector_settings", "{least_points: 4}", "has no settings of its own"),
+        ("detector_settings", "{min_points: 4}", "has no settings of its own"),
         ("trackr", "cv", "did you mean 'tracker'?"),
     ],
 )
@@ -110,7 +110,7 @@ def test_a_latency_as_long_as_reports_live_makes_no_sense(write: Write) -> None:
 
 
 def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> None:
-    path = write(rsu=True, detector_settings="{least_points: 0, of_road: 3}")
+    path = write(rsu=True, detector_settings="{min_points: 0, of_road: 3}")
     text = path.read_text().replace(
         '<Property name="detector" value="oracle"/>', '<Property name="detector" value="lidar"/>'
     )
@@ -118,13 +118,13 @@ def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> Non
     problems = told(path)
     line = line_of(path, "detector_settings")
     assert all(problem.startswith(f"{path}:{line}: ") for problem in problems if "detector_settings" not in problem)
-    assert any("'least_points' is 0" in problem for problem in problems)
+    assert any("'min_points' is 0" in problem for problem in problems)
     assert any("did you mean 'off_road'?" in problem for problem in problems)
 
 
 def test_settings_of_the_detector_in_the_file_do_not_bother_one_by_option(write: Write) -> None:
     """The file tunes `lidar`; the option asks for the oracle, which has nothing to tune."""
-    path = write(detector_settings="{least_points: 4}")
+    path = write(detector_settings="{min_points: 4}")
     path.write_text(path.read_text().replace('name="detector" value="oracle"', 'name="detector" value="lidar"'))
     Simulation(load_for_seed(path, 1, {}), settings=RunSettings(detector="oracle")).close()
 
@@ -191,8 +191,8 @@ def test_the_lidar_detector_sees_the_incoming_car_in_time(scenario: str, helper:
     assert {verdict.name: verdict.passed for verdict in result.criteria} == {"collision": True, "min_distance": True}
     first: dict[str, float] = {}
     for frame in frames:
-        place = frame.view.centres[frame.view.row("Incoming"), :2]
-        truck = frame.view.centres[frame.view.row("Firetruck"), :2]
+        place = frame.view.centers[frame.view.row("Incoming"), :2]
+        truck = frame.view.centers[frame.view.row("Firetruck"), :2]
         if ((place - truck) ** 2).sum() > 12.0**2:
             continue
         for name, step in frame.steps.items():

@@ -136,7 +136,7 @@ def test_signals_come_from_the_detector_that_sees_them_and_from_the_lookout() ->
 
 
 def test_without_the_oracle_objects_lie_where_the_station_takes_itself_to_be() -> None:
-    """The first estimate is some decimetres off, and so is what the station sees."""
+    """The first estimate is some decimeters off, and so is what the station sees."""
     perception = Perception(OracleDetector(), localizer=Localizer("Ego", 5))
     seen = perception.locate(readings(0.0, 20.0))
     shift = seen.ego.position[:2]

@@ -45,7 +45,7 @@ def test_equal_scores_keep_their_order() -> None:
     assert suppress(boxes, np.array([0.5, 0.5]), np.zeros(2, dtype=np.int64), 0.5).tolist() == [0]
 
 
-def test_a_vehicle_is_not_two_vehicles_and_a_lamp_not_two_colours() -> None:
+def test_a_vehicle_is_not_two_vehicles_and_a_lamp_not_two_colors() -> None:
     group = dict(zip(IMAGE_CLASSES, suppression_groups(IMAGE_CLASSES).tolist(), strict=True))
     assert group["car"] == group["truck"] == group["bus"]
     assert group["traffic light red"] == group["traffic light green"]

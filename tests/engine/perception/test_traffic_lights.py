@@ -179,7 +179,7 @@ class Drive:
 
 
 def test_a_car_stops_at_red_and_goes_on_at_green() -> None:
-    """The light stands at 120 m: the front comes to a stand within two metres before it, and passes it at green."""
+    """The light stands at 120 m: the front comes to a stand within two meters before it, and passes it at green."""
     drive = Drive(street(light("east", 120.0)))
     front, speed = drive.run(18.0, {"east": "red"})
     assert 118.0 < front < 120.0
@@ -282,7 +282,7 @@ SCENARIO = """<OpenSCENARIO>
 <Storyboard><Init><Actions>
 <GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="7" state="red"/>
 </TrafficSignalAction></InfrastructureAction></GlobalAction>
-<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>
+<Private entitiref="Ego"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="1" laneId="-1" s="20"/></Position></TeleportAction></PrivateAction></Private></Actions></Init>
 <Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
 <Actors selectTriggeringEntities="false"/><Maneuver name="maneuver"><Event name="turns" priority="parallel">

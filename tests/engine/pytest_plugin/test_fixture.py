@@ -33,7 +33,7 @@ def test_the_marker_runs_every_match_channel_and_seed(project: pytest.Pytester) 
 def test_far(run_scenario):
     result = run_scenario()
     assert result.passed
-    assert result.metrics["min_distance.Ego.Parked.centre"] == pytest.approx(5.0)
+    assert result.metrics["min_distance.Ego.Parked.center"] == pytest.approx(5.0)
 """
     result = run(project, text, "--junitxml", "junit.xml")
     result.assert_outcomes(passed=8)

@@ -36,7 +36,7 @@ def test_outcomes_and_reasons(project: pytest.Pytester) -> None:
         [
             "*failed with channel *, seed 1",
             "collision: Ego and Parked hit each other at 1.6* s at *",
-            "min_distance: Ego and Parked came within * m (centre to centre) at * s (limit 3 m)",
+            "min_distance: Ego and Parked came within * m (center to center) at * s (limit 3 m)",
             "*wrong.xosc:61: *did you mean 'step'?",
         ]
     )

@@ -20,7 +20,7 @@ SIZES = np.array([[4.892, 1.837, 1.49], [4.892, 1.837, 1.49], [8.468, 2.891, 3.8
 
 
 def view_at(tick: int, ego_x: float, ego_speed: float, incoming_y: float) -> WorldView:
-    """All centres on their reference points, to keep the numbers of the tests plain."""
+    """All centers on their reference points, to keep the numbers of the tests plain."""
     count = len(NAMES)
     position = np.array([[ego_x, 0.0, 0.75], [29.5, incoming_y, 0.75], [25.4, 5.6, 1.9], [42.2, -6.0, 1.5]])
     velocity = np.zeros((count, 3))

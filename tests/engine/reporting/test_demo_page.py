@@ -23,10 +23,10 @@ def table(rule: ModelVariant) -> Table:
     cells = []
     for (scenario, name), published in PUBLISHED.items():
         arm = next(arm for arm in ARMS if arm.name == name)
-        centres = published.episodes
-        boxes = tuple(max(0.0, centre - 3.4) for centre in centres)
+        centers = published.episodes
+        boxes = tuple(max(0.0, center - 3.4) for center in centers)
         free = sum(box > 0 for box in boxes)
-        cells.append(Cell(scenario, arm, (1, 2, 3, 4, 5), centres, boxes, wilson(free, 5), published))
+        cells.append(Cell(scenario, arm, (1, 2, 3, 4, 5), centers, boxes, wilson(free, 5), published))
     return Table(rule, tuple(cells))
 
 
@@ -72,7 +72,7 @@ def test_every_arm_has_four_pictures_or_says_why_not(page: str) -> None:
 def test_captions_tell_time_distance_and_speed(page: str) -> None:
     captions = [caption.text_content() for caption in html.fromstring(page).iterfind(".//figcaption")]
     assert any(
-        re.fullmatch(r"Ego knows Incoming from RSU aloneat 1\.45 s, 26\.\d m between centres, .*", c) for c in captions
+        re.fullmatch(r"Ego knows Incoming from RSU aloneat 1\.45 s, 26\.\d m between centers, .*", c) for c in captions
     )
 
 

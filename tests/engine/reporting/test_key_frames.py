@@ -93,7 +93,7 @@ def test_without_a_channel_the_ego_does_not_brake(street: Play) -> None:
     assert story.moment("braked").title == "Ego never brakes for it"
 
 
-def test_the_car_enters_the_area_when_its_centre_does(street: Play) -> None:
+def test_the_car_enters_the_area_when_its_center_does(street: Play) -> None:
     """y = 39.5 - 14 t falls below 10.5 m after 2.071 s."""
     assert time_of(story_of(street(1)), "entered") == pytest.approx(2.10)
 
@@ -114,10 +114,10 @@ def test_without_an_area_nothing_is_told_of_one(street: Play) -> None:
     assert [moment.kind for moment in observer.story().moments] == ["heard", "braked", "closest"]
 
 
-def test_distances_over_time_are_those_of_centres_and_bodies(street: Play) -> None:
+def test_distances_over_time_are_those_of_centers_and_bodies(street: Play) -> None:
     story = story_of(street(None))
-    assert len(story.times) == len(story.centres) == len(story.boxes) == len(story.speeds) == 100
-    assert story.centres[0] == pytest.approx(math.hypot(29.5, 39.5))
+    assert len(story.times) == len(story.centers) == len(story.boxes) == len(story.speeds) == 100
+    assert story.centers[0] == pytest.approx(math.hypot(29.5, 39.5))
     gap = (29.5 - (4.892 + 1.837) / 2, 39.5 - (4.892 + 1.837) / 2)
     assert story.boxes[0] == pytest.approx(math.hypot(*gap))
 

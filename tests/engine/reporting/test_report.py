@@ -117,11 +117,11 @@ def test_metrics_have_the_units_of_their_criteria(tmp_path: Path) -> None:
     assert "collision count<br>" in text
 
 
-def test_all_colours_of_a_page_have_one_for_the_dark() -> None:
+def test_all_colors_of_a_page_have_one_for_the_dark() -> None:
     templates = Path(reporting.__file__).parent / "templates"
     style = (templates / "style.css").read_text(encoding="utf-8")
     light, dark = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]
-    named = [re.findall(r"(--\w+): #", colours) for colours in (light, dark)]
+    named = [re.findall(r"(--\w+): #", colors) for colors in (light, dark)]
     assert named[0] == named[1]
     rest = style.replace(light, "").replace(dark, "")
     pages = [rest, *(path.read_text(encoding="utf-8") for path in templates.glob("*.jinja"))]

@@ -24,8 +24,8 @@ Play = Callable[..., list[Frame]]
 GREEN = (0.0, 0.8, 0.0)
 
 
-def body(name: str, shape: str, size: tuple[float, float, float], colour: tuple[float, float, float]) -> ActorSpec:
-    return ActorSpec(name, shape, "car", size, (0.0, 0.0, 0.0), colour=colour)
+def body(name: str, shape: str, size: tuple[float, float, float], color: tuple[float, float, float]) -> ActorSpec:
+    return ActorSpec(name, shape, "car", size, (0.0, 0.0, 0.0), color=color)
 
 
 def test_look_at_is_a_rotation_that_points_there_with_down_below() -> None:
@@ -49,7 +49,7 @@ def test_a_helper_looks_at_its_target(street: Play) -> None:
     view = street(None)[0].view
     pose = helper_view(view, "RSU", "Incoming")
     assert pose[:3, 3] == pytest.approx([42.2, -6.0, 3.1])
-    way = view.centres[1] - pose[:3, 3]
+    way = view.centers[1] - pose[:3, 3]
     assert pose[:3, 2] == pytest.approx(way / np.linalg.norm(way))
 
 

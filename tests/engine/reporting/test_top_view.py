@@ -96,16 +96,16 @@ def test_what_was_heard_stays_as_long_as_a_station_goes_by_it(street: Play) -> N
 def test_own_detections_that_travel_the_channel_are_shown_when_they_come_back(street: Play) -> None:
     frames = street(None)
     sent = [frame.steps["Ego"].detections for frame in frames]
-    travelling = []
+    traveling = []
     for tick, frame in enumerate(frames):
         state = StationState(frame.view.time, 0.0, 0.0, 0.0, 0.0, 0.0)
         back = Message("Ego", tick - 6, 0.0, state, sent[tick - 6], 100)
         inbox = (ReceivedMessage(back, frame.view.time),) if tick >= 6 else ()
         step = dataclasses.replace(frame.steps["Ego"], inbox=inbox)
         event = LinkEvent("Ego", "Ego", tick, frame.view.time, "delivered", frame.view.time + 0.3, "", 100)
-        travelling.append(Frame(frame.view, {"Ego": step}, (), (event,)))
-    assert len(snapshot_at(travelling, 5).own) == 0
-    snapshot = snapshot_at(travelling, 40)
+        traveling.append(Frame(frame.view, {"Ego": step}, (), (event,)))
+    assert len(snapshot_at(traveling, 5).own) == 0
+    snapshot = snapshot_at(traveling, 40)
     assert snapshot.own is sent[34]
     assert (snapshot.heard, snapshot.links) == ((), ())
 

@@ -39,7 +39,7 @@ def test_every_map_loads_and_can_be_drawn(corpora: Path) -> None:
 
 
 @pytest.mark.parametrize("town", TOWNS)
-def test_lane_centres_are_where_carla_has_them(corpora: Path, carla: Any, town: str) -> None:
+def test_lane_centers_are_where_carla_has_them(corpora: Path, carla: Any, town: str) -> None:
     file = corpora / "carla_towns" / f"{town}.xodr"
     network = RoadNetwork.load(file)
     waypoints = carla.Map(town, file.read_text()).generate_waypoints(4.0)
@@ -143,7 +143,7 @@ def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str,
         first = {row["name"]: row for row in csv.DictReader(file) if float(row["time"]) == 0.0}
     checked = 0
     for private in root.iterfind("Storyboard/Init/Actions/Private"):
-        row = first[value(private, "entityRef")]
+        row = first[value(private, "entitiref")]
         for place in private.iterfind("PrivateAction/TeleportAction/Position/LanePosition"):
             at = network.location(
                 value(place, "roadId"),

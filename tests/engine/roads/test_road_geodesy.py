@@ -26,7 +26,7 @@ def plane(text: str, latitude: float, longitude: float) -> tuple[float, float]:
         ),
         # the same: Mercator variant A, Makassar / NEIEZ, 3°S 120°E
         ("+proj=merc +lon_0=110 +k=0.997 +x_0=3900000 +y_0=900000 +ellps=bessel", -3, 120, 5009726.58, 569150.82, 0.01),
-        # the same: Lambert conic conformal (2SP), NAD27 / Texas South Central, 28°30'N 96°W, false easting in metres
+        # the same: Lambert conic conformal (2SP), NAD27 / Texas South Central, 28°30'N 96°W, false easting in meters
         (
             "+proj=lcc +lat_0=27.8333333333333 +lon_0=-99 +lat_1=28.3833333333333 +lat_2=30.2833333333333"
             " +x_0=609601.21920 +y_0=0 +ellps=clrk66",
@@ -48,7 +48,7 @@ def test_the_origin_of_a_projection_lies_at_its_false_coordinates() -> None:
     assert plane("+proj=lcc +lat_0=46.5 +lon_0=3 +lat_1=49 +lat_2=44 +x_0=7 +y_0=6", 46.5, 3) == pytest.approx((7, 6))
 
 
-def test_a_southern_zone_counts_from_ten_thousand_kilometres() -> None:
+def test_a_southern_zone_counts_from_ten_thousand_kilometers() -> None:
     north, south = plane("+proj=utm +zone=33", -20, 15), plane("+proj=utm +zone=33 +south", -20, 15)
     assert south == pytest.approx((north[0], north[1] + 1e7))
 

@@ -45,7 +45,7 @@ def test_the_committed_file_is_what_the_script_writes(library: Path, tmp_path: P
         ("coop_2", 25.0, 34.5, -90.0, "3", 1),
     ],
 )
-def test_cars_of_the_paper_start_on_a_lane_centre(
+def test_cars_of_the_paper_start_on_a_lane_center(
     library: Path, name: str, x: float, y: float, heading: float, road: str, lane: int
 ) -> None:
     network = RoadNetwork.load(library / f"{name}.xodr")
@@ -70,7 +70,7 @@ def test_each_arm_leads_everywhere_else_from_a_stop_line(library: Path, name: st
     assert sorted(item.type for item in network.objects) == ["building"] * 24 + ["crosswalk"] * 4 + ["roadMark"] * 4
 
 
-def test_straight_roads_of_sixty_metres_each_way(library: Path) -> None:
+def test_straight_roads_of_sixty_meters_each_way(library: Path) -> None:
     for name, x in (("coop_1", 29.5), ("coop_2", 25.0)):
         network = RoadNetwork.load(library / f"{name}.xodr")
         for y in (-75.0, -30.0, 0.0, 30.0, 75.0):

@@ -75,7 +75,7 @@ def test_a_lane_offset_before_its_road_does_not_reach_into_others(road: Text, ma
 
 
 @pytest.mark.parametrize("narrowing", [0.0, -0.01])
-def test_a_lane_inside_the_centre_of_its_bend_does_not_turn_round(road: Text, map_of: Text, narrowing: float) -> None:
+def test_a_lane_inside_the_center_of_its_bend_does_not_turn_round(road: Text, map_of: Text, narrowing: float) -> None:
     """A turn of half a circle with a radius of 1.5 m, as at the ends of dead-end streets: lane 1 lies inside of it."""
     turn = geometry(0.0, 0.0, 1.5 * math.pi, f'<arc curvature="{1 / 1.5!r}"/>')
     network = RoadNetwork.parse(map_of(road(length=1.5 * math.pi, lanes=section(narrowing), geometry=turn)))

@@ -12,7 +12,7 @@ from eidrive_scenario.roads.geometry import poses as scalar
 
 
 def beneath(network: RoadNetwork, x: float, y: float) -> set[tuple[str, int]]:
-    """Every lane beneath a point, one road after the other, from a guess at every second metre."""
+    """Every lane beneath a point, one road after the other, from a guess at every second meter."""
     found = set()
     for road in network.roads.values():
         for guess in np.arange(0.0, road.length + 2.0, 2.0):

@@ -71,12 +71,12 @@ def one_lane(number: int) -> str:
     return f'<lane id="{number}" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
 
 
-def test_lanes_that_occur_twice_or_are_no_centre(road: Text, map_of: Text) -> None:
-    centre, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
-    found = problems(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", centre, right))))
+def test_lanes_that_occur_twice_or_are_no_center(road: Text, map_of: Text) -> None:
+    center, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
+    found = problems(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
     assert [line.split(": ", 1)[1] for line in found] == [
-        "lane 0 stands under <left>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
-        "lane 1 stands under <center>; left lanes have ids above 0, the centre lane 0, right lanes below 0",
+        "lane 0 stands under <left>; left lanes have ids above 0, the center lane 0, right lanes below 0",
+        "lane 1 stands under <center>; left lanes have ids above 0, the center lane 0, right lanes below 0",
         "lane -1 occurs twice in its section; give each lane its own id",
     ]
 
@@ -91,7 +91,7 @@ def test_lanes_under_the_wrong_side_lie_where_their_ids_say(road: Text, map_of: 
     assert str(doubt) == (
         "town.xodr:1: lane -1 stands under <left>, and is taken by its id; "
         "2 more of lanes under the wrong side: line 2, 2; "
-        "left lanes have ids above 0, the centre lane 0, right lanes below 0"
+        "left lanes have ids above 0, the center lane 0, right lanes below 0"
     )
 
 
@@ -124,7 +124,7 @@ def test_road_length_that_differs_from_geometry_gives_way_with_a_warning(
     network = RoadNetwork.parse(map_of(first, second), "town.xodr")
     assert network.roads["1"].length == 80.0
     assert [(doubt.rule, doubt.message) for doubt in network.map_warnings] == [
-        ("road-jump", f"road '1' has length {length:g} m, but its geometry ends {there} that: the geometry counts")
+        ("geometry-gap", f"road '1' has length {length:g} m, but its geometry ends {there} that: the geometry counts")
     ]
     ahead = network.advance(network.location("1", -1, 70.0), 25.0)
     assert ahead is not None
@@ -207,8 +207,8 @@ def test_borders_say_the_same_as_widths(road: Text, map_of: Text) -> None:
 def test_sections_of_one_side_only(road: Text, map_of: Text) -> None:
     def part(s: int, tag: str, number: int, a: float, b: float) -> str:
         lane = f'<lane id="{number}" type="driving"><width sOffset="0" a="{a}" b="{b}" c="0" d="0"/></lane>'
-        centre = '<center><lane id="0"/></center>'
-        return f'<laneSection s="{s}" singleSide="true"><{tag}>{lane}</{tag}>{centre}</laneSection>'
+        center = '<center><lane id="0"/></center>'
+        return f'<laneSection s="{s}" singleSide="true"><{tag}>{lane}</{tag}>{center}</laneSection>'
 
     lanes = part(0, "right", -1, 3.0, 0.01) + part(0, "left", 1, 4.0, 0.0) + part(40, "left", 1, 2.0, 0.0)
     network = RoadNetwork.parse(map_of(road(lanes=lanes)))

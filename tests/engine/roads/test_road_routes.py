@@ -134,7 +134,7 @@ def test_who_stands_at_a_destination_does_not_go_round_to_it(road: Text, map_of:
     assert network.route(beyond, there).length == pytest.approx(0.0, abs=1e-6)
     onward = network.route(beyond, network.location("b", -1, 10.0), via=[there])
     assert [key.road for key in onward.lanes] == ["a", "b"]
-    # A metre behind is a lap ahead.
+    # A meter behind is a lap ahead.
     assert network.route(network.location("a", -1, 31.0), there).length > 300.0
 
 

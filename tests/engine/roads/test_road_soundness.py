@@ -36,11 +36,11 @@ def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) 
 @pytest.mark.parametrize(
     ("second", "rule", "message"),
     [
-        ({"y": 0.3, "x": 50.4}, "road-jump", "road '1' jumps by 0.5 m at s = 50 m"),
-        ({"s": 50.2}, "road-jump", "road '1': the geometry at s = 0 m ends before the next one begins, by 0.2 m"),
-        ({"s": 49.8}, "road-jump", "road '1': the geometry at s = 0 m runs on into the next one, by 0.2 m"),
-        ({"h": 0.02}, "road-kink", "road '1' has a kink of 0.02 rad at s = 50 m"),
-        ({"h": 2 * math.pi - 0.02}, "road-kink", "road '1' has a kink of 0.02 rad at s = 50 m"),
+        ({"y": 0.3, "x": 50.4}, "geometry-gap", "road '1' jumps by 0.5 m at s = 50 m"),
+        ({"s": 50.2}, "geometry-gap", "road '1': the geometry at s = 0 m ends before the next one begins, by 0.2 m"),
+        ({"s": 49.8}, "geometry-gap", "road '1': the geometry at s = 0 m runs on into the next one, by 0.2 m"),
+        ({"h": 0.02}, "heading-discontinuity", "road '1' has a kink of 0.02 rad at s = 50 m"),
+        ({"h": 2 * math.pi - 0.02}, "heading-discontinuity", "road '1' has a kink of 0.02 rad at s = 50 m"),
     ],
 )
 def test_geometries_that_do_not_join(road: Text, map_of: Text, second: dict, rule: str, message: str) -> None:
@@ -54,7 +54,7 @@ def test_rounding_and_corners_are_left_alone(road: Text, map_of: Text, second: d
 
 def test_a_length_that_is_not_that_of_the_geometry(road: Text, map_of: Text) -> None:
     text = map_of(road(length=100.05, geometry=two_lines()))
-    assert told(text) == [("road-jump", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")]
+    assert told(text) == [("geometry-gap", "road '1' has length 100.05 m, but its geometry ends 0.05 m before that")]
 
 
 def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of: Text) -> None:
@@ -130,7 +130,7 @@ def test_linked_lanes_that_do_not_meet(road: Text, map_of: Text) -> None:
     for y, apart in ((-3.5, ""), (-3.505, ""), (-3.1, "0.4"), (0.0, "3.5")):
         second = road("2", x=100.0, y=y, link=back, lanes=section(0, lane(-1, '<predecessor id="-2"/>')))
         what = f"lane -2 of road '1' and lane -1 of road '2' are linked, and their ends are {apart} m apart"
-        assert told(map_of(first, second)) == ([("road-jump", what)] if apart else [])
+        assert told(map_of(first, second)) == ([("geometry-gap", what)] if apart else [])
 
 
 def test_what_lies_across_a_road(road: Text, map_of: Text) -> None:
@@ -195,7 +195,7 @@ def test_real_maps_are_not_flooded(corpora: Path) -> None:
             found.setdefault((file.name, problem.rule), []).append(problem.line)
     assert found == {
         ("SampleDatabase.xodr", "lane-width"): [1807, 1807],
-        ("SampleDatabase.xodr", "road-jump"): [3237, 3237],
+        ("SampleDatabase.xodr", "geometry-gap"): [3237, 3237],
         ("Town03.xodr", "lane-link"): [7913, 8040],
         ("parking_demo.xodr", "lane-link"): [564],
     }

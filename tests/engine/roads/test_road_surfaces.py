@@ -34,10 +34,10 @@ def test_a_straight_lane_needs_few_triangles(road: Text, map_of: Text) -> None:
     assert area(mesh) == pytest.approx(400.0)
     assert len(mesh.faces) <= 12
     assert np.diff(np.unique(mesh.vertices[:, 0])).max() <= 25.0
-    assert mesh.colour == KINDS["driving"]
+    assert mesh.color == KINDS["driving"]
 
 
-def test_a_bend_is_drawn_to_the_centimetre(road: Text, map_of: Text) -> None:
+def test_a_bend_is_drawn_to_the_centimeter(road: Text, map_of: Text) -> None:
     length = 20 * math.pi
     bend = f'<geometry s="0" x="0" y="0" hdg="0" length="{length!r}"><arc curvature="0.05"/></geometry>'
     mesh = by_kind(RoadNetwork.parse(map_of(road(length=length, geometry=bend, lanes=marked("none")))))["driving"]
@@ -52,7 +52,7 @@ def test_marks_are_as_long_and_as_wide_as_they_should_be(road: Text, map_of: Tex
         assert mesh.vertices[:, 2].min() > 0.0
 
 
-def test_the_broken_line_of_a_centre_lane_lies_on_the_left_if_it_is_named_first(road: Text, map_of: Text) -> None:
+def test_the_broken_line_of_a_center_lane_lies_on_the_left_if_it_is_named_first(road: Text, map_of: Text) -> None:
     mesh = by_kind(RoadNetwork.parse(map_of(road(lanes=marked("broken solid")))))["marking_white"]
     left = mesh.vertices[mesh.faces][np.mean(mesh.vertices[mesh.faces][:, :, 1], axis=1) > 0.0]
     assert left[:, :, 0].max() - left[:, :, 0].min() == pytest.approx(100.0, abs=1.1)
@@ -69,7 +69,7 @@ def test_faces_of_the_ground_look_upwards(library: Path, name: str) -> None:
             assert np.all(normal[:, 2] > -1e-9), mesh.kind
 
 
-def test_a_crosswalk_is_striped_and_a_kerb_is_raised(library: Path) -> None:
+def test_a_crosswalk_is_striped_and_a_curb_is_raised(library: Path) -> None:
     network = RoadNetwork.load(library / "coop_2.xodr")
     meshes = by_kind(network)
     assert meshes["sidewalk"].vertices[:, 2] == pytest.approx(0.12)

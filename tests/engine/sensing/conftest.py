@@ -110,7 +110,7 @@ def make_view(
     categories: dict[str, str] | None = None,
     velocity: dict[str, tuple[float, float]] | None = None,
 ) -> WorldView:
-    """Actors as name: x, y of the box centre, yaw; the reference point is below the centre, on the ground."""
+    """Actors as name: x, y of the box center, yaw; the reference point is below the center, on the ground."""
     sizes, categories, velocity = sizes or {}, categories or {}, velocity or {}
     count = len(actors)
     size = np.array([sizes.get(name, CAR) for name in actors])

@@ -39,7 +39,7 @@ def level(x: float = 0.0, y: float = 0.0, z: float = 1.4) -> np.ndarray:
 def test_a_known_point_lands_where_opencv_projects_it(
     distortion: tuple[float, ...], place: tuple[float, float]
 ) -> None:
-    """The edges of a small crate are where OpenCV projects its corners, to within the pixel that a centre falls in; the
+    """The edges of a small crate are where OpenCV projects its corners, to within the pixel that a center falls in; the
     lens bends its edges by less than that."""
     settings = CameraSettings(width=400, height=300, fov=90, distortion=distortion)
     with World() as world:
@@ -56,12 +56,12 @@ def test_a_known_point_lands_where_opencv_projects_it(
 
 
 def test_each_pixel_of_a_bent_picture_shows_the_direction_that_distorts_to_it() -> None:
-    """A picture whose colours are the directions of its rays comes out of the lens as OpenCV's distortion has it."""
+    """A picture whose colors are the directions of its rays comes out of the lens as OpenCV's distortion has it."""
     settings = CameraSettings(width=160, height=120, fov=100, distortion=BARREL)
     optics = Optics(settings)
     hole = optics.pinhole
     rows, columns = np.indices((hole.height, hole.width), dtype=np.float32) + 0.5
-    rays = np.stack([(columns - hole.centre_x) / hole.focal, (rows - hole.centre_y) / hole.focal], axis=-1)
+    rays = np.stack([(columns - hole.center_x) / hole.focal, (rows - hole.center_y) / hole.focal], axis=-1)
     light = np.concatenate([rays, np.ones_like(rays[..., :1])], axis=-1).astype(np.float32)
     flat = np.zeros((hole.height, hole.width), np.float32)
     seen = optics.bent(Radiance(light, flat, flat.astype(np.int32))).luminance
@@ -132,11 +132,11 @@ def test_supersampling_is_the_mean_of_finer_pixels() -> None:
 def test_exposure_by_iso_12232() -> None:
     """L_sat = 78 / S · N² / (0.65 t): at f/2, 1/100 s and 0 dB, 78 / 100 · 4 / 0.65 · 100 = 480 cd/m²; 20 dB take ten
     times less."""
-    grey = np.full((8, 8, 3), 10.0, np.float32)
+    gray = np.full((8, 8, 3), 10.0, np.float32)
     settings = CameraSettings(f_number=2.0, exposure_time=0.01, gain=0.0)
-    assert metered(grey, settings).saturation == pytest.approx(SATURATION / BASE_SPEED * 4.0 / LENS / 0.01)
-    assert metered(grey, settings).saturation == pytest.approx(480.0)
-    louder = metered(grey, settings.model_copy(update={"gain": 20.0}))
+    assert metered(gray, settings).saturation == pytest.approx(SATURATION / BASE_SPEED * 4.0 / LENS / 0.01)
+    assert metered(gray, settings).saturation == pytest.approx(480.0)
+    louder = metered(gray, settings.model_copy(update={"gain": 20.0}))
     assert louder.saturation == pytest.approx(48.0)
 
 
@@ -144,11 +144,11 @@ def test_the_meter_turns_up_time_first_then_gain() -> None:
     settings = CameraSettings()
     noon, dusk, night = (metered(np.full((8, 8, 3), level, np.float32), settings) for level in (5000.0, 5.0, 0.05))
     assert noon.time < 0.001
-    assert noon.gain == dusk.gain == 0.0 or dusk.time == settings.longest_exposure
-    assert night.time == settings.longest_exposure
+    assert noon.gain == dusk.gain == 0.0 or dusk.time == settings.max_exposure_time
+    assert night.time == settings.max_exposure_time
     assert night.gain > 10.0
     assert noon.saturation > dusk.saturation > night.saturation
-    pitch_dark = metered(np.full((8, 8, 3), 1e-6, np.float32), CameraSettings(highest_gain=12.0))
+    pitch_dark = metered(np.full((8, 8, 3), 1e-6, np.float32), CameraSettings(max_gain=12.0))
     assert (pitch_dark.time, pitch_dark.gain) == (0.03, 12.0)
 
 

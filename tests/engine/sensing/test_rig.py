@@ -55,7 +55,7 @@ def test_own_motion(boxes: Any) -> None:
 
 
 def test_the_usual_mounts_are_ei_drive_s_on_its_car(boxes: Any) -> None:
-    """Lincoln MKZ: front camera 2.5 m ahead and 1 m high, LiDAR half a metre behind the middle, 1.9 m high."""
+    """Lincoln MKZ: front camera 2.5 m ahead and 1 m high, LiDAR half a meter behind the middle, 1.9 m high."""
     spec = boxes.spec("Ego")
     front, lidar = mounting(CameraSettings(), spec, "front"), mounting(LidarSettings(), spec, "roof")
     assert (front.x, front.y, front.z, front.yaw) == pytest.approx((2.5, 0.0, 1.0, 0.0), abs=1e-3)

@@ -47,7 +47,7 @@ def test_a_gap_shows_only_the_corners_behind_it(boxes: Any) -> None:
     assert seen(boxes, actors, walls=edge, visibility=0.5) == {}
 
 
-def test_range_is_measured_from_centre_to_centre(boxes: Any) -> None:
+def test_range_is_measured_from_center_to_center(boxes: Any) -> None:
     assert "Other" in seen(boxes, {"Ego": (0, 0, 0), "Other": (49.9, 0, 0)})
     assert "Other" not in seen(boxes, {"Ego": (0, 0, 0), "Other": (50.1, 0, 0)})
     assert "Other" in seen(boxes, {"Ego": (0, 0, 0), "Other": (79.9, 0, 0)}, range=80.0)

@@ -87,4 +87,4 @@ def test_boxes_of_a_view_with_few_and_many_actors(boxes: Any) -> None:
     few = view.without(view.names[7:])
     assert len(few.names) == 7
     np.testing.assert_allclose(few.boxes, view.boxes[:7], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(few.centres, view.centres[:7], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(few.centers, view.centers[:7], rtol=0.0, atol=1e-12)

@@ -13,7 +13,7 @@ from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.positions.resolution import resolve_position
 
-LATITUDE, METRES_PER_DEGREE = 48.0, 111_190.32
+LATITUDE, METERS_PER_DEGREE = 48.0, 111_190.32
 """Arc of the WGS 84 meridian per degree around 48°N: a (1 - e²) (1 - e² sin² 48°)^(-3/2) π / 180 [m]."""
 NORTHING = 5_316_300.0
 
@@ -39,12 +39,12 @@ def at(context: Any, **frame: Any) -> tuple[Pose, Any]:
 
 
 @pytest.mark.element("GeoPosition")
-def test_a_metre_on_the_globe_is_a_metre_on_the_street(globe: RuntimeContext) -> None:
+def test_a_meter_on_the_globe_is_a_meter_on_the_street(globe: RuntimeContext) -> None:
     """On the middle meridian x is the false easting, and the map is smaller than the globe by 0.9996."""
     first, location = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     assert first.x == pytest.approx(4.0, abs=1e-6)
     assert (location.road, location.lane) == ("1", -1)
-    north, _ = at(globe, latitude_deg=LATITUDE + 100.0 / METRES_PER_DEGREE, longitude_deg=9.0)
+    north, _ = at(globe, latitude_deg=LATITUDE + 100.0 / METERS_PER_DEGREE, longitude_deg=9.0)
     assert north.y - first.y == pytest.approx(99.96, abs=2e-3)
     assert north.x == pytest.approx(first.x, abs=1e-6)
 
@@ -71,7 +71,7 @@ def test_the_ground_the_level_or_the_altitude_say_how_high(globe: RuntimeContext
 
 
 @pytest.mark.element("GeoPosition")
-def test_before_1_2_angles_are_radians_and_degrees_are_recognised(globe: RuntimeContext) -> None:
+def test_before_1_2_angles_are_radians_and_degrees_are_recognized(globe: RuntimeContext) -> None:
     expected, _ = at(globe, latitude_deg=LATITUDE, longitude_deg=9.0)
     old, _ = at(globe, latitude=math.radians(LATITUDE), longitude=math.radians(9.0))
     assert old[:3] == pytest.approx(expected[:3], abs=1e-6)
@@ -99,7 +99,7 @@ def test_a_file_of_1_1_with_radians_loads() -> None:
     frame = '<GeoPosition latitude="0.8" longitude="0.1" height="3"/>'
     text = f"""<OpenSCENARIO>
       <FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="x" author="y"/>
-      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entityRef="A">
+      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entitiref="A">
       <AddEntityAction><Position>{frame}</Position></AddEntityAction></EntityAction></GlobalAction></Actions></Init>
       <StopTrigger/></Storyboard></OpenSCENARIO>"""
     with pytest.raises(ScenarioError, match="entity 'A', which is not there"):

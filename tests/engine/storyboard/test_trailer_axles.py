@@ -45,7 +45,7 @@ def test_the_bar_is_longer_than_to_the_middle_of_the_axles() -> None:
 
 @pytest.mark.parametrize("axles", [((0.0, 0.0),), ((0.0, 0.0), (-1.4, 0.0), (-2.8, 0.0))])
 def test_in_a_long_turn_it_rolls_on_the_circle_of_its_bar(axles: tuple[tuple[float, float], ...]) -> None:
-    """Where it rolls without slip it is abreast of the turn's centre: at √(R² - bar²) from it."""
+    """Where it rolls without slip it is abreast of the turn's center: at √(R² - bar²) from it."""
     trailer = vehicle(*axles, trailer_coupler=model.TrailerCoupler(dx=REACH))
     truck = vehicle((0.0, 0.0), trailer_hitch=model.TrailerHitch(dx=0.0))
     front, back = Actor("Truck", truck, (), None), Actor("Trailer", trailer, (), None)

@@ -159,7 +159,7 @@ def test_control_points_with_headings_say_where_a_spline_looks() -> None:
 
 @pytest.mark.element("Nurbs")
 def test_the_time_of_a_control_point_holds_where_its_basis_function_peaks() -> None:
-    """In the middle of three: at half of the parameter, on steps of a metre of the control polygon."""
+    """In the middle of three: at half of the parameter, on steps of a meter of the control polygon."""
     points = ((0, 0, 0.0), (10, 0, 2.0), (20, 0, 6.0))
     shape = model.Nurbs(
         order=3,

@@ -237,7 +237,7 @@ def test_names_are_unique_and_can_be_used_again(loop: RoadNetwork) -> None:
     assert fleet.names == ("car",)
 
 
-def test_neighbours_stay_in_order_over_a_long_run(loop: RoadNetwork) -> None:
+def test_neighbors_stay_in_order_over_a_long_run(loop: RoadNetwork) -> None:
     fleet = Fleet(loop)
     wishes = (6.0, 14.0, 9.0, 12.0)
     for k, wish in enumerate(wishes):

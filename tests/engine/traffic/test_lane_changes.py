@@ -118,7 +118,7 @@ def test_nobody_changes_into_oncoming_traffic(street: Street, car: Car) -> None:
 
 
 def test_a_free_car_returns_to_the_slow_side_only_with_a_bias(street: Street, car: Car) -> None:
-    # In left-hand traffic lane -1 of a one-way road drives against s, and its left neighbour is lane -2.
+    # In left-hand traffic lane -1 of a one-way road drives against s, and its left neighbor is lane -2.
     for rule, bias, lane, after in (
         ("RHT", 0.0, -1, -1),
         ("RHT", 0.3, -1, -2),

@@ -107,7 +107,7 @@ def test_who_would_have_to_brake_too_hard_passes(street: Street, car: Car, dista
 
 
 def test_a_car_that_stands_on_the_line_is_not_held_by_it(car: Car) -> None:
-    """The line lies half a metre into the second road; the car stands before that one, its front beyond the line."""
+    """The line lies half a meter into the second road; the car stands before that one, its front beyond the line."""
     lane = (
         '<lane id="-1" type="driving"><link><{kind} id="-1"/></link>'
         '<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'

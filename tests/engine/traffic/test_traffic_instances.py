@@ -59,7 +59,7 @@ class Scene:
         self.traffic = BackgroundTraffic(
             roads,
             seed=seed,
-            centre=lambda name: (
+            center=lambda name: (
                 CentralObject(self.ego.x, self.ego.y, self.ego.yaw, self.ego.speed) if name == "Ego" else None
             ),
             taken=frozenset({"swarm.0003"}),
@@ -94,7 +94,7 @@ def scene(street: Street, view_of: ViewOf, car: Callable[[str], ActorSpec]) -> C
 
 def swarm(scene: Scene, **given: object) -> Swarm:
     settings: dict[str, object] = {
-        "centre": "Ego",
+        "center": "Ego",
         "inner": 50.0,
         "major": 300.0,
         "minor": 100.0,
@@ -140,7 +140,7 @@ def test_names_come_from_the_traffic_and_are_used_once(scene: Callable[..., Scen
 
 
 def test_nobody_appears_in_anybody(scene: Callable[..., Scene]) -> None:
-    """Neither in the entity, nor in each other: half a metre of air at least."""
+    """Neither in the entity, nor in each other: half a meter of air at least."""
     stage = scene(1, 2)
     swarm(stage, inner=0.0, count=60, offset=0.0)
     for changes in stage.play(20.0):
@@ -182,7 +182,7 @@ def test_a_swarm_starts_with_speeds_of_its_range(scene: Callable[..., Scene]) ->
 
 def test_a_swarm_around_nobody_does_nothing(scene: Callable[..., Scene]) -> None:
     stage = scene()
-    swarm(stage, centre="Nobody")
+    swarm(stage, center="Nobody")
     assert not [changes for changes in stage.play(1.0) if changes.additions]
 
 

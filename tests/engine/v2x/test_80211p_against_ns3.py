@@ -34,7 +34,7 @@ MESSAGES, DT = 3000, 0.02
 def delivery_ratio(fading: str, distances: list[float], packet_errors: str) -> NDArray[np.float64]:
     """PDR of one sender at receivers in these distances [m]; 36 bytes of headers come on top of the payload."""
     carrier = radio(1, **PROFILE, fading=FADING[fading], packet_errors=packet_errors)
-    places = {"sender": (0.0, 0.0, 1.5), **{f"{metres:04.0f}": (metres, 0.0, 1.5) for metres in distances}}
+    places = {"sender": (0.0, 0.0, 1.5), **{f"{meters:04.0f}": (meters, 0.0, 1.5) for meters in distances}}
     receivers = [name for name in places if name != "sender"]
     carrier.update_environment(RadioEnvironment(places))
     delivered = dict.fromkeys(receivers, 0)
@@ -65,7 +65,7 @@ def test_80211p_broadcasts_reach_as_far_as_in_ns3(fading: str) -> None:
 def test_measured_packet_errors_reach_farther_than_ns3_by_their_lower_ratio(fading: str) -> None:
     """The default curve (WiLabV2Xsim, soft decisions) has half of the errors at 1.08 dB, NIST's at 5.99 dB with 336
     bytes: at an exponent of 2.5 that is a factor of 10^(4.91 / 25) = 1.57 in the distance of 50 %."""
-    distances = [float(metres) for metres in range(100, 1500, 25)]
+    distances = [float(meters) for meters in range(100, 1500, 25)]
     expected = reach(NS3[fading]["distance_m"], np.array(NS3[fading]["pdr"]), 0.5) * 10.0 ** (4.91 / 25.0)
     ratios = delivery_ratio(fading, distances, "80211p_highway_los")
     assert reach(distances, ratios, 0.5) == pytest.approx(expected, rel=0.03)

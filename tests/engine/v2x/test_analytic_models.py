@@ -86,7 +86,7 @@ def test_whatever_the_models_take_they_give_probabilities(settings: dict[str, An
 
 
 def test_more_than_the_models_can_tell_of_is_refused() -> None:
-    """The fit of the busy ratio of 802.11p turns down at 0.913 / (2 · 0.2481) times the channel: 0.3 cars per metre, 25
+    """The fit of the busy ratio of 802.11p turns down at 0.913 / (2 · 0.2481) times the channel: 0.3 cars per meter, 25
     messages a second and 2.08 ms for each, over the 584 m in which one is sensed, are 9.1. Mode 4 needs a fifth to
     choose from."""
     with pytest.raises(ValueError, match=r"need 9\.1\d* times the time there is; the model holds up to 1.84: lower"):

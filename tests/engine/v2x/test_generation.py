@@ -51,7 +51,7 @@ def test_a_heading_across_the_end_of_the_circle_is_a_small_change() -> None:
     assert rules.is_due(state(0.2, yaw=math.radians(-174.5)), 0.2)
 
 
-def test_a_change_of_speed_triggers_and_half_a_metre_per_second_does_not() -> None:
+def test_a_change_of_speed_triggers_and_half_a_meter_per_second_does_not() -> None:
     rules = CamGenerationRules()
     assert rules.is_due(state(0.0, speed=10.0), 0.0)
     assert not rules.is_due(state(0.1, speed=10.5), 0.1)

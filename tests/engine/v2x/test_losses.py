@@ -215,7 +215,7 @@ def test_wrong_traces_say_what_is_wrong(
         TraceDelay.model_validate({"kind": "trace", "file": str(file), **settings})
 
 
-def test_distances_of_the_table_are_in_metres() -> None:
+def test_distances_of_the_table_are_in_meters() -> None:
     loss = DistanceLoss(kind="by_distance", distances=(10.0, 20.0), reception=(0.9, 0.5))
     assert loss.probability_at(0.0) == pytest.approx(0.1)
     assert loss.probability_at(15.0) == pytest.approx(0.3)

@@ -179,5 +179,5 @@ def test_log_distance_starts_from_free_space_at_its_reference() -> None:
 def test_nist_errors_of_qpsk_are_those_of_ns_3() -> None:
     """ns-3 3.44 delivers 0.9825, 0.5325 and 0.231 of 20,000 packets of 336 bytes at 7.08, 6.05 and 5.80 dB."""
     curve = CURVES["80211p_nist"]
-    ratios = np.array([23.0 - 47.86 - 25.0 * math.log10(metres) + 96.975 for metres in (400, 440, 450)])
+    ratios = np.array([23.0 - 47.86 - 25.0 * math.log10(meters) + 96.975 for meters in (400, 440, 450)])
     assert 1.0 - curve.at(ratios, 336) == pytest.approx([0.9825, 0.53245, 0.23095], abs=0.01)

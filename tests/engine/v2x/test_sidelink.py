@@ -55,7 +55,7 @@ def test_last_transmission_on_a_resource_announces_no_further_use() -> None:
 @pytest.mark.parametrize("keep", [0.0, 0.4, 0.8])
 def test_resources_are_kept_with_the_probability_that_was_set(keep: float) -> None:
     """On average 10 uses per counter, and 1 / (1 - keep) counters on each resource."""
-    air = Air(radio(5, **MODE_4, sidelink={"keep": keep}), TWO, 0.1).run(300.0, {"A": 1})
+    air = Air(radio(5, **MODE_4, sidelink={"resource_keep_probability": keep}), TWO, 0.1).run(300.0, {"A": 1})
     changes = sum(not entry.reserves for entry in air.of("A"))
     assert len(air.of("A")) / changes == pytest.approx(10.0 / (1.0 - keep), rel=0.2)
 

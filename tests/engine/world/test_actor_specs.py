@@ -77,16 +77,16 @@ def test_the_shape_follows_category_and_name(name: str, category: str, shape: st
 
 
 def test_the_property_decides() -> None:
-    spec = actor_spec("A", vehicle("anything", "truck", eidrive__shape="firetruck", eidrive__colour="#ff8000"))
+    spec = actor_spec("A", vehicle("anything", "truck", eidrive__shape="firetruck", eidrive__color="#ff8000"))
     assert spec.shape == "firetruck"
-    assert spec.colour == pytest.approx((1.0, 128 / 255, 0.0))
+    assert spec.color == pytest.approx((1.0, 128 / 255, 0.0))
 
 
 @pytest.mark.parametrize(
     ("entries", "message"),
     [
         ({"eidrive__shape": "firetruk"}, r"a.xosc:9: unknown shape 'firetruk'; did you mean 'firetruck'\?"),
-        ({"eidrive__colour": "red"}, "a.xosc:9: colour 'red'.*#rrggbb"),
+        ({"eidrive__color": "red"}, "a.xosc:9: color 'red'.*#rrggbb"),
     ],
 )
 def test_a_wrong_property_is_refused_with_its_line(entries: dict[str, str], message: str) -> None:
@@ -133,12 +133,12 @@ def test_catalog_vehicles_are_consistent() -> None:
     wanted = "lincoln_mkz firetruck ambulance bus nissan_patrol seat_leon tesla_model3 truck van motorbike bicycle"
     assert set(wanted.split()) <= {entry.get("name") for entry in entries}
     for entry in entries:
-        centre, size = entry.find(".//Center"), entry.find(".//Dimensions")
+        center, size = entry.find(".//Center"), entry.find(".//Dimensions")
         front, radius = entry.find(".//FrontAxle"), float(entry.find(".//FrontAxle").get("wheelDiameter")) / 2
         # Both wheels stand inside the box.
-        reach = float(centre.get("x")) + float(size.get("length")) / 2
+        reach = float(center.get("x")) + float(size.get("length")) / 2
         assert float(front.get("positionX")) + radius <= reach + 0.02, entry.get("name")
-        assert float(centre.get("x")) - float(size.get("length")) / 2 <= 0.02 - radius, entry.get("name")
-        assert float(centre.get("z")) == pytest.approx(float(size.get("height")) / 2, abs=1e-3)
+        assert float(center.get("x")) - float(size.get("length")) / 2 <= 0.02 - radius, entry.get("name")
+        assert float(center.get("z")) == pytest.approx(float(size.get("height")) / 2, abs=1e-3)
         known = {prop.get("name") for prop in entry.findall(".//Property")}
-        assert known - {"eidrive.shape", "eidrive.colour"} <= set(PROPERTIES)
+        assert known - {"eidrive.shape", "eidrive.color"} <= set(PROPERTIES)

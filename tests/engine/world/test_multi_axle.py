@@ -137,9 +137,9 @@ def test_it_comes_to_rest_in_a_turn_and_stays() -> None:
     assert after.yaw[0] == before.yaw[0]
 
 
-def tyres(spec: ActorSpec) -> set[tuple[float, float, float]]:
+def tires(spec: ActorSpec) -> set[tuple[float, float, float]]:
     """Place, radius and outer face of each pair of wheels, of the reference point's frame."""
-    parts = actor_mesh(spec)["tyre"]
+    parts = actor_mesh(spec)["tire"]
     points = parts[parts[..., 1].min(axis=1) > 0.0].reshape(-1, 3)
     order = np.sort(points[:, 0])
     cuts = np.flatnonzero(np.diff(order) > 0.25)
@@ -157,18 +157,18 @@ def tyres(spec: ActorSpec) -> set[tuple[float, float, float]]:
     [("truck", (1.6 + 0.55) / 2), ("firetruck", (1.6 + 0.55) / 2), ("bus", 0.998 * 1.25), ("van", 0.965 * 1.25)],
 )
 def test_pictures_show_each_axle_where_it_is(shape: str, side: float) -> None:
-    """On its own track, with twin tyres; under the skirts of a bus or a van, in the skin, where it is seen."""
+    """On its own track, with twin tires; under the skirts of a bus or a van, in the skin, where it is seen."""
     small = ExtraAxle(-1.4, 1.6, 0.4)
     spec = replace(with_axles(small), shape=shape)
-    two = tyres(replace(TRUCK, shape=shape))
+    two = tires(replace(TRUCK, shape=shape))
     assert len(two) == 2
-    (added,) = tyres(spec) - two
+    (added,) = tires(spec) - two
     assert added == pytest.approx((-1.4, 0.4, side), abs=0.006)
 
 
 def test_a_trailer_has_the_axles_of_its_file_and_no_cab() -> None:
     spec = actor_spec("Trailer", xml("semitrailer", False, -1.3))
-    assert {place for place, *_ in tyres(spec)} == {0.0, -1.3}
+    assert {place for place, *_ in tires(spec)} == {0.0, -1.3}
     assert "glass" not in actor_mesh(spec)
     points = np.concatenate([part.reshape(-1, 3) for part in actor_mesh(spec).values()])
     assert np.ptp(points, axis=0) == pytest.approx([9.0, 2.5, 3.5], abs=0.06)

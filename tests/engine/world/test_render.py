@@ -42,7 +42,7 @@ def inside(corners: np.ndarray, x: float, y: float) -> bool:
     return all(s > 0 for s in signs) or all(s < 0 for s in signs)
 
 
-def test_pixels_whose_centres_lie_inside_are_covered() -> None:
+def test_pixels_whose_centers_lie_inside_are_covered() -> None:
     rng = np.random.default_rng(1)
     corners = rng.uniform(-5.0, 25.0, (40, 3, 2))
     nearness = np.repeat(rng.uniform(0.1, 1.0, 40)[None], 3, axis=0)
@@ -54,8 +54,8 @@ def test_pixels_whose_centres_lie_inside_are_covered() -> None:
         assert shown[pixel] == nearest
 
 
-def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
-    """A fan of triangles around a point, with corners on pixel centres too: each centre inside belongs to one."""
+def test_neighbors_neither_overlap_nor_leave_gaps() -> None:
+    """A fan of triangles around a point, with corners on pixel centers too: each center inside belongs to one."""
     ring = np.array([(2.5, 2.5), (17.5, 3.5), (18.2, 14.5), (9.5, 17.5), (1.5, 12.5)])
     hub = np.array([9.5, 9.5])
     triangles = np.array([[hub, ring[k], ring[(k + 1) % 5]] for k in range(5)])
@@ -72,7 +72,7 @@ def test_neighbours_neither_overlap_nor_leave_gaps() -> None:
 
 
 def test_large_triangles_cover_what_small_ones_do() -> None:
-    """Triangles of thousands of pixels, thin tips among them, against all centres of pixels one by one."""
+    """Triangles of thousands of pixels, thin tips among them, against all centers of pixels one by one."""
     rng = np.random.default_rng(3)
     gap_in_its_tip = [(94.18172651875673, 149.27757363317045), (20.45740141210438, 28.0104538720336), (36.576, 287.222)]
     corners = np.concatenate([rng.uniform(-150.0, 400.0, (25, 3, 2)), [gap_in_its_tip]])
@@ -131,7 +131,7 @@ def test_a_clear_sky_gives_the_ground_its_light() -> None:
 
 def test_the_side_towards_the_sun_is_brighter(world: World) -> None:
     """A house, from south and north, in the morning: what faces the sun gets it."""
-    world.add_building("house", (0.0, 0.0, 5.0), (10.0, 10.0, 10.0), colour=(0.7, 0.7, 0.7))
+    world.add_building("house", (0.0, 0.0, 5.0), (10.0, 10.0, 10.0), color=(0.7, 0.7, 0.7))
     world.set_weather(Weather(sun_azimuth=180.0, sun_elevation=30.0, cloud_cover=0.0))
     south = world.radiance(looking(math.pi / 2, 5.0, y=-25.0), PINHOLE).luminance[40:80, 60:100]
     north = world.radiance(looking(-math.pi / 2, 5.0, y=25.0), PINHOLE).luminance[40:80, 60:100]
@@ -146,7 +146,7 @@ def test_the_shadow_of_a_house_falls_away_from_the_sun(world: World, azimuth: fl
     above = looking(math.pi / 2, 60.0, pitch=math.pi / 2 - 1e-6)
 
     def ground(y: float) -> float:
-        row = round(PINHOLE.centre_y - PINHOLE.focal * y / 60.06)
+        row = round(PINHOLE.center_y - PINHOLE.focal * y / 60.06)
         light = world.radiance(above, PINHOLE).luminance
         return float(brightness(light[row - 1 : row + 2, 70:90]).mean())
 
@@ -178,7 +178,7 @@ def test_fog_is_koschmieder_s_law_on_distance(world: World, visual_range: float)
     world.set_weather(fog)
     foggy = world.radiance(looking(0.0), PINHOLE)
     rows, columns = np.indices(bare.depth.shape) + 0.5
-    slant = np.hypot(1.0, np.hypot(columns - PINHOLE.centre_x, rows - PINHOLE.centre_y) / PINHOLE.focal)
+    slant = np.hypot(1.0, np.hypot(columns - PINHOLE.center_x, rows - PINHOLE.center_y) / PINHOLE.focal)
     seen = np.isfinite(bare.depth) & (bare.depth * slant < 300.0)
     through = np.exp(-3.912 / visual_range * bare.depth[seen] * slant[seen])[:, None]
     expected = bare.luminance[seen] * through + horizon(fog) * (1.0 - through)
@@ -218,13 +218,13 @@ def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFact
     spec = car("Ego")
     world.add(spec, Placement(0.0, 0.0))
     lamp = np.array([3.6, 0.0, 0.675])
-    world.add_building("wall", (lamp[0] + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), colour=(1.0, 1.0, 1.0))
+    world.add_building("wall", (lamp[0] + 21.0, 0.0, 2.0), (2.0, 40.0, 4.0), color=(1.0, 1.0, 1.0))
     world.set_weather(Weather(sun_elevation=-30.0, cloud_cover=0.0, visual_range=1e9))
     height, eye = 0.55, 8.0
     lines, columns = (part.astype(float) for part in np.mgrid[57:60, 70:90])  # the plinth of the wall is 0.5 m high
     away = lamp[0] + 20.0 - eye
-    y = -(columns + 0.5 - PINHOLE.centre_x) / PINHOLE.focal * away
-    z = height - (lines + 0.5 - PINHOLE.centre_y) / PINHOLE.focal * away
+    y = -(columns + 0.5 - PINHOLE.center_x) / PINHOLE.focal * away
+    z = height - (lines + 0.5 - PINHOLE.center_y) / PINHOLE.focal * away
     distance = np.sqrt(20.0**2 + y**2 + (z - lamp[2]) ** 2)
     candela = 2.0 * intensity(y / 20.0, (z - lamp[2]) / 20.0, False)
     expected = candela * (20.0 / distance) / distance**2 / math.pi
@@ -235,7 +235,7 @@ def test_headlamps_light_a_wall_by_the_inverse_square(world: World, car: CarFact
 def test_a_wet_road_mirrors_a_bright_wall(world: World) -> None:
     """Seen at a low angle, the road before a white wall is lighter than when dry, and darker than when dry far from
     anything: it takes the light of what stands there."""
-    world.add_building("wall", (30.0, 0.0, 10.0), (2.0, 200.0, 20.0), colour=(0.9, 0.1, 0.1))
+    world.add_building("wall", (30.0, 0.0, 10.0), (2.0, 200.0, 20.0), color=(0.9, 0.1, 0.1))
     overcast = Weather(cloud_cover=1.0, visual_range=1e9)
     at = np.s_[66:72, 60:100]
     world.set_weather(overcast)

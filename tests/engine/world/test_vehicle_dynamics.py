@@ -93,9 +93,9 @@ def test_top_speed_by_air_drag(car: CarFactory) -> None:
 
 def test_lateral_acceleration_is_bounded_by_friction(car: CarFactory) -> None:
     for friction in (1.0, 0.4):
-        rows = np.array(drive(car(tyre_friction=0.9), Control(steering=0.5), 3.0, speed=20.0, friction=friction))
+        rows = np.array(drive(car(tire_friction=0.9), Control(steering=0.5), 3.0, speed=20.0, friction=friction))
         velocity = rows[:, 4]
-        # The acceleration of the centre of gravity cannot exceed the grip, whatever the steering.
+        # The acceleration of the center of gravity cannot exceed the grip, whatever the steering.
         positions = rows[:, 1:3] + 2.7 * 0.55 * np.column_stack([np.cos(rows[:, 3]), np.sin(rows[:, 3])])
         acceleration = np.diff(positions, n=2, axis=0) / 0.05**2
         largest = np.linalg.norm(acceleration, axis=1).max()
@@ -158,7 +158,7 @@ def test_rolling_resistance_and_drag_slow_down(car: CarFactory) -> None:
     assert 20.0 - rows[-1][4] == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize(("name", "value"), [("power", "much"), ("tyre_friction", "-1"), ("weight_front", "1.2")])
+@pytest.mark.parametrize(("name", "value"), [("power", "much"), ("tire_friction", "-1"), ("weight_front", "1.2")])
 def test_senseless_properties_are_refused(car: CarFactory, name: str, value: str) -> None:
     with pytest.raises(SettingError, match=name):
         VehicleParameters.of(car(**{name: value}))

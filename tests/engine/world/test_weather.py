@@ -151,7 +151,7 @@ def test_the_sun_by_the_clock() -> None:
 
 @pytest.mark.parametrize("grip", [1.0, 0.5, 0.2])
 def test_a_slippery_road_lengthens_the_way_to_a_stop(car: Callable[..., ActorSpec], grip: float) -> None:
-    """From 12 m/s with full brakes (8 m/s²), or with what the tyres give (grip · 9.81 m/s²): v² / 2 a."""
+    """From 12 m/s with full brakes (8 m/s²), or with what the tires give (grip · 9.81 m/s²): v² / 2 a."""
     with World() as world:
         world.set_weather(Weather(friction=grip))
         world.add(car("Ego"), Placement(0.0, 0.0, speed=12.0), driven=True)

@@ -31,7 +31,7 @@ def camera_pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
 @pytest.fixture
 def crate() -> ActorSpec:
     """A box of 1 m."""
-    return ActorSpec("Crate", "box", "misc", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), colour=(0.9, 0.1, 0.1))
+    return ActorSpec("Crate", "box", "misc", (1.0, 1.0, 1.0), (0.0, 0.0, 0.5), color=(0.9, 0.1, 0.1))
 
 
 def test_a_known_box_covers_its_pixels(world: World, crate: ActorSpec) -> None:
@@ -49,7 +49,7 @@ def test_a_known_box_covers_its_pixels(world: World, crate: ActorSpec) -> None:
     assert picture.rgb[rows, columns].mean(axis=0)[0] > picture.rgb[rows, columns].mean(axis=0)[1] + 20
 
 
-def test_depth_at_the_centre_is_exact_to_a_centimetre(world: World, crate: ActorSpec) -> None:
+def test_depth_at_the_center_is_exact_to_a_centimeter(world: World, crate: ActorSpec) -> None:
     # The mesh of the crate has battens along its edges and its faces 6 cm inside.
     for distance in (5.0, 20.0, 60.0):
         world.step({"Crate": Placement(distance + 0.5, 0.0)}, {}) if "Crate" in world.names else world.add(

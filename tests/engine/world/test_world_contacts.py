@@ -26,7 +26,7 @@ def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 0.5))
     found = approach(world, 60, 10.0, 0.0)
-    # The gap of 15.5 m closes by half a metre per tick.
+    # The gap of 15.5 m closes by half a meter per tick.
     assert len(found) == 1
     tick, contact = found[0]
     assert tick in (31, 32)
@@ -37,7 +37,7 @@ def test_scripted_boxes_touch_once(world: World, car: CarFactory) -> None:
     assert contact.position[2] == pytest.approx(0.75)
 
 
-def test_passing_by_at_ten_centimetres_is_no_contact(world: World, car: CarFactory) -> None:
+def test_passing_by_at_ten_centimeters_is_no_contact(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(20.0, 1.9))
     assert approach(world, 80, 10.0, 0.0) == []
@@ -116,7 +116,7 @@ def test_two_driven_cars_share_the_momentum(world: World, car: CarFactory) -> No
     assert after.contacts[0].impact_speed == pytest.approx(before.speed[0], rel=0.02)
 
 
-def test_a_blow_off_centre_spins_the_car(world: World, car: CarFactory) -> None:
+def test_a_blow_off_center_spins_the_car(world: World, car: CarFactory) -> None:
     world.add(car("A"), Placement(3.2, -12.0, yaw=math.pi / 2, speed=12.0))
     world.add(car("B"), Placement(0.0, 0.0), driven=True)
     for tick in range(1, 30):

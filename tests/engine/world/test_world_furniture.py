@@ -20,7 +20,7 @@ ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
 
 
 def network(*objects: str, signals: str = "") -> RoadNetwork:
-    """A street along x whose only lane has its centre at y = -2; objects are given by their attributes."""
+    """A street along x whose only lane has its center at y = -2; objects are given by their attributes."""
     listed = "".join(f'<object id="{number}" hdg="0" {one}</object>' for number, one in enumerate(objects))
     return RoadNetwork.parse(ROAD.format(objects=listed, signals=signals))
 
@@ -155,7 +155,7 @@ def test_a_long_barrier_of_many_parts_stops_a_car() -> None:
         'type="gantry" s="40" t="-2" zOffset="0" length="0.5" width="9" height="6">',
         'type="tree" s="40" t="-6" zOffset="0" length="9" width="9" height="8">',
     ],
-    ids=["bush", "kerb", "gantry", "crown of a tree beside the road"],
+    ids=["bush", "curb", "gantry", "crown of a tree beside the road"],
 )
 def test_what_a_car_passes(attributes: str) -> None:
     view, contacts = driven_into(network(attributes))

@@ -66,7 +66,7 @@ def test_each_shape_fills_its_box_and_keeps_to_it(shape: str) -> None:
     length, width, height = SIZES[shape]
     low, high = points.min(axis=0), points.max(axis=0)
     half = np.array([length / 2, width / 2, 0.0])
-    # Lamps, mirrors, hands and the like may stand out by a few centimetres.
+    # Lamps, mirrors, hands and the like may stand out by a few centimeters.
     assert (low >= -half - np.array([0.12, 0.12, 0.02])).all(), low
     assert (high <= half + np.array([0.12, 0.12, height + 0.03])).all(), high
     assert high[2] - low[2] >= 0.95 * height
@@ -75,7 +75,7 @@ def test_each_shape_fills_its_box_and_keeps_to_it(shape: str) -> None:
     assert all(volume(triangles) >= -1e-6 for material, triangles in mesh.items() if material == "paint")
 
 
-def test_every_shape_has_a_builder_and_every_material_a_colour() -> None:
+def test_every_shape_has_a_builder_and_every_material_a_color() -> None:
     assert set(BUILDERS) == set(SHAPES)
     for shape in SHAPES:
         assert set(actor_mesh(spec_of(shape))) <= {*MATERIALS, "paint"}

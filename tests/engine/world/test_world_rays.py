@@ -52,8 +52,8 @@ def test_ignored_actors_are_looked_through_from_everywhere(world: World, car: Ca
     assert world.raycast(through, np.broadcast_to(behind, (500, 3)), ignore=("Hidden",)).rows.tolist() == [1] * 500
 
 
-def test_line_of_sight_behind_a_lorry(world: World, car: CarFactory) -> None:
-    world.add(car("Lorry"), Placement(10.0, 0.0))
+def test_line_of_sight_behind_a_truck(world: World, car: CarFactory) -> None:
+    world.add(car("Truck"), Placement(10.0, 0.0))
     clear = world.line_of_sight((0, 0, 1.0), [[20, 0, 1.0], [20, 0, 4.0], [8.0, 0, 1.0], [20, 3, 1.0]])
     assert clear.tolist() == [False, True, True, True]
 

@@ -50,8 +50,8 @@ def test_a_car_follows_the_slope(car: CarFactory, heading: float) -> None:
         for _ in range(60):
             world.step({}, {"Ego": Control(throttle=0.3)})
             view = world.view()
-            travelled = view.position[0, :2] @ along
-            assert view.position[0, 2] == pytest.approx(0.05 * travelled, abs=1e-6)
+            traveled = view.position[0, :2] @ along
+            assert view.position[0, 2] == pytest.approx(0.05 * traveled, abs=1e-6)
         assert view.pitch[0] == pytest.approx(-math.atan(0.05), abs=1e-9)
         assert view.roll[0] == pytest.approx(0.0, abs=1e-9)
         assert view.velocity[0, 2] == pytest.approx(0.05 * math.hypot(*view.velocity[0, :2]), rel=1e-3)

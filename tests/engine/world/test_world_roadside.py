@@ -66,7 +66,7 @@ def street() -> Any:
 
 
 def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) -> list[str]:
-    """Colours of the thirds (or halves) of a light's head that shine, from the top."""
+    """Colors of the thirds (or halves) of a light's head that shine, from the top."""
     while world.time < time - 1e-9:
         world.step({}, {})
     world.set_display_state({signal: state}, {})
@@ -77,8 +77,8 @@ def lit_lamps(world: World, state: str, signal: str = "L", time: float = 0.0) ->
     found = []
     for part in np.array_split(np.arange(rows.min(), rows.max() + 1), count):
         inside = np.isin(rows, part)
-        colours = shot.rgb[rows[inside], columns[inside]].astype(float)
-        red, green, blue = colours[colours.max(axis=1).argsort()[-12:]].mean(axis=0)
+        colors = shot.rgb[rows[inside], columns[inside]].astype(float)
+        red, green, blue = colors[colors.max(axis=1).argsort()[-12:]].mean(axis=0)
         bright = max(red, green, blue) > 150
         found.append("" if not bright else "yellow" if min(red, green) > 110 else "red" if red > green else "green")
     return found
@@ -123,8 +123,8 @@ def test_from_behind_a_sign_is_bare_metal(street: World) -> None:
     label = next(label for label, name in street.signal_labels.items() if name == "S")
 
     def redness(shot: Any) -> float:
-        colours = shot.rgb[shot.segmentation == label].astype(float)
-        return float((colours[:, 0] - colours[:, 1]).mean())
+        colors = shot.rgb[shot.segmentation == label].astype(float)
+        return float((colors[:, 0] - colors[:, 1]).mean())
 
     assert redness(picture(street, 25.0, 1.0, 2.4)) > 40.0
     assert abs(redness(picture(street, 35.0, 1.0, 2.4, math.pi))) < 10.0
@@ -179,15 +179,15 @@ def test_a_sign_fits_its_size_and_faces_the_traffic(face: SignFace) -> None:
 
 
 def tail(world: World) -> np.ndarray:
-    """Mean colour of the left half, and of the right half, of the car's rear where it is brightest."""
+    """Mean color of the left half, and of the right half, of the car's rear where it is brightest."""
     shot = picture(world, 0.0, 0.0, 1.0)
     rows, columns = np.nonzero(shot.segmentation == 0)
     halves = []
     middle = (columns.min() + columns.max()) / 2
     for side in (columns < middle, columns > middle):
-        colours = shot.rgb[rows[side], columns[side]].astype(float)
-        strength = colours[:, 0] - colours[:, 2]
-        halves.append(colours[strength.argsort()[-15:]].mean(axis=0))
+        colors = shot.rgb[rows[side], columns[side]].astype(float)
+        strength = colors[:, 0] - colors[:, 2]
+        halves.append(colors[strength.argsort()[-15:]].mean(axis=0))
     return np.array(halves)
 
 
@@ -196,12 +196,12 @@ def lights(*states: LightState) -> dict[str, Appearance]:
 
 
 @pytest.fixture
-def grey(car: CarFactory) -> ActorSpec:
-    return replace(car("Ego"), colour=(0.4, 0.4, 0.4))
+def gray(car: CarFactory) -> ActorSpec:
+    return replace(car("Ego"), color=(0.4, 0.4, 0.4))
 
 
-def test_brake_lights_brighten_both_sides(world: World, grey: ActorSpec) -> None:
-    world.add(grey, Placement(8.0, 0.0))
+def test_brake_lights_brighten_both_sides(world: World, gray: ActorSpec) -> None:
+    world.add(gray, Placement(8.0, 0.0))
     dark = tail(world)
     world.set_display_state({}, lights(LightState("brakeLights", "on")))
     assert (tail(world)[:, 0] > dark[:, 0] + 25.0).all()
@@ -209,8 +209,8 @@ def test_brake_lights_brighten_both_sides(world: World, grey: ActorSpec) -> None
     assert tail(world) == pytest.approx(dark, abs=3.0)
 
 
-def test_an_indicator_flashes_on_its_side(world: World, grey: ActorSpec) -> None:
-    world.add(grey, Placement(8.0, 0.0))
+def test_an_indicator_flashes_on_its_side(world: World, gray: ActorSpec) -> None:
+    world.add(gray, Placement(8.0, 0.0))
     dark = tail(world)[:, 1]
     world.set_display_state({}, lights(LightState("indicatorLeft", "flashing")))
     left, right = tail(world)[:, 1]
@@ -221,8 +221,8 @@ def test_an_indicator_flashes_on_its_side(world: World, grey: ActorSpec) -> None
     assert tail(world)[0, 1] == pytest.approx(dark[0], abs=3.0)
 
 
-def test_low_beam_lights_the_road_at_night_by_itself_or_by_the_scenario(world: World, grey: ActorSpec) -> None:
-    world.add(grey, Placement(0.0, 0.0))
+def test_low_beam_lights_the_road_at_night_by_itself_or_by_the_scenario(world: World, gray: ActorSpec) -> None:
+    world.add(gray, Placement(0.0, 0.0))
     world.set_weather(Weather(sun_elevation=-30.0, street_lighting=1.0))
 
     def road() -> float:
@@ -243,16 +243,16 @@ def _pinhole() -> Pinhole:
 # Who sees whom
 
 
-def test_an_actor_without_graphics_is_in_no_picture(world: World, grey: ActorSpec) -> None:
-    world.add(grey, Placement(8.0, 0.0))
+def test_an_actor_without_graphics_is_in_no_picture(world: World, gray: ActorSpec) -> None:
+    world.add(gray, Placement(8.0, 0.0))
     assert (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
     world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(graphics=False))})
     assert not (picture(world, 0.0, 0.0, 1.0).segmentation == 0).any()
     assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == 0
 
 
-def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, grey: ActorSpec) -> None:
-    world.add(grey, Placement(8.0, 0.0))
+def test_an_actor_that_sensors_do_not_see_lets_rays_pass(world: World, gray: ActorSpec) -> None:
+    world.add(gray, Placement(8.0, 0.0))
     world.set_display_state({}, {"Ego": Appearance(visibility=Visibility(sensors=False))})
     assert world.raycast((0.0, 0.0, 0.5), [(20.0, 0.0, 0.5)]).rows[0] == -2
     assert world.view().unseen == ("Ego",)

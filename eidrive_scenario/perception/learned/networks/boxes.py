@@ -1,4 +1,4 @@
-"""Boxes as tensors: overlap measures for training, in centre form (cx cy w h) or as corners (x1 y1 x2 y2)."""
+"""Boxes as tensors: overlap measures for training, in center form (cx cy w h) or as corners (x1 y1 x2 y2)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from torch import Tensor
 
 def corners(boxes: Tensor) -> Tensor:
     """(…, 4) cx cy w h to x1 y1 x2 y2."""
-    centre, half = boxes[..., :2], boxes[..., 2:] / 2.0
-    return torch.cat([centre - half, centre + half], dim=-1)
+    center, half = boxes[..., :2], boxes[..., 2:] / 2.0
+    return torch.cat([center - half, center + half], dim=-1)
 
 
-def centred(boxes: Tensor) -> Tensor:
+def centered(boxes: Tensor) -> Tensor:
     """(…, 4) x1 y1 x2 y2 to cx cy w h."""
     low, high = boxes[..., :2], boxes[..., 2:]
     return torch.cat([(low + high) / 2.0, high - low], dim=-1)
@@ -31,9 +31,9 @@ def pairwise_iou(first: Tensor, second: Tensor) -> Tensor:
 
 
 def complete_iou(first: Tensor, second: Tensor) -> Tensor:
-    """(N,) CIoU of boxes (N, 4) in centre form, row by row.
+    """(N,) CIoU of boxes (N, 4) in center form, row by row.
 
-    Overlap less the squared distance of the centres over the diagonal of the hull, less a term for unlike shapes
+    Overlap less the squared distance of the centers over the diagonal of the hull, less a term for unlike shapes
     (Zheng et al., Distance-IoU loss, AAAI 2020, eq. 6, 10 and 11).
     """
     a, b = corners(first), corners(second)

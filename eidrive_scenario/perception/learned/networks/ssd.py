@@ -21,7 +21,7 @@ ASPECTS = (1.0, 2.0, 3.0, 0.5, 1.0 / 3.0)
 BOXES_PER_CELL = len(ASPECTS) + 1
 """One of each aspect, and a square one between this stride's side and the next."""
 VARIANCES = (0.1, 0.2)
-"""Scale of encoded centres and sizes, as in the paper's code."""
+"""Scale of encoded centers and sizes, as in the paper's code."""
 
 
 class Ssd(nn.Module):
@@ -81,21 +81,21 @@ def default_boxes(height: int, width: int) -> Tensor:
         lines, columns = torch.meshgrid(
             torch.arange(math.ceil(height / stride)), torch.arange(math.ceil(width / stride)), indexing="ij"
         )
-        centres = (torch.stack([columns, lines], dim=-1).float() + 0.5) * stride
-        each = torch.tensor(sizes).expand(*centres.shape[:2], -1, -1)
-        boxes.append(torch.cat([centres[:, :, None, :].expand_as(each), each], dim=-1).reshape(-1, 4))
+        centers = (torch.stack([columns, lines], dim=-1).float() + 0.5) * stride
+        each = torch.tensor(sizes).expand(*centers.shape[:2], -1, -1)
+        boxes.append(torch.cat([centers[:, :, None, :].expand_as(each), each], dim=-1).reshape(-1, 4))
     return torch.cat(boxes)
 
 
 def encode(boxes: Tensor, defaults: Tensor) -> Tensor:
-    """Boxes (…, N, 4) in centre form as offsets from the default boxes (N, 4)."""
-    centre = (boxes[..., :2] - defaults[..., :2]) / (defaults[..., 2:] * VARIANCES[0])
+    """Boxes (…, N, 4) in center form as offsets from the default boxes (N, 4)."""
+    center = (boxes[..., :2] - defaults[..., :2]) / (defaults[..., 2:] * VARIANCES[0])
     size = torch.log(boxes[..., 2:].clamp(min=1e-3) / defaults[..., 2:]) / VARIANCES[1]
-    return torch.cat([centre, size], dim=-1)
+    return torch.cat([center, size], dim=-1)
 
 
 def decode(encoded: Tensor, defaults: Tensor) -> Tensor:
-    """The inverse of `encode`: boxes (…, N, 4) in centre form."""
-    centre = encoded[..., :2] * VARIANCES[0] * defaults[..., 2:] + defaults[..., :2]
+    """The inverse of `encode`: boxes (…, N, 4) in center form."""
+    center = encoded[..., :2] * VARIANCES[0] * defaults[..., 2:] + defaults[..., :2]
     size = torch.exp((encoded[..., 2:] * VARIANCES[1]).clamp(max=8.0)) * defaults[..., 2:]
-    return torch.cat([centre, size], dim=-1)
+    return torch.cat([center, size], dim=-1)

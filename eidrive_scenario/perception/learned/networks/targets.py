@@ -26,9 +26,9 @@ class Targets:
     def in_ignored(self, points: Tensor) -> Tensor:
         """(B, N) whether points (N, 2) [px] lie in an object of the picture that is ignored."""
         picture, row = torch.nonzero(self.classes == IGNORED, as_tuple=True)
-        centre, half = self.boxes[picture, row].chunk(2, dim=1)
+        center, half = self.boxes[picture, row].chunk(2, dim=1)
         half = half / 2.0
-        away = (points[None] - centre[:, None]).abs()
+        away = (points[None] - center[:, None]).abs()
         inside = (away <= half[:, None]).all(dim=2)
         found = torch.zeros((self.boxes.shape[0], len(points)), dtype=torch.int32, device=points.device)
         return found.index_add_(0, picture, inside.int()) > 0

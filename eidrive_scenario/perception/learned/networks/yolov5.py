@@ -1,7 +1,7 @@
 """The network `yolov5`: CSP backbone, pyramid pooling, path aggregation neck, three scales with anchors; nano size.
 
 Written from the published architecture: CSPNet (Wang et al. 2020), PANet (Liu et al. 2018), YOLOv3's anchors on three
-scales (Redmon and Farhadi 2018), YOLOv4's widened centre offsets (Bochkovskiy et al. 2020).
+scales (Redmon and Farhadi 2018), YOLOv4's widened center offsets (Bochkovskiy et al. 2020).
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ class YoloV5(nn.Module):
         for scale, (raw, stride) in enumerate(zip(outputs, STRIDES, strict=True)):
             share = raw.sigmoid()
             cells = cell_corners(raw.shape[2], raw.shape[3], raw.device)
-            centre = (2.0 * share[..., :2] - 0.5 + cells) * stride
+            center = (2.0 * share[..., :2] - 0.5 + cells) * stride
             size = (2.0 * share[..., 2:4]).square() * self.anchors[scale][None, :, None, None, :]
-            found.append(torch.cat([centre, size, share[..., 4:]], dim=-1).flatten(1, 3))
+            found.append(torch.cat([center, size, share[..., 4:]], dim=-1).flatten(1, 3))
         return torch.cat(found, dim=1)
 
     def _start_rare(self) -> None:

@@ -34,16 +34,16 @@ class Assignment(NamedTuple):
 def assign(targets: Targets, anchors: Tensor, stride: int, height: int, width: int) -> Assignment:
     """The answers of one scale of height x width cells; anchors (A, 2) [px].
 
-    An object is answered for by all anchors of like size, in the cell of its centre and in the two next cells whose
+    An object is answered for by all anchors of like size, in the cell of its center and in the two next cells whose
     widened offsets, -0.5 to 1.5, still reach it.
     """
     picture, boxes, classes = targets.objects()
     ratio = boxes[:, None, 2:] / anchors[None]
     fits = torch.maximum(ratio, 1.0 / ratio.clamp(min=1e-9)).amax(dim=2) < LARGEST_RATIO
     row, anchor = torch.nonzero(fits, as_tuple=True)
-    centre = boxes[row, :2] / stride
-    cell = centre.floor()
-    beside = torch.where(centre - cell < 0.5, -1.0, 1.0)
+    center = boxes[row, :2] / stride
+    cell = center.floor()
+    beside = torch.where(center - cell < 0.5, -1.0, 1.0)
     none = torch.zeros_like(cell[:, 0])
     shifts = torch.stack(
         [
@@ -86,9 +86,9 @@ class YoloLoss:
                 chosen = raw[found.picture, found.anchor, found.line, found.column]
                 share = chosen[:, :4].sigmoid()
                 cells = torch.stack([found.column, found.line], dim=1)
-                centre = (2.0 * share[:, :2] - 0.5 + cells) * stride
+                center = (2.0 * share[:, :2] - 0.5 + cells) * stride
                 size = (2.0 * share[:, 2:]).square() * self._anchors[scale][found.anchor]
-                fit = complete_iou(torch.cat([centre, size], dim=1), found.boxes)
+                fit = complete_iou(torch.cat([center, size], dim=1), found.boxes)
                 box_loss = box_loss + (1.0 - fit).sum()
                 wanted.index_put_((found.picture, found.anchor, found.line, found.column), fit.detach().clamp(min=0.0))
                 one_hot = torch.zeros((count, self._classes), device=device)
@@ -107,6 +107,6 @@ class YoloLoss:
 
     def _asked(self, targets: Targets, height: int, width: int, stride: int, device: torch.device) -> Tensor:
         """(B, A, H, W) cells that are not in an ignored object."""
-        centres = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
-        free = ~targets.in_ignored(centres).view(-1, 1, height, width)
+        centers = (cell_corners(height, width, device).reshape(-1, 2) + 0.5) * stride
+        free = ~targets.in_ignored(centers).view(-1, 1, height, width)
         return free.expand(-1, ANCHORS_PER_SCALE, -1, -1)

@@ -160,7 +160,7 @@ class Sidelink(MediumAccess):
         transmission.first_band, transmission.bands = grant.band, grant.width
         grant.used = subframe
         grant.counter -= 1
-        if grant.counter == 0 and self._draw("keep", row) < self._settings.keep:
+        if grant.counter == 0 and self._draw("keep", row) < self._settings.resource_keep_probability:
             grant.counter = self._new_counter(row)
         transmission.reserves = grant.counter > 0
         length = round(transmission.duration / SUBFRAME)

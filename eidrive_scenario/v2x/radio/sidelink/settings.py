@@ -28,7 +28,7 @@ class SidelinkSettings(Settings):
     interval      resource reservation interval [s]
     subchannels   into which 10 MHz are divided, and
     subchannel_bytes   what one of them carries in a subframe of 1 ms
-    keep          probability of keeping the resource when the reselection counter has reached 0 (probResourceKeep)
+    resource_keep_probability   of keeping the resource when the reselection counter has reached 0 (probResourceKeep)
     processing    from the message to the earliest subframe that can carry it [s]; T1 of the selection window
     selection_window   T2, the end of the selection window, after the request [s]; None: the interval, at most 100 ms
     latency       latency requirement [s]: if the next reserved resource is later than this after the message could be
@@ -44,7 +44,7 @@ class SidelinkSettings(Settings):
     interval: float = 0.1
     subchannels: Annotated[int, Field(ge=1, le=20)] = 4
     subchannel_bytes: Annotated[int, Field(ge=1)] = 190
-    keep: Annotated[float, Field(ge=0.0, le=0.8)] = 0.0
+    resource_keep_probability: Annotated[float, Field(ge=0.0, le=0.8)] = 0.0
     processing: Annotated[float, Field(ge=0.0, le=0.004)] = 0.001
     selection_window: Annotated[float, Field(ge=0.02, le=MAX_SELECTION_WINDOW)] | None = None
     latency: Annotated[float, Field(gt=0.0)] = 0.1

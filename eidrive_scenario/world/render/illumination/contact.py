@@ -34,7 +34,7 @@ def dimmed(bodies: Sequence[MeshInstance], cover: Cover, upright: NDArray[np.boo
     share = np.ones(eye.shape, dtype=np.float32)
     for body in bodies:
         half = body.model.half
-        middle = body.rotation @ np.array([*body.model.centre[:2], 0.0]) + body.position - eye.place
+        middle = body.rotation @ np.array([*body.model.center[:2], 0.0]) + body.position - eye.place
         away = math.sqrt(float(middle @ middle))
         if 2.0 * float(half[0]) * eye.pinhole.focal < _FEWEST_PIXELS * away:
             continue
@@ -86,7 +86,7 @@ def _window(middle: Array, body: MeshInstance, half: Array, eye: CameraView) -> 
     if not len(corners):
         return None
     x, y, depth = corners.T
-    columns, rows = x / depth * pinhole.focal + pinhole.centre_x, y / depth * pinhole.focal + pinhole.centre_y
+    columns, rows = x / depth * pinhole.focal + pinhole.center_x, y / depth * pinhole.focal + pinhole.center_y
     left, right = max(math.floor(columns.min()), 0), min(math.ceil(columns.max()) + 1, pinhole.width)
     top, bottom = max(math.floor(rows.min()), 0), min(math.ceil(rows.max()) + 1, pinhole.height)
     if left >= right or top >= bottom:

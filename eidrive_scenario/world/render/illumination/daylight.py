@@ -60,7 +60,7 @@ def daylight(weather: Weather) -> Daylight:
     towards = np.array(weather.sun_direction)
     height = float(towards[2])
     cover = weather.cloud_cover
-    warm = _sunlight_colour(weather.sun_elevation)
+    warm = _sunlight_color(weather.sun_elevation)
     if height > 0.0:
         beam = 127_500.0 * math.exp(-0.21 / max(height, 1e-3)) * weather.sun_share
         if weather.sun_illuminance is not None:
@@ -83,11 +83,11 @@ def daylight(weather: Weather) -> Daylight:
         if direct * height < 0.01 * total:
             direct = 0.0
     clear_light = clear * _unit(np.array([0.70, 0.88, 1.25]) if height > 0.0 else np.array([0.62, 0.78, 1.30]))
-    grey = (
+    gray = (
         np.array([0.96, 1.0, 1.03]) * (1.0 - 0.35 * _low(weather.sun_elevation))
         + 0.35 * _low(weather.sun_elevation) * warm
     )
-    cloud_light = clouds * _unit(grey) + NIGHT_GLOW * _unit(np.array([1.0, 0.85, 0.7]))
+    cloud_light = clouds * _unit(gray) + NIGHT_GLOW * _unit(np.array([1.0, 0.85, 0.7]))
     sun = direct * warm
     sky = clear_light + cloud_light
     ground = sky + sun * max(height, 0.0)
@@ -105,7 +105,7 @@ def _twilight(elevation: float) -> float:
     return math.exp(float(np.interp(elevation, angles, np.log(values))))
 
 
-def _sunlight_colour(elevation: float) -> Array:
+def _sunlight_color(elevation: float) -> Array:
     """Linear sRGB of luminance 1: what air and haze leave (air mass by Kasten and Young 1989)."""
     height = max(elevation, 0.0)
     mass = 1.0 / (math.sin(math.radians(height)) + 0.50572 * (height + 6.07995) ** -1.6364)
@@ -113,10 +113,10 @@ def _sunlight_colour(elevation: float) -> Array:
 
 
 def _low(elevation: float) -> float:
-    """How much a low sun colours clouds, in [0, 1]."""
+    """How much a low sun colors clouds, in [0, 1]."""
     return float(np.clip(1.0 - abs(elevation - 2.0) / 10.0, 0.0, 1.0))
 
 
-def _unit(colour: Array) -> Array:
-    found: Array = colour / float(colour @ LUMA)
+def _unit(color: Array) -> Array:
+    found: Array = color / float(color @ LUMA)
     return found

@@ -1,4 +1,4 @@
-"""The light of headlamps in a picture, found for every second pixel both ways and taken over by its neighbours."""
+"""The light of headlamps in a picture, found for every second pixel both ways and taken over by its neighbors."""
 
 from __future__ import annotations
 

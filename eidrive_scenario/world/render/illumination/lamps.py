@@ -141,6 +141,6 @@ def intensity(aside: Array, above: Array, high: bool) -> Array:
     return found
 
 
-def colour() -> Floats:
+def color() -> Floats:
     """Of the light, linear sRGB."""
     return np.array(_WARM, dtype=np.float32)

@@ -172,7 +172,7 @@ def _seen_ground(eye: CameraView) -> Array:
     pinhole, pose = eye.pinhole, eye.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
     rows = np.array([0.0, 0.5, 1.0]) * pinhole.height
-    rays = np.array([((c - pinhole.centre_x) / pinhole.focal, (r - pinhole.centre_y) / pinhole.focal, 1.0)
+    rays = np.array([((c - pinhole.center_x) / pinhole.focal, (r - pinhole.center_y) / pinhole.focal, 1.0)
                      for c in columns for r in rows])  # fmt: skip
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ pose[:3, :3].T
     lowest, highest = -pose[2, 3] - 0.5, max(-pose[2, 3] + 6.0, 1.0)
@@ -193,13 +193,13 @@ def _away(caster: MeshInstance, grid: ShadowGrid) -> Array | None:
     """Corners (3 · K, 3), relative to the camera, of a body's triangles that turn away from the sun; None where none of
     them can shade the grid."""
     model, axes, eye, low, high = caster.model, grid.axes, grid.eye, grid.low, grid.high
-    centre = caster.rotation @ model.centre + caster.position - eye
-    flat = axes @ centre
+    center = caster.rotation @ model.center + caster.position - eye
+    flat = axes @ center
     if (flat + model.radius < low).any() or (flat - model.radius > high).any():
         return None
     sun = (caster.rotation.T @ grid.towards).astype(np.float32)
     if model.cells is not None:
-        flat = (model.cells.centre @ caster.rotation.T + caster.position - eye) @ axes.T
+        flat = (model.cells.center @ caster.rotation.T + caster.position - eye) @ axes.T
         radius = model.cells.radius[:, None]
         within = (flat + radius >= low) & (flat - radius <= high)
         rows = model.cells.rows(within[:, 0] & within[:, 1])

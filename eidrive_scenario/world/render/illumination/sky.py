@@ -46,17 +46,17 @@ def dome(weather: Weather) -> Floats:
     x, y, z = _directions()
     clear = _scaled(_cie(_CLEAR, x, y, z, light.towards), z, float(light.clear @ LUMA))
     covered = _scaled(_cie(_OVERCAST, x, y, z, light.towards), z, float(light.clouds @ LUMA))
-    colour_clear = light.clear / max(float(light.clear @ LUMA), 1e-12)
+    color_clear = light.clear / max(float(light.clear @ LUMA), 1e-12)
     pale = np.array([0.93, 0.99, 1.07])
     blue = np.array([0.42, 0.74, 1.75]) / float(np.array([0.42, 0.74, 1.75]) @ LUMA)
     height = np.clip(z, 0.0, 1.0)[..., None] ** 0.55
     tint = pale + (blue - pale) * height
-    sun = light.sun / max(float(light.sun @ LUMA), 1e-12) if light.sun.any() else colour_clear
+    sun = light.sun / max(float(light.sun @ LUMA), 1e-12) if light.sun.any() else color_clear
     near = np.clip(x * light.towards[0] + y * light.towards[1] + z * light.towards[2], 0.0, 1.0)[..., None] ** 6
     low = float(np.clip(1.0 - weather.sun_elevation / 25.0, 0.0, 1.0)) * float(weather.sun_elevation > -8.0)
     tint = tint + (sun - tint) * low * (0.25 + 0.55 * near) * (1.0 - 0.8 * height)
     tint /= (tint @ LUMA)[..., None]
-    colour_clouds = light.clouds / max(float(light.clouds @ LUMA), 1e-12)
+    color_clouds = light.clouds / max(float(light.clouds @ LUMA), 1e-12)
     share, relief = _clouds(weather.cloud_cover)
     if weather.sun_elevation < -6.0:
         share = share * _NIGHT_CLOUDS
@@ -66,7 +66,7 @@ def dome(weather: Weather) -> Floats:
         0.45 * float(light.sun @ LUMA) * max(float(light.towards[2]), 0.3) + float(light.sky @ LUMA)
     ) / math.pi
     above = above + (1.0 - weather.cloud_cover) * np.maximum(lit_from_above - above, 0.0)
-    mixed = whole + (above * colour_clouds * relief[..., None] - whole) * share[..., None]
+    mixed = whole + (above * color_clouds * relief[..., None] - whole) * share[..., None]
     # Thick air before the sky: as far as the layer reaches in that direction.
     fog = max(weather.extinction - CLEAR_AIR, 0.0)
     through = np.exp(-fog * FOG_HEIGHT / np.maximum(z, 0.004))[..., None]
@@ -76,7 +76,7 @@ def dome(weather: Weather) -> Floats:
 
 
 def horizon(weather: Weather) -> Array:
-    """(3,) mean luminance just above the horizon [cd/m²]: the colour into which distance fades."""
+    """(3,) mean luminance just above the horizon [cd/m²]: the color into which distance fades."""
     return _horizon(weather).copy()
 
 

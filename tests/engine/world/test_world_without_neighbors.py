@@ -94,7 +94,7 @@ def test_nobody_is_watched_but_near_others(car: CarFactory, monkeypatch: pytest.
             gaps.append(world.distance("Ego", "Parked"))
             world.step({}, {"Ego": Control(throttle=0.1)})
         assert world.view().contacts == ()
-    # 0.8 m lie between them as the one passes the other, at half a metre a tick.
+    # 0.8 m lie between them as the one passes the other, at half a meter a tick.
     assert min(gaps) == pytest.approx(0.8)
     assert all(seen for gap, seen in zip(gaps, watched, strict=True) if gap <= 0.81)
     assert not any(seen for gap, seen in zip(gaps, watched, strict=True) if gap > 1.2)
