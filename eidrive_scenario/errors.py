@@ -58,9 +58,11 @@ class EidriveError(Exception):
 class InputError(EidriveError):
     """Invalid input. `diagnostics` holds all diagnostics in the order of the file."""
 
-    def __init__(self, problems: Diagnostic | Sequence[Diagnostic]) -> None:
-        self.diagnostics: tuple[Diagnostic, ...] = (problems,) if isinstance(problems, Diagnostic) else tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.diagnostics))
+    def __init__(self, diagnostics: Diagnostic | Sequence[Diagnostic]) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = (
+            (diagnostics,) if isinstance(diagnostics, Diagnostic) else tuple(diagnostics)
+        )
+        super().__init__("\n".join(str(diagnostic) for diagnostic in self.diagnostics))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Diagnostic, ...]]]:
         return type(self), (self.diagnostics,)
@@ -132,16 +134,16 @@ class ExtensionPlace:
 class ExtensionError(SimulationError):
     """An extension raised an exception or returned something invalid; `place` says which one and where."""
 
-    def __init__(self, place: ExtensionPlace, problem: str) -> None:
-        super().__init__(f"{place}: {problem}")
+    def __init__(self, place: ExtensionPlace, description: str) -> None:
+        super().__init__(f"{place}: {description}")
         self.place = place
-        self.problem = problem
+        self.description = description
 
     def __reduce__(self) -> tuple[type[ExtensionError], tuple[ExtensionPlace, str]]:
-        return type(self), (self.place, self.problem)
+        return type(self), (self.place, self.description)
 
     def as_json(self) -> dict[str, Any]:
-        return {**super().as_json(), **self.place.as_json(), "problem": self.problem}
+        return {**super().as_json(), **self.place.as_json(), "problem": self.description}
 
 
 class WallLimitError(SimulationError):
@@ -178,8 +180,8 @@ class InvalidResult(Exception):
     extension  the object whose `method` returned it
     """
 
-    def __init__(self, extension: object, method: str, problem: str) -> None:
-        super().__init__(f"{method} {problem}")
+    def __init__(self, extension: object, method: str, description: str) -> None:
+        super().__init__(f"{method} {description}")
         self.extension = extension
         self.method = method
 
@@ -192,7 +194,7 @@ class ErrorCollector:
     """
 
     def __init__(self) -> None:
-        self._problems: list[Diagnostic] = []
+        self._diagnostics: list[Diagnostic] = []
 
     def __enter__(self) -> None:
         return None
@@ -200,20 +202,20 @@ class ErrorCollector:
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> bool:
         if not isinstance(error, InputError):
             return False
-        self._problems += error.diagnostics
+        self._diagnostics += error.diagnostics
         return True
 
     def raise_if_any(self) -> None:
         """Raise InputError if diagnostics are stored, each once."""
-        if self._problems:
-            raise InputError(list(dict.fromkeys(self._problems)))
+        if self._diagnostics:
+            raise InputError(list(dict.fromkeys(self._diagnostics)))
 
 
-def capped(problems: Sequence[Diagnostic]) -> list[Diagnostic]:
+def capped(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
     """The first MAX_DIAGNOSTICS of several diagnostics, and one that counts the others."""
-    shown = list(problems[:MAX_DIAGNOSTICS])
-    if len(problems) > MAX_DIAGNOSTICS:
-        shown.append(Diagnostic(f"{len(problems) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
+    shown = list(diagnostics[:MAX_DIAGNOSTICS])
+    if len(diagnostics) > MAX_DIAGNOSTICS:
+        shown.append(Diagnostic(f"{len(diagnostics) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
     return shown
 
 

@@ -55,8 +55,8 @@ def resolve_scenario(name: str | Path) -> Path:
         return inside
     if str(name) and is_folder(path):
         raise SettingError(Diagnostic(f"{quoted(str(name))} is a folder", "give one .xosc file"))
-    remedy = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
-    raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", remedy))
+    hint = suggestion(str(name).removesuffix(_SUFFIX), scenarios())
+    raise SettingError(Diagnostic(f"no scenario {quoted(str(name))}: neither a file nor in the library", hint))
 
 
 def from_library(name: str | Path) -> Path:
@@ -111,8 +111,8 @@ def resolve(kind: Kind, name: str | Path) -> Path:
     if is_regular_file(inside):
         return inside
     singular = "channel profile" if kind == "channels" else "weather preset"
-    remedy = suggestion(str(name), names(kind))
-    raise SettingError(Diagnostic(f"no {singular} {quoted(str(name))}: neither a file nor in the library", remedy))
+    hint = suggestion(str(name), names(kind))
+    raise SettingError(Diagnostic(f"no {singular} {quoted(str(name))}: neither a file nor in the library", hint))
 
 
 def _check_letters(path: Path) -> None:
@@ -121,8 +121,8 @@ def _check_letters(path: Path) -> None:
         str(path).encode()
     except UnicodeEncodeError:
         shown = os.fsencode(path).decode(errors="backslashreplace")
-        remedy = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
-        raise SettingError(Diagnostic("the name has bytes that are no letters here", remedy, shown)) from None
+        hint = "rename it, or set a locale with UTF-8, such as LANG=C.UTF-8"
+        raise SettingError(Diagnostic("the name has bytes that are no letters here", hint, shown)) from None
 
 
 def definition(path: Path) -> Definition:

@@ -75,8 +75,8 @@ class Registry:
             missing = ", ".join(sorted(found.__abstractmethods__))
             raise RegistryError(f"{described} lacks {missing}")
         if isinstance(found, type):
-            for problem in _mismatches(found):
-                raise RegistryError(f"{described}: {problem}")
+            for diagnostic in _mismatches(found):
+                raise RegistryError(f"{described}: {diagnostic}")
             _loaded.setdefault(found, (singular(self.kind), name, point.value))
             _checked[self.kind, name, base] = (found,)
         return found
@@ -153,8 +153,8 @@ def _mismatches(found: type) -> Iterator[str]:
                 yield f"{name} is an object of type {type(plain).__name__} (expected a method)"
             elif inspect.isgeneratorfunction(plain) or inspect.iscoroutinefunction(plain):
                 yield f"{name} is a generator or coroutine (expected a method that returns its result)"
-            elif problem := _signature_problem(own, plain, expected):
-                yield f"{name}{problem}"
+            elif diagnostic := _signature_problem(own, plain, expected):
+                yield f"{name}{diagnostic}"
 
 
 def _signature_problem(own: Any, plain: Any, expected: Any) -> str:

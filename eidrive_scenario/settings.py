@@ -44,9 +44,9 @@ def parse_settings(
     try:
         settings = model.model_validate(dict(data))
     except ValidationError as error:
-        findings = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
-        problems = [_problem(model, data, finding, source, line, lines or {}) for finding in findings]
-        raise SettingError(problems) from error
+        collector = error.errors(include_url=False)[:MAX_DIAGNOSTICS]
+        diagnostics = [_diagnostic(model, data, finding, source, line, lines or {}) for finding in collector]
+        raise SettingError(diagnostics) from error
     immense = next(_immense(settings), None)
     if immense is not None:
         place = _line_of(immense[0], lines or {}, line)
@@ -56,7 +56,7 @@ def parse_settings(
     return settings
 
 
-def _problem(
+def _diagnostic(
     model: type[BaseModel],
     data: Mapping[str, Any],
     finding: ErrorDetails,
@@ -69,15 +69,15 @@ def _problem(
     path = _typed_path(loc, data)
     place = _line_of(loc, lines, line)
     if kind == "extra_forbidden":
-        remedy = suggestion(str(loc[-1]), _known_keys(model, loc[:-1]))
-        return Diagnostic(f"unknown setting {quoted(path)}", remedy, source, place)
+        hint = suggestion(str(loc[-1]), _known_keys(model, loc[:-1]))
+        return Diagnostic(f"unknown setting {quoted(path)}", hint, source, place)
     if kind == "missing":
         return Diagnostic(f"setting {path!r} is missing", "add it", source, place)
     if kind == "union_tag_invalid":
         word, key = finding["ctx"]["tag"], finding["ctx"]["discriminator"].strip("'")
-        remedy = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
+        hint = suggestion(word, re.findall(r"'([^']*)'", finding["ctx"]["expected_tags"]))
         place = _line_of((*loc, key), lines, line)
-        return Diagnostic(f"setting {quoted(path + '.' + key)} is {quoted(word)}", remedy, source, place)
+        return Diagnostic(f"setting {quoted(path + '.' + key)} is {quoted(word)}", hint, source, place)
     if kind == "union_tag_not_found":
         key = finding["ctx"]["discriminator"].strip("'")
         return Diagnostic(
@@ -87,8 +87,8 @@ def _problem(
     if kind in _NO_MAPPING:
         return Diagnostic(message, "a mapping is expected: {key: value, …}", source, place)
     own = kind == "value_error"
-    remedy = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
-    return Diagnostic(message if path else "settings do not fit together", remedy, source, place)
+    hint = finding["msg"].removeprefix("Value error, ") if own else finding["msg"].lower()
+    return Diagnostic(message if path else "settings do not fit together", hint, source, place)
 
 
 def _immense(value: Any, path: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], float]]:

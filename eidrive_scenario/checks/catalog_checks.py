@@ -21,17 +21,17 @@ def check_catalog(path: Path) -> tuple[tuple[Diagnostic, ...], tuple[Diagnostic,
     Each entry is read with the defaults of the parameters that it declares. What an entry refers to in other catalogs
     is checked with the scenarios that use it, as only these name the folders.
     """
-    findings = DiagnosticCollector()
+    collector = DiagnosticCollector()
     try:
         document = open_document(path)
-        version = version_of(document, findings, older=VERSIONS[0])
+        version = version_of(document, collector, older=VERSIONS[0])
         if version is not None:
-            tree = apply_workarounds(document.root, document.name, version, findings)
-            root = Reader(document.name, version, findings).read(tree, OpenScenario)
-            check_values(list(root.walk()), version, findings)
+            tree = apply_workarounds(document.root, document.name, version, collector)
+            root = Reader(document.name, version, collector).read(tree, OpenScenario)
+            check_values(list(root.walk()), version, collector)
         catalog = document.root.find("Catalog")
         if catalog is not None:
-            findings.problems.extend(twins_in(catalog, document.name).values())
+            collector.errors.extend(twins_in(catalog, document.name).values())
     except ScenarioError as error:
-        findings.problems.extend(error.diagnostics)
-    return tuple(sort_diagnostics(findings.problems)), tuple(sort_diagnostics(findings.warnings))
+        collector.errors.extend(error.diagnostics)
+    return tuple(sort_diagnostics(collector.errors)), tuple(sort_diagnostics(collector.warnings))

@@ -51,8 +51,8 @@ def check_distribution(path: Path, ignored: Collection[str] = ()) -> Distributio
     if len(telling) > _MOST_LOADED:
         unread = f"{len(telling) - _MOST_LOADED} of the listed values were not tried"
         found.told[Level.WARNING][Diagnostic(unread, "run them", unfolding.source)] = None
-    problems, warnings, notes = (tuple(found.told[level]) for level in (Level.ERROR, Level.WARNING, Level.NOTE))
-    return DistributionCheckReport(problems, warnings, len(unfolding), notes=notes)
+    diagnostics, warnings, notes = (tuple(found.told[level]) for level in (Level.ERROR, Level.WARNING, Level.NOTE))
+    return DistributionCheckReport(diagnostics, warnings, len(unfolding), notes=notes)
 
 
 class _Gathered:
@@ -65,7 +65,7 @@ class _Gathered:
             Level.NOTE: dict.fromkeys(alone.notes),
         }
         self._ignored = ignored
-        self._known = {_place(problem) for problem in (*alone.warnings, *alone.notes) if problem.rule}
+        self._known = {_place(diagnostic) for diagnostic in (*alone.warnings, *alone.notes) if diagnostic.rule}
         self._read: set[int] = set()
 
     def read(self, run: ConcreteRun, *, every_value: bool) -> None:
@@ -78,24 +78,24 @@ class _Gathered:
         except InputError as error:
             self._refused(error, every_value)
             return
-        for level, problem in run_rules(scenario, self._ignored):
-            if _place(problem) not in self._known:
-                self._known.add(_place(problem))
-                self.told[level][replace(problem, message=f"in run {run.number}: {problem.message}")] = None
+        for level, diagnostic in run_rules(scenario, self._ignored):
+            if _place(diagnostic) not in self._known:
+                self._known.add(_place(diagnostic))
+                self.told[level][replace(diagnostic, message=f"in run {run.number}: {diagnostic.message}")] = None
 
     def _refused(self, error: InputError, every_value: bool) -> None:
         """A run that cannot be played; of one that was read besides only what is new."""
-        known = {_place(problem) for told in self.told.values() for problem in told}
-        problems = [one for one in error.diagnostics if every_value or _place(one) not in known]
+        known = {_place(diagnostic) for told in self.told.values() for diagnostic in told}
+        diagnostics = [one for one in error.diagnostics if every_value or _place(one) not in known]
         if isinstance(error, ConstraintError):
-            left_out = (replace(one, hint=f"{one.hint}; such runs are left out") for one in problems)
+            left_out = (replace(one, hint=f"{one.hint}; such runs are left out") for one in diagnostics)
             self.told[Level.WARNING].update(dict.fromkeys(left_out))
         else:
-            self.told[Level.ERROR].update(dict.fromkeys(problems))
+            self.told[Level.ERROR].update(dict.fromkeys(diagnostics))
 
 
-def _place(problem: Diagnostic) -> tuple[str, str, int | None]:
-    return problem.rule, problem.source, problem.line
+def _place(diagnostic: Diagnostic) -> tuple[str, str, int | None]:
+    return diagnostic.rule, diagnostic.source, diagnostic.line
 
 
 def _telling(unfolding: DistributionExpansion) -> Iterator[int]:

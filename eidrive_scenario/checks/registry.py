@@ -28,8 +28,8 @@ def run_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tup
     context = RoadLintContext(scenario, roads)
     for rule in chosen:
         if rule.name not in ignored:
-            for problem in rule.run(context):
-                yield rule.level, problem
+            for diagnostic in rule.run(context):
+                yield rule.level, diagnostic
 
 
 def check_rule_names(ignored: Collection[str]) -> None:

@@ -37,10 +37,10 @@ class Rule(Generic[S]):
 
     def run(self, context: S) -> Iterator[Diagnostic]:
         """What the rule finds, marked with its name."""
-        for problem in self.check(context):
-            yield replace(problem, rule=self.name)
+        for diagnostic in self.check(context):
+            yield replace(diagnostic, rule=self.name)
 
 
-def at(element: Element, message: str, remedy: str = "") -> Diagnostic:
+def at(element: Element, message: str, hint: str = "") -> Diagnostic:
     """A finding at the place of an element."""
-    return Diagnostic(message, remedy, element.source, element.line)
+    return Diagnostic(message, hint, element.source, element.line)

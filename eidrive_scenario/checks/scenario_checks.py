@@ -39,22 +39,22 @@ def check_scenario(source: Source, ignored: Collection[str] = ()) -> CheckReport
         scenario = load_scenario(source)
     except InputError as error:
         return CheckReport(error.diagnostics)
-    unbuilt = [problem for problem in unsupported_criteria(scenario) if problem not in scenario.warnings]
+    unbuilt = [diagnostic for diagnostic in unsupported_criteria(scenario) if diagnostic not in scenario.warnings]
     found: dict[Level, list[Diagnostic]] = {
         Level.ERROR: [],
         Level.WARNING: [*scenario.warnings, *unbuilt],
         Level.NOTE: [],
     }
-    for level, problem in run_rules(scenario, ignored):
-        found[level].append(problem)
+    for level, diagnostic in run_rules(scenario, ignored):
+        found[level].append(diagnostic)
     try:
         Simulation(scenario, load_weights=False).close()
         found[Level.WARNING] += torchscript_warnings(scenario)
     except InputError as error:
-        known = [replace(problem, rule="") for problem in found[Level.ERROR]]
-        found[Level.ERROR] += [problem for problem in error.diagnostics if problem not in known]
-    problems, warnings, notes = (tuple(capped(sort_diagnostics(problems))) for problems in found.values())
-    return CheckReport(problems, warnings, notes=notes)
+        known = [replace(diagnostic, rule="") for diagnostic in found[Level.ERROR]]
+        found[Level.ERROR] += [diagnostic for diagnostic in error.diagnostics if diagnostic not in known]
+    diagnostics, warnings, notes = (tuple(capped(sort_diagnostics(diagnostics))) for diagnostics in found.values())
+    return CheckReport(diagnostics, warnings, notes=notes)
 
 
 def inspect_catalog(path: Path, ignored: Collection[str] = ()) -> CheckReport:
@@ -76,5 +76,5 @@ def check_road_file(path: Path, ignored: Collection[str] = ()) -> CheckReport:
         roads = RoadNetwork.load(path)
     except InputError as error:
         return CheckReport(error.diagnostics)
-    found = [problem for problem in roads.map_warnings if problem.rule not in ignored]
-    return CheckReport((), tuple(capped(sorted(found, key=lambda problem: problem.line or 0))))
+    found = [diagnostic for diagnostic in roads.map_warnings if diagnostic.rule not in ignored]
+    return CheckReport((), tuple(capped(sorted(found, key=lambda diagnostic: diagnostic.line or 0))))

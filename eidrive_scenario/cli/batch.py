@@ -63,12 +63,12 @@ def _runs(unfolding: DistributionExpansion, numbers: Sequence[int]) -> Iterator[
 
 def _refuse_varied(unfolding: DistributionExpansion, parameters: Mapping[str, object]) -> None:
     varied = unfolding.varied.names
-    problems = [
+    diagnostics = [
         Diagnostic(
             f"--param {name!r} would undo what the distribution varies", "leave it out", origin.source, origin.line
         )
         for name, origin in varied.items()
         if name in parameters
     ]
-    if problems:
-        raise SettingError(problems)
+    if diagnostics:
+        raise SettingError(diagnostics)

@@ -50,12 +50,12 @@ def check(
     broken: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     told: dict[str, dict[Diagnostic, None]] = {"problem": dict.fromkeys(missing), "warning": {}, "note": {}}
-    for problem in missing:
-        typer.echo(str(problem))
+    for diagnostic in missing:
+        typer.echo(str(diagnostic))
     for path in files:
         hung.file = path
         try:
-            findings = _inspect(path, ignored, wall_limit)
+            collector = _inspect(path, ignored, wall_limit)
         except InputError:
             raise
         except (Exception, SystemExit) as error:
@@ -64,13 +64,13 @@ def check(
             print_error(error, path)
             broken.append(error)
             continue
-        for level, found in zip(told, (findings.errors, findings.warnings, findings.notes), strict=True):
-            for problem in found:
-                if problem not in told[level]:
-                    typer.echo(f"{problem}{_mark(level, problem.rule)}")
+        for level, found in zip(told, (collector.errors, collector.warnings, collector.notes), strict=True):
+            for diagnostic in found:
+                if diagnostic not in told[level]:
+                    typer.echo(f"{diagnostic}{_mark(level, diagnostic.rule)}")
             told[level].update(dict.fromkeys(found))
-        if isinstance(findings, DistributionCheckReport) and findings.runs:
-            typer.echo(f"{path}: {_count(findings.runs, 'run')}")
+        if isinstance(collector, DistributionCheckReport) and collector.runs:
+            typer.echo(f"{path}: {_count(collector.runs, 'run')}")
     counts = [_count(len(files), "file"), *(_count(len(found), level) for level, found in told.items())]
     typer.echo(", ".join(counts if told["note"] else counts[:-1]))
     if broken:

@@ -25,8 +25,8 @@ class Guarded(TyperGroup):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            for problem in error.diagnostics:
-                typer.echo(str(problem), err=True)
+            for diagnostic in error.diagnostics:
+                typer.echo(str(diagnostic), err=True)
             raise typer.Exit(WRONG_INPUT) from error
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)

@@ -262,11 +262,11 @@ def agent_settings(controller: Controller) -> AgentSettings:
     source = controller.source
     data: dict[str, Any] = {}
     lines: dict[str, int] = {}
-    problems = []
+    diagnostics = []
     for entry in entries:
         if entry.name in data:
             message = f"property {entry.name!r} is given twice, first in line {lines[entry.name]}"
-            problems.append(Diagnostic(message, "keep one", source, entry.line))
+            diagnostics.append(Diagnostic(message, "keep one", source, entry.line))
             continue
         lines[entry.name] = entry.line
         try:
@@ -274,25 +274,25 @@ def agent_settings(controller: Controller) -> AgentSettings:
         except SettingError as error:
             what = error.diagnostics[0].message
             message = f"property {entry.name!r} is {entry.value!r}, which is {what}"
-            problems.append(Diagnostic(message, "check brackets, commas and quotes", source, entry.line))
+            diagnostics.append(Diagnostic(message, "check brackets, commas and quotes", source, entry.line))
             continue
         try:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
-            problems += error.diagnostics
+            diagnostics += error.diagnostics
     for name, kind in (("detector", "detectors"), ("fusion", "fusion"), ("planner", "planners")):
         known = [*registry(kind), *((NO_PLANNER,) if name == "planner" else ())]
         if name in data and data[name] not in known:
             message = f"unknown {name} {data[name]!r}"
-            problems.append(Diagnostic(message, suggestion(data[name], known), source, lines[name]))
+            diagnostics.append(Diagnostic(message, suggestion(data[name], known), source, lines[name]))
     lacks_area = data.get("conflict_area") is None and ("conflict_area" in data or "conflict_area" not in lines)
     if data.get("planner") == "conflict_area" and lacks_area:
         message = "planner 'conflict_area' has no area"
-        problems.append(Diagnostic(message, "add the property 'conflict_area'", source, lines["planner"]))
+        diagnostics.append(Diagnostic(message, "add the property 'conflict_area'", source, lines["planner"]))
     try:
         settings = parse_settings(AgentSettings, data, source=source, line=controller.line, lines=lines)
     except SettingError as error:
-        raise SettingError([*problems, *error.diagnostics]) from error
-    if problems:
-        raise SettingError(problems)
+        raise SettingError([*diagnostics, *error.diagnostics]) from error
+    if diagnostics:
+        raise SettingError(diagnostics)
     return settings

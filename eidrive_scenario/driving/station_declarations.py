@@ -25,9 +25,9 @@ def declared_settings(
 ) -> dict[str, AgentSettings]:
     """The settings of every entity with a controller of ours, options applied; all that is wrong in one error."""
     if detector is not None and detector not in registry("detectors"):
-        remedy = suggestion(detector, registry("detectors"))
-        raise SettingError(Diagnostic(f"unknown detector {detector!r}", remedy, "--detector"))
-    problems: list[Diagnostic] = []
+        hint = suggestion(detector, registry("detectors"))
+        raise SettingError(Diagnostic(f"unknown detector {detector!r}", hint, "--detector"))
+    diagnostics: list[Diagnostic] = []
     found: dict[str, AgentSettings] = {}
     controllers: dict[str, Controller] = {}
     for name, assigned in scenario.controllers.items():
@@ -35,19 +35,19 @@ def declared_settings(
             try:
                 found[name] = agent_settings(controller)
             except SettingError as error:
-                problems.extend(error.diagnostics)
+                diagnostics.extend(error.diagnostics)
             controllers[name] = controller
     for name, settings in found.items():
-        problems.extend(_unknown_senders(name, settings, controllers))
+        diagnostics.extend(_unknown_senders(name, settings, controllers))
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = _line(controllers[name], "planner")
-            problems.append(Diagnostic(message, "remove the property 'planner'", controllers[name].source, line))
+            diagnostics.append(Diagnostic(message, "remove the property 'planner'", controllers[name].source, line))
     for sender in cooperate or ():
         if sender not in controllers:
-            problems.append(Diagnostic(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
-    if problems:
-        raise SettingError(problems)
+            diagnostics.append(Diagnostic(f"no station {sender!r}", suggestion(sender, controllers), "--cooperate"))
+    if diagnostics:
+        raise SettingError(diagnostics)
     updated = {}
     for name, settings in found.items():
         update = _by_detector(settings, detector)
@@ -87,7 +87,7 @@ def declared_detectors(
 ) -> dict[str, Detector]:
     """The detector of every station, with its weights unless `load_weights` is False. Raises SettingError with all that
     is wrong with any of them, their sensors or their methods of fusion."""
-    problems: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     found: dict[str, Detector] = {}
     for name, station in settings.items():
         controller = list(filter(is_agent_controller, scenario.controllers[name]))[-1]
@@ -103,12 +103,12 @@ def declared_detectors(
             line = _line(controller, "fusion_settings", "fusion")
             build_fusion(station, found[name], source=controller.source, line=line)
         except SettingError as error:
-            problems += [
-                problem if problem.source else replace(problem, source=source, line=line)
-                for problem in error.diagnostics
+            diagnostics += [
+                diagnostic if diagnostic.source else replace(diagnostic, source=source, line=line)
+                for diagnostic in error.diagnostics
             ]
-    if problems:
-        raise SettingError(list(dict.fromkeys(problems)))
+    if diagnostics:
+        raise SettingError(list(dict.fromkeys(diagnostics)))
     return found
 
 
@@ -124,8 +124,8 @@ def torchscript_warnings(scenario: Scenario) -> list[Diagnostic]:
             weights = given.get("weights") if isinstance(given, dict) else None
             if isinstance(weights, str) and Path(weights).suffix == TORCHSCRIPT_SUFFIX:
                 message = "the run is refused: its TorchScript weights can execute any code"
-                remedy = f"export the model to ONNX, or allow it by --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
-                warnings.append(Diagnostic(message, remedy, controller.source, entry.line))
+                hint = f"export the model to ONNX, or allow it by --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
+                warnings.append(Diagnostic(message, hint, controller.source, entry.line))
     return warnings
 
 

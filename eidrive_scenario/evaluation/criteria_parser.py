@@ -54,7 +54,7 @@ def parse_criteria(
         raise SettingError(Diagnostic(f"{text.strip()!r} declares no criterion", f"write {_EXAMPLE}", source, line))
     names = set(taken)
     criteria = []
-    problems: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     for kind, settings, lines in _items(entries, text, line):
         here = lines.get("", line)
         try:
@@ -63,13 +63,13 @@ def parse_criteria(
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
         except SettingError as error:
-            problems.extend(error.diagnostics)
+            diagnostics.extend(error.diagnostics)
             continue
         criterion.name = _free_name(criterion.name, names)
         names.add(criterion.name)
         criteria.append(criterion)
-    if problems:
-        raise SettingError(problems)
+    if diagnostics:
+        raise SettingError(diagnostics)
     return criteria
 
 
@@ -100,8 +100,8 @@ def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mappi
     settings = {} if settings is None else settings
     if not isinstance(settings, dict):
         fields = criterion_type.settings_type.model_fields.items()
-        remedy = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
-        raise SettingError(Diagnostic(f"{kind} is given {settings!r}", remedy, source, line))
+        hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
+        raise SettingError(Diagnostic(f"{kind} is given {settings!r}", hint, source, line))
     parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
     criterion: Criterion = construct(criterion_type, parsed)
     name: object = getattr(criterion, "name", kind)

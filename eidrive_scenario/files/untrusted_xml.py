@@ -56,8 +56,8 @@ def parse_untrusted(
     error   makes the exception that is raised for a diagnostic; each names `source` and the line
     """
 
-    def refuse(message: str, remedy: str, line: int | None) -> NoReturn:
-        raise error(Diagnostic(message, remedy, source, line))
+    def refuse(message: str, hint: str, line: int | None) -> NoReturn:
+        raise error(Diagnostic(message, hint, source, line))
 
     if len(content) > limits.max_bytes:
         refuse(f"the file is larger than {limits.max_bytes // 2**20} MiB", "split it", None)

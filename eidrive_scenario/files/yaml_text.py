@@ -119,8 +119,8 @@ def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = 
     mistake, counted from `line` if given.
     """
     if len(text) > MAX_YAML:
-        problem = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
-        raise SettingError(problem)
+        diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
+        raise SettingError(diagnostic)
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:

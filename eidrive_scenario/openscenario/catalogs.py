@@ -47,11 +47,11 @@ class CatalogLibrary:
         locations: CatalogLocations | None,
         folder: Path,
         parameters: Mapping[str, Parameter],
-        findings: DiagnosticCollector,
+        collector: DiagnosticCollector,
     ) -> None:
         self.entries: dict[CatalogReference, Element] = {}
         self._parameters = parameters
-        self._findings = findings
+        self._collector = collector
         self._places: dict[str, Path] = {}
         for location in locations.children() if locations else ():
             directory = getattr(location, "directory", None)
@@ -104,22 +104,22 @@ class CatalogLibrary:
             )
             return None
         if reference.entry_name in catalog.twins:
-            self._findings.problems.append(catalog.twins[reference.entry_name])
+            self._collector.errors.append(catalog.twins[reference.entry_name])
             return None
         rule = rules(Catalog, catalog.version).children.get(node.tag)
         if rule is None:
             self._wrong(reference, f"{node.tag} is nothing that a catalog may hold", str(catalog.document.name))
             return None
         try:
-            self._findings.budget.enter_catalog_element(sum(1 for _ in node.iter()))
+            self._collector.budget.enter_catalog_element(sum(1 for _ in node.iter()))
         except BudgetError as error:
-            problem = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
-            raise ScenarioError([*self._findings.problems, problem]) from error
-        reader = Reader(catalog.document.name, catalog.version, self._findings)
-        lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._findings.budget)
+            diagnostic = Diagnostic(str(error), "use fewer or smaller entries", reference.source, reference.line)
+            raise ScenarioError([*self._collector.errors, diagnostic]) from error
+        reader = Reader(catalog.document.name, catalog.version, self._collector)
+        lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
         entry = reader.read(node, rule.cls, _assignments(reference), lent)
         for name in sorted(lent.lent or ()):
-            self._findings.warning(
+            self._collector.warning(
                 f"the catalog entry {quoted(reference.entry_name)} uses the scenario's parameter {quoted(name)}",
                 "declare it in the entry and assign it where the entry is used",
                 source=entry.source,
@@ -151,24 +151,24 @@ class CatalogLibrary:
         for path in _candidates(places, name):
             catalog = self._file(path)
             if catalog is not None and catalog.name == name:
-                self._findings.warnings.extend(unreadable)
+                self._collector.warnings.extend(unreadable)
                 return catalog
             if catalog is not None:
                 catalogs[path] = catalog
             unreadable += self._unreadable.get(path, ())
         if unreadable:
-            self._findings.problems.extend(unreadable)
+            self._collector.errors.extend(unreadable)
             return None
         for path, catalog in catalogs.items():
             if path.stem == name:
                 message = f"the catalog in {path.name} is named {quoted(catalog.name)}"
                 line = line_of(catalog.document.root)
-                self._findings.warning(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
+                self._collector.warning(message, f"name it {quoted(name)}", source=catalog.document.name, line=line)
                 return catalog
         beside = self._beside(name)
         if beside is not None:
             place = Path(beside.document.name).parent
-            self._findings.warning(
+            self._collector.warning(
                 f"the catalog {quoted(name)} lies in none of the places given, but in {place}",
                 f"name that place, {place}",
                 source=found.reference.source,
@@ -190,7 +190,7 @@ class CatalogLibrary:
         for folder in sorted(folders):
             path = folder / f"{name}.xosc"
             catalog = self._file(path) if is_regular_file(path) else None
-            self._findings.problems.extend(self._unreadable.get(path, ()))
+            self._collector.errors.extend(self._unreadable.get(path, ()))
             if catalog is not None and catalog.name == name:
                 return catalog
         return None
@@ -203,19 +203,19 @@ class CatalogLibrary:
     def _file(self, path: Path) -> CatalogFile | None:
         """The catalog in a file, or None if it has none or cannot be read; `_unreadable` has what is wrong with it."""
         if path not in self._files:
-            findings = DiagnosticCollector()
+            collector = DiagnosticCollector()
             try:
-                self._files[path] = _read(path, findings)
+                self._files[path] = _read(path, collector)
             except ScenarioError as error:
-                findings.problems.extend(error.diagnostics)
+                collector.errors.extend(error.diagnostics)
                 self._files[path] = None
-            self._findings.warnings.extend(findings.warnings)
-            if findings.problems:
-                self._unreadable[path] = tuple(findings.problems)
+            self._collector.warnings.extend(collector.warnings)
+            if collector.errors:
+                self._unreadable[path] = tuple(collector.errors)
         return self._files[path]
 
-    def _wrong(self, reference: CatalogReference, message: str, remedy: str) -> None:
-        self._findings.error(message, remedy, source=reference.source, line=reference.line)
+    def _wrong(self, reference: CatalogReference, message: str, hint: str) -> None:
+        self._collector.error(message, hint, source=reference.source, line=reference.line)
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -231,15 +231,15 @@ def catalog_place(directory: str, folder: Path) -> Path:
     return place_of(directory.replace("\\", "/"), folder)
 
 
-def _read(path: Path, findings: DiagnosticCollector) -> CatalogFile | None:
+def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
     document = open_document(path)
     catalog = document.root.find("Catalog")
     if catalog is None:
         return None
-    version = version_of(document, findings, older=VERSIONS[0])
+    version = version_of(document, collector, older=VERSIONS[0])
     if version is None:
         return None
-    catalog = apply_workarounds(catalog, document.name, version, findings)
+    catalog = apply_workarounds(catalog, document.name, version, collector)
     entries = {child.get("name", ""): child for child in reversed(list(catalog.iterchildren(etree.Element)))}
     return CatalogFile(catalog.get("name", path.stem), document, version, entries, twins_in(catalog, document.name))
 
@@ -262,10 +262,10 @@ def _nowhere(name: str, places: Iterable[Path], known: set[str]) -> tuple[str, s
     gone = [shortened(str(place), 300) for place in places if not os.path.exists(place)]
     message = f"no catalog {quoted(name)} in " + ", ".join(shortened(str(place), 300) for place in places)
     if gone:
-        remedy = "correct the Directory"
+        hint = "correct the Directory"
         if is_regular_file(library_path() / "catalogs" / f"{name}.xosc"):
-            remedy += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
-        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", remedy
+            hint += f"; that of the library is {LIBRARY_FOLDER}/catalogs"
+        return f"{message}; {', '.join(gone)} {'is' if len(gone) == 1 else 'are'} not there", hint
     return message, suggestion(name, known)
 
 

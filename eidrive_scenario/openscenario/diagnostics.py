@@ -21,25 +21,25 @@ class DiagnosticCollector:
     warnings the first MAX_DIAGNOSTICS are kept and the others counted.
     """
 
-    problems: list[Diagnostic] = field(default_factory=list)
+    errors: list[Diagnostic] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
     uncounted: int = 0
     """Number of warnings that are not kept."""
     budget: Budget = field(default_factory=Budget)
     """What the scenario may expand to."""
 
-    def error(self, message: str, remedy: str = "", *, source: str = "", line: int | None = None) -> None:
+    def error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
         """Something is wrong. Raises ScenarioError with all errors once there are too many."""
-        self._add(Diagnostic(message, remedy, source, line))
+        self._add(Diagnostic(message, hint, source, line))
 
-    def constraint_error(self, message: str, remedy: str = "", *, source: str = "", line: int | None = None) -> None:
+    def constraint_error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
         """A parameter has a value that its constraints do not allow."""
-        self._add(ConstraintDiagnostic(message, remedy, source, line))
+        self._add(ConstraintDiagnostic(message, hint, source, line))
 
-    def warning(self, message: str, remedy: str = "", *, source: str = "", line: int | None = None) -> None:
+    def warning(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
         """Something is outdated or doubtful."""
         if len(self.warnings) < MAX_DIAGNOSTICS:
-            self.warnings.append(Diagnostic(message, remedy, source, line))
+            self.warnings.append(Diagnostic(message, hint, source, line))
         else:
             self.uncounted += 1
 
@@ -49,21 +49,21 @@ class DiagnosticCollector:
         Raises ScenarioError with all problems in the order of the files: ConstraintError if nothing but values that
         constraints rule out is wrong.
         """
-        if self.problems:
-            only_ruled_out = all(isinstance(problem, ConstraintDiagnostic) for problem in self.problems)
-            raise (ConstraintError if only_ruled_out else ScenarioError)(sort_diagnostics(self.problems))
+        if self.errors:
+            only_ruled_out = all(isinstance(diagnostic, ConstraintDiagnostic) for diagnostic in self.errors)
+            raise (ConstraintError if only_ruled_out else ScenarioError)(sort_diagnostics(self.errors))
         more = [Diagnostic(f"{self.uncounted} more warnings are not listed")] if self.uncounted else []
         return (*sort_diagnostics(self.warnings), *more)
 
-    def _add(self, problem: Diagnostic) -> None:
-        self.problems.append(problem)
-        if len(self.problems) >= MAX_DIAGNOSTICS:
-            last = Diagnostic(f"reading ends after {MAX_DIAGNOSTICS} errors", "", problem.source, problem.line)
-            raise ScenarioError([*sort_diagnostics(self.problems), last])
+    def _add(self, diagnostic: Diagnostic) -> None:
+        self.errors.append(diagnostic)
+        if len(self.errors) >= MAX_DIAGNOSTICS:
+            last = Diagnostic(f"reading ends after {MAX_DIAGNOSTICS} errors", "", diagnostic.source, diagnostic.line)
+            raise ScenarioError([*sort_diagnostics(self.errors), last])
 
 
-def sort_diagnostics(problems: list[Diagnostic]) -> list[Diagnostic]:
+def sort_diagnostics(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
     """Each problem once, the files in the order in which they appear, the lines of a file ascending."""
-    unique = list(dict.fromkeys(problems))
-    files = list(dict.fromkeys(problem.source for problem in unique))
-    return sorted(unique, key=lambda problem: (files.index(problem.source), problem.line or 0))
+    unique = list(dict.fromkeys(diagnostics))
+    files = list(dict.fromkeys(diagnostic.source for diagnostic in unique))
+    return sorted(unique, key=lambda diagnostic: (files.index(diagnostic.source), diagnostic.line or 0))

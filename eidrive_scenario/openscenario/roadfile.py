@@ -17,7 +17,7 @@ MAPS = "EIDRIVE_MAPS"
 SUFFIX = ".xodr"
 
 
-def find_road_file(network: RoadNetwork | None, folder: Path, findings: DiagnosticCollector) -> Path | None:
+def find_road_file(network: RoadNetwork | None, folder: Path, collector: DiagnosticCollector) -> Path | None:
     """The road file that the scenario names, or None if it names none.
 
     It is looked for beside the scenario, then by its bare name in the folders of EIDRIVE_MAPS; a name without a
@@ -29,9 +29,9 @@ def find_road_file(network: RoadNetwork | None, folder: Path, findings: Diagnost
     for candidate in _candidates(logic, folder):
         if is_regular_file(candidate):
             return candidate
-    findings.error(
+    collector.error(
         f"no road file '{shortened(logic.filepath, 300)}' {_from(folder)} nor in the folders of {MAPS}",
-        _remedy(logic, folder),
+        _hint(logic, folder),
         source=logic.source,
         line=logic.line,
     )
@@ -55,7 +55,7 @@ def _map_folders() -> list[Path]:
     return [Path(entry) for entry in os.environ.get(MAPS, "").split(os.pathsep) if entry]
 
 
-def _remedy(logic: File, folder: Path) -> str:
+def _hint(logic: File, folder: Path) -> str:
     named = PurePosixPath(logic.filepath.strip().replace("\\", "/"))
     places = [(folder / named).parent, *_map_folders()]
     known = {file.stem for place in places if is_folder(place) for file in place.glob(f"*{SUFFIX}")}

@@ -111,18 +111,18 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
     if isinstance(source, str | Path):
         source = from_library(source)
     document = open_document(source)
-    findings = DiagnosticCollector()
+    collector = DiagnosticCollector()
     assignments = as_assignments(parameters)
-    read = read_root(document, findings, assignments)
+    read = read_root(document, collector, assignments)
     if read is None or read.root.catalog is not None or read.root.parameter_value_distribution is not None:
-        findings.raise_on_error()
+        collector.raise_on_error()
         raise ScenarioError(_other_kind(read.root if read else None, document.name))
     root = read.root
-    library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, findings)
+    library = CatalogLibrary(root.catalog_locations, document.folder, read.parameters, collector)
     library.resolve(read.references)
-    road_file = find_road_file(root.road_network, document.folder, findings)
-    check_rules(root, read.version, library.entries, findings)
-    warnings = findings.raise_on_error()
+    road_file = find_road_file(root.road_network, document.folder, collector)
+    check_rules(root, read.version, library.entries, collector)
+    warnings = collector.raise_on_error()
     objects = list(scenario_objects(root.entities, library.entries))
     return Scenario(
         name=document.path.stem if document.path else " ".join(root.file_header.description.split()) or document.name,
@@ -142,7 +142,7 @@ def load_scenario(source: Source, parameters: Mapping[str, str | Assignment] | N
         assigned=assignments,
         digest=document.digest,
         catalogs=library.digests,
-        scope=Scope(parameters=dict(read.parameters), budget=findings.budget),
+        scope=Scope(parameters=dict(read.parameters), budget=collector.budget),
     )
 
 

@@ -87,8 +87,8 @@ class Recording:
     def _skip(self, tick: int, error: ValueError, skipped: Callable[[str], None] | None) -> None:
         reason = f"frame {tick} does not read: {error}"
         if not self.damage:
-            remedy = f"read it with the version that wrote it ({self.metadata.get('eidrive-scenario', 'unknown')})"
-            raise InputError(Diagnostic(reason, remedy, str(self.path))) from error
+            hint = f"read it with the version that wrote it ({self.metadata.get('eidrive-scenario', 'unknown')})"
+            raise InputError(Diagnostic(reason, hint, str(self.path))) from error
         if skipped is not None:
             skipped(reason)
 

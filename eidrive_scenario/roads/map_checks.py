@@ -73,8 +73,8 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         turn = abs(wrap_angle(start.h - end.h))
         if apart > JUMP:
             what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
-            remedy = "let each geometry begin where the one before ends"
-            yield MapWarning("geometry-gap", "such jumps", what, remedy, other.line)
+            hint = "let each geometry begin where the one before ends"
+            yield MapWarning("geometry-gap", "such jumps", what, hint, other.line)
         elif KINK < turn < CORNER:
             what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
             yield MapWarning(
@@ -155,8 +155,8 @@ def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lan
             if number not in there:
                 word = "successor" if side > 0 else "predecessor"
                 what = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
-                remedy = "known: " + ", ".join(map(str, sorted(there)))
-                yield MapWarning("lane-link", "links to lanes that do not exist", what, remedy, lane.line)
+                hint = "known: " + ", ".join(map(str, sorted(there)))
+                yield MapWarning("lane-link", "links to lanes that do not exist", what, hint, lane.line)
 
 
 def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
@@ -184,8 +184,8 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
     if link is not None:
         what += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
-        remedy = "add a <laneLink> from it to a <connection>"
-        return MapWarning("lane-link", "lanes that lead nowhere at junctions", what, remedy, lane.line)
+        hint = "add a <laneLink> from it to a <connection>"
+        return MapWarning("lane-link", "lanes that lead nowhere at junctions", what, hint, lane.line)
     return MapWarning("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
 
 
@@ -244,12 +244,12 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     touches = any(link.element_type == "junction" and link.element_id == junction.id for link in ends)
     if junction.type == "default" and not touches:
         what = f"{name} comes from road {incoming.id!r}, which does not end at the junction"
-        remedy = "link that road to the junction, or correct incomingRoad"
-        yield MapWarning(rule, "connections from elsewhere", what, remedy, connection.line)
+        hint = "link that road to the junction, or correct incomingRoad"
+        yield MapWarning(rule, "connections from elsewhere", what, hint, connection.line)
     if junction.type == "default" and connecting.junction_id != junction.id:
         what = f"{name} takes road {connecting.id!r}, which is not of this junction"
-        remedy = f"give that road junction={junction.id!r}, or correct connectingRoad"
-        yield MapWarning(rule, "connections by roads outside", what, remedy, connection.line)
+        hint = f"give that road junction={junction.id!r}, or correct connectingRoad"
+        yield MapWarning(rule, "connections by roads outside", what, hint, connection.line)
     side, other_side = (
         side_at(incoming, junction, connecting, connection.contact),
         1 if connection.contact == "end" else -1,
@@ -260,14 +260,14 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     ]
     if driven and all(incoming.directions[n] == -side and connecting.directions[m] == other_side for n, m in driven):
         what = f"{name} leads against the traffic of the roads {incoming.id!r} and {connecting.id!r}"
-        remedy = 'swap them; where traffic keeps to the left, give the roads rule="LHT"'
-        yield MapWarning(rule, "connections against the traffic", what, remedy, connection.line)
+        hint = 'swap them; where traffic keeps to the left, give the roads rule="LHT"'
+        yield MapWarning(rule, "connections against the traffic", what, hint, connection.line)
     for number, target in connection.lane_links:
         for lane, known, road in ((number, here, incoming), (target, there, connecting)):
             if lane not in known:
                 what = f"{name} links lane {lane} of road {road.id!r}, which it does not have there"
-                remedy = "known: " + ", ".join(map(str, sorted(known)))
-                yield MapWarning(rule, "links of lanes that do not exist", what, remedy, connection.line)
+                hint = "known: " + ", ".join(map(str, sorted(known)))
+                yield MapWarning(rule, "links of lanes that do not exist", what, hint, connection.line)
     if not connection.lane_links and not set(here) & set(there) - {0}:
         what = f"{name} links no lane"
         yield MapWarning(rule, "connections without lanes", what, "add a <laneLink>", connection.line)

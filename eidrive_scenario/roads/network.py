@@ -96,8 +96,8 @@ class RoadNetwork(RoadAttributes):
         try:
             return parse_geo_reference(text)
         except ValueError as error:
-            remedy = "write <geoReference> as a PROJ text, such as +proj=utm +zone=32 +datum=WGS84"
-            raise PositionError(Diagnostic(str(error), remedy, self.source)) from error
+            hint = "write <geoReference> as a PROJ text, such as +proj=utm +zone=32 +datum=WGS84"
+            raise PositionError(Diagnostic(str(error), hint, self.source)) from error
 
     @cached_property
     def _locator(self) -> Locator:

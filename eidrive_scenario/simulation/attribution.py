@@ -74,7 +74,7 @@ def report_extension(error: BaseException, *, time: float | None = None, observe
     place = extension_place(calls, time=time, observers=observers)
     if place is None or type(error).__module__.partition(".")[0] in _CONTROL_FLOW:
         return
-    raise ExtensionError(place, _problem(error, calls, place)) from error
+    raise ExtensionError(place, _diagnostic(error, calls, place)) from error
 
 
 Result = TypeVar("Result")
@@ -260,7 +260,7 @@ def _place_of_method(error: InvalidResult, calls: Sequence[_Call], time: float |
     return ExtensionPlace(kind, name, value, whom, time, file, line, error.method)
 
 
-def _problem(error: BaseException, calls: Sequence[_Call], place: ExtensionPlace) -> str:
+def _diagnostic(error: BaseException, calls: Sequence[_Call], place: ExtensionPlace) -> str:
     """The exception in a line, and where it was raised if that is not the extension's own code."""
     text = "".join(traceback.format_exception_only(type(error), error)).strip()
     if isinstance(error, SystemExit):

@@ -40,18 +40,18 @@ def check_commands(scenario: Scenario) -> None:
         ),
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }
-    problems: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     for command in scenario.custom_commands:
         if not command.type.startswith(PREFIX):
             continue
         reader = readers.get(command.type)
         if reader is None:
             what = f"unknown command type {command.type!r}"
-            problems.append(Diagnostic(what, suggestion(command.type, readers), command.source, command.line))
+            diagnostics.append(Diagnostic(what, suggestion(command.type, readers), command.source, command.line))
             continue
         try:
             reader(command)
         except InputError as error:
-            problems += error.diagnostics
-    if problems:
-        raise ScenarioError(list(dict.fromkeys(problems)))
+            diagnostics += error.diagnostics
+    if diagnostics:
+        raise ScenarioError(list(dict.fromkeys(diagnostics)))

@@ -19,8 +19,8 @@ _NUMBER = int | float | np.integer | np.floating
 def check_interval(channel: Channel, interval: Any) -> None:
     """Raise InvalidResult unless the interval between messages [s] is a finite number from 0 on."""
     if not isinstance(interval, _NUMBER) or not 0.0 <= interval < math.inf:
-        problem = f"returned {interval!r} (expected a finite number from 0 on)"
-        raise InvalidResult(channel, "min_message_interval", problem)
+        diagnostic = f"returned {interval!r} (expected a finite number from 0 on)"
+        raise InvalidResult(channel, "min_message_interval", diagnostic)
 
 
 def check_delivered(channel: Channel, delivered: Any, now: float) -> None:

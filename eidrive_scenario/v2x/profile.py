@@ -72,10 +72,10 @@ def load_profile(
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
         what = f"no {kind} {quoted(str(source))}"
-        remedy = suggestion(source.stem, names)
+        hint = suggestion(source.stem, names)
         if is_regular_file(source):
-            what, remedy = f"the file {quoted(str(source))} is no channel profile", "give one that ends in .yaml"
-        raise SettingError(Diagnostic(what, remedy, origin, line))
+            what, hint = f"the file {quoted(str(source))} is no channel profile", "give one that ends in .yaml"
+        raise SettingError(Diagnostic(what, hint, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
 
@@ -144,10 +144,10 @@ def _parse(
     model = data.get("model", ChannelProfile.model_fields["model"].default)
     models = registry("channels")
     if not isinstance(model, str) or model not in models:
-        problem = Diagnostic(
+        diagnostic = Diagnostic(
             f"unknown channel model {quoted(model)}", suggestion(str(model), models), source, lines.get("model", line)
         )
-        raise SettingError(problem)
+        raise SettingError(diagnostic)
     settings = getattr(models.load(model, Channel), "settings", None)
     if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
         raise RegistryError(f"the channel model {model!r} has no `settings`, a class derived from ChannelProfile")

@@ -125,7 +125,7 @@ def load_weather(source: str | Path, *, origin: str = "") -> Weather:
     try:
         path = resolve("weather", source)
     except SettingError as error:
-        raise SettingError([replace(problem, source=origin) for problem in error.diagnostics]) from error
+        raise SettingError([replace(diagnostic, source=origin) for diagnostic in error.diagnostics]) from error
     data, lines = load_yaml_file(path)
     if not isinstance(data, Mapping):
         found = "nothing" if data is None else type(data).__name__

@@ -235,7 +235,7 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Any
     warnings: list[str] = []
 
     def look(simulation: Any, frame: Any) -> None:
-        warnings[:] = [str(problem) for problem in simulation.storyboard.context.warnings]
+        warnings[:] = [str(diagnostic) for diagnostic in simulation.storyboard.context.warnings]
 
     if later:
         played = run(3, ("Ego", action, after(0.45)), driven=False, during=look)

@@ -261,7 +261,7 @@ def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
 def test_what_makes_no_sense_is_told_before_the_run(run: Run, inside: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
         run(1.0, globally=traffic(inside))
-    assert all(problem.line for problem in caught.value.diagnostics)
+    assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
 
 
 def test_a_source_far_from_all_lanes_is_told(run: Run) -> None:

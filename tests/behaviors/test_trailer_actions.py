@@ -84,7 +84,7 @@ def test_who_is_a_trailer_of_itself_is_refused(run: Any) -> None:
     train = link("Front", "A") + link("A", "B") + link("B", "A")
     with pytest.raises(InputError) as caught:
         run(1, driven=False, more=train, globally=everywhere(PLACE.format("Front", 200)))
-    messages = [problem.message for problem in caught.value.diagnostics]
+    messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
     assert messages == ["'A' is a trailer of itself", "'B' is a trailer of itself"]
 
 

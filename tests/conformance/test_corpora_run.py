@@ -82,7 +82,7 @@ def _placed(private: object) -> bool:
 def test_a_broken_scenario_says_what_is_wrong_with_it(name: str, record_property: pytest.RecordProperty) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(Path(CORPORA) / name)
-    assert all(problem.line for problem in caught.value.diagnostics)
+    assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
     record_property(END, f"{name}: refused, as {BROKEN[name]} at line {caught.value.diagnostics[0].line}")
 
 

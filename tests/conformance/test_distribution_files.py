@@ -84,11 +84,11 @@ def test_check_tells_of_such_runs() -> None:
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)
 def test_every_value_makes_a_scenario(path: Path) -> None:
     """Nothing is wrong with any; some of their combinations are outside constraints, which is a warning."""
-    findings = check_distribution(path)
-    assert findings.errors == ()
-    own = [warning for warning in findings.warnings if warning.source == str(path)]
+    collector = check_distribution(path)
+    assert collector.errors == ()
+    own = [warning for warning in collector.warnings if warning.source == str(path)]
     assert all("outside its constraints" in warning.message for warning in own)
-    assert findings.runs == len(load_distribution(path))
+    assert collector.runs == len(load_distribution(path))
 
 
 @pytest.mark.parametrize("path", distributions(), ids=lambda path: path.stem)

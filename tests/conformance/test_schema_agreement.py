@@ -86,16 +86,16 @@ class Judged:
     what: str
     schema: tuple[str, ...]
     """What the schema has against it."""
-    problems: tuple[str, ...]
+    errors: tuple[str, ...]
 
     @property
     def agreed(self) -> bool:
         """Whether both find it valid, or both find it invalid."""
-        return bool(self.schema) == bool(self.problems)
+        return bool(self.schema) == bool(self.errors)
 
     def explanations(self) -> set[tuple[str, str, str]]:
         """Why they disagree: who refuses it, for what, and why the other does not; what is unexplained has no why."""
-        return {self._explained("we", message, OURS_ALONE) for message in self.problems} | {
+        return {self._explained("we", message, OURS_ALONE) for message in self.errors} | {
             self._explained("the schema", message, THEIRS_ALONE) for message in self.schema
         }
 
@@ -124,9 +124,9 @@ class Judge:
         schema = self._schemas[self.version_of(root) or otherwise]
         valid = schema.validate(root)
         complaints = () if valid else tuple(str(entry.message) for entry in schema.error_log)
-        findings = DiagnosticCollector()
-        read_root(open_document(xml), findings)
-        return Judged(what, complaints, tuple(problem.message for problem in findings.problems))
+        collector = DiagnosticCollector()
+        read_root(open_document(xml), collector)
+        return Judged(what, complaints, tuple(diagnostic.message for diagnostic in collector.errors))
 
 
 Mutation = Callable[[etree._Element, random.Random, "Pool"], None]
@@ -269,8 +269,8 @@ def table(judged: list[Judged]) -> list[str]:
 
 def assert_explained(judged: list[Judged], capsys: pytest.CaptureFixture[str]) -> None:
     lines = table(judged)
-    valid = sum(one.agreed and not one.problems for one in judged)
-    invalid = sum(one.agreed and bool(one.problems) for one in judged)
+    valid = sum(one.agreed and not one.errors for one in judged)
+    invalid = sum(one.agreed and bool(one.errors) for one in judged)
     others = len(judged) - valid - invalid
     lines.insert(0, f"{len(judged)} judged: {valid} valid for both, {invalid} invalid for both, {others} not alike")
     with capsys.disabled():

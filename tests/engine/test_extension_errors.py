@@ -60,13 +60,13 @@ def test_run_of_sound_extensions_passes(package: Path, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_exception_of_extension_names_it_with_time_and_line(
-    package: Path, tmp_path: Path, extensions: dict[str, str], place: str, time: float, line: str, problem: str
+    package: Path, tmp_path: Path, extensions: dict[str, str], place: str, time: float, line: str, diagnostic: str
 ) -> None:
     error = error_of(tmp_path, **extensions)
     assert str(error.place).split(": ", 1)[1].startswith(place)
     assert (error.place.file, error.place.line) == (str(package / "faulty.py"), line_of(line))
     assert error.place.time == pytest.approx(time)
-    assert error.problem.startswith(problem)
+    assert error.description.startswith(diagnostic)
 
 
 def test_exception_of_action_or_condition_names_its_place_in_the_scenario(package: Path, tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_exception_of_built_in_extension_names_it(
     error = error_of(tmp_path)
     assert str(error.place).endswith("detector 'oracle' (eidrive_scenario.perception.oracle:OracleDetector) "
                                      "of station 'Ego' at t = 0.000 s")  # fmt: skip
-    assert error.problem.startswith("ZeroDivisionError: division by zero")
+    assert error.description.startswith("ZeroDivisionError: division by zero")
 
 
 def test_extension_error_survives_pickling(package: Path, tmp_path: Path) -> None:
@@ -160,10 +160,10 @@ def test_keyboard_interrupt_of_extension_interrupts_the_run(
     ],
 )
 def test_invalid_result_of_extension_names_it_and_what_is_expected(
-    package: Path, tmp_path: Path, extensions: dict[str, str], problem: str
+    package: Path, tmp_path: Path, extensions: dict[str, str], diagnostic: str
 ) -> None:
     error = error_of(tmp_path, **extensions)
-    assert error.problem.startswith(problem)
+    assert error.description.startswith(diagnostic)
     assert error.place.value.startswith("faulty:")
     assert error.place.file == str(package / "faulty.py")
     assert error.place.line is not None
@@ -172,7 +172,7 @@ def test_invalid_result_of_extension_names_it_and_what_is_expected(
 def test_action_that_leaves_its_actor_with_nan_is_named(package: Path, tmp_path: Path) -> None:
     error = error_of(tmp_path, action="nan")
     assert error.place.name == "faulty.action"
-    assert error.problem.startswith("update left actor 'Ego' with motion.speed = nan")
+    assert error.description.startswith("update left actor 'Ego' with motion.speed = nan")
 
 
 # Extensions that cannot be loaded
@@ -192,8 +192,10 @@ def test_action_that_leaves_its_actor_with_nan_is_named(package: Path, tmp_path:
         ("faulty_import", "does not load: No module named 'no_such_module' (FOLDER/faulty_import.py:1)"),
     ],
 )
-def test_extension_that_cannot_be_loaded_is_named(package: Path, tmp_path: Path, detector: str, problem: str) -> None:
-    text = re.escape(problem.replace("FOLDER", str(package)))
+def test_extension_that_cannot_be_loaded_is_named(
+    package: Path, tmp_path: Path, detector: str, diagnostic: str
+) -> None:
+    text = re.escape(diagnostic.replace("FOLDER", str(package)))
     with pytest.raises(RegistryError, match=rf"detectors '{detector}' \(faulty\w*:\w+\).*{text}"):
         run(tmp_path, detector=detector)
 
@@ -201,7 +203,7 @@ def test_extension_that_cannot_be_loaded_is_named(package: Path, tmp_path: Path,
 def test_planner_with_another_constructor_is_named(package: Path, tmp_path: Path) -> None:
     error = error_of(tmp_path, planner="planner_arguments")
     assert error.place.name == "planner_arguments"
-    assert "TypeError" in error.problem
+    assert "TypeError" in error.description
 
 
 # Observers

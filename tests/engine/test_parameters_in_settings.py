@@ -133,8 +133,8 @@ def test_controller_of_a_catalog_uses_its_own_parameters(make: Make, tmp_path: P
     (tmp_path / "stacks.xosc").write_text(catalog.replace("${$West", "${$Wst"))
     with pytest.raises(InputError) as caught:
         run_file(path)
-    (problem,) = caught.value.diagnostics
-    assert str(problem).endswith(
+    (diagnostic,) = caught.value.diagnostics
+    assert str(diagnostic).endswith(
         "stacks.xosc:1: setting 'conflict_area.2': unknown parameter $Wst; did you mean 'West'?"
     )
 

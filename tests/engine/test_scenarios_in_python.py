@@ -124,12 +124,12 @@ def test_a_mistake_has_the_line_that_the_file_would_have(cut_in: Build, tmp_path
     wrong = cut_in(changing="Taget")
     path = tmp_path / "cut_in.xosc"
     wrong.write_xml(str(path))
-    problems = []
+    diagnostics = []
     for source in (path, wrong):
         with pytest.raises(ScenarioError) as caught:
             load_scenario(source)
-        problems += caught.value.diagnostics
-    in_file, in_python = problems
+        diagnostics += caught.value.diagnostics
+    in_file, in_python = diagnostics
     assert "names the entity 'Taget', which is not there; did you mean 'Target'?" in str(in_python)
     assert in_python.source == "<Scenario>"
     assert in_python.line == in_file.line
@@ -184,14 +184,14 @@ def test_what_is_no_scenario_is_refused() -> None:
 
 
 def test_what_check_finds_it_finds_in_an_object(cut_in: Build) -> None:
-    findings = check_scenario(cut_in())
-    assert (findings.errors, findings.warnings) == ((), ())
+    collector = check_scenario(cut_in())
+    assert (collector.errors, collector.warnings) == ((), ())
     scenario = cut_in()
     scenario.parameters.add_parameter(xosc.Parameter("Speed", xosc.ParameterType.double, "3"))
     (unused,) = check_scenario(scenario).warnings
     assert str(unused).startswith("<Scenario>:5: the parameter 'Speed' is never used")
-    (problem,) = check_scenario(cut_in(changing="Taget")).errors
-    assert "did you mean 'Target'?" in problem.hint
+    (diagnostic,) = check_scenario(cut_in(changing="Taget")).errors
+    assert "did you mean 'Target'?" in diagnostic.hint
 
 
 def test_a_distribution_over_it(cut_in: Build) -> None:

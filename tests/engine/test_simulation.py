@@ -171,10 +171,10 @@ def test_a_wrong_setting_is_told_by_file_and_line_before_the_run(
     path = edited(old, new, tmp_path)
     with pytest.raises(InputError) as caught:
         Simulation(load_for_seed(path, 1, {}))
-    problem = caught.value.diagnostics[0]
-    assert expected in str(problem)
-    assert problem.source == str(path)
-    line = path.read_text().splitlines()[(problem.line or 0) - 1]
+    diagnostic = caught.value.diagnostics[0]
+    assert expected in str(diagnostic)
+    assert diagnostic.source == str(path)
+    line = path.read_text().splitlines()[(diagnostic.line or 0) - 1]
     assert new.strip('"')[:8] in line or "eidrive" in line
 
 

@@ -81,7 +81,7 @@ class AssignControllerAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         self._controller = self._found()
         if self._controller is not None and is_agent_controller(self._controller):
-            raise self.problem(
+            raise self.error(
                 "assigns an eidrive controller during the run",
                 "give it to the entity in ObjectController, and switch it by ActivateControllerAction",
             )

@@ -59,9 +59,9 @@ class LaneChangeAction(ActionBehaviour):
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = action.lane_change_target.absolute_target_lane
         if target is not None and not target.value.removeprefix("-").isdecimal():
-            raise self.problem(f"aims at lane {target.value!r}", "give the lane's number")
+            raise self.error(f"aims at lane {target.value!r}", "give the lane's number")
         if context.roads is None:
-            raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
+            raise self.error("needs a road network", "name one in RoadNetwork/LogicFile")
         self._roads = context.roads
         self._lane = 0
         self._tracker: RateLimitedValue | None = None
@@ -70,10 +70,10 @@ class LaneChangeAction(ActionBehaviour):
         """Find the target lane, and see the actor's place as an offset from its center."""
         here = self.context.location(self.actor.name)
         if here is None:
-            raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+            raise self.error(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
         self._lane = self._target_lane(here)
         if self._lane not in self._roads.lane_ids(here.road, here.s):
-            raise self.problem(
+            raise self.error(
                 f"aims at lane {self._lane} of road {here.road!r}, which it does not have at s = {here.s:.1f}",
                 f"its lanes there: {', '.join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))}",
             )
@@ -166,7 +166,7 @@ class LaneChangeAction(ActionBehaviour):
         name = target.relative_target_lane.entity_ref
         reference = self.context.location(name)
         if reference is None:
-            raise self.problem(f"counts lanes from {name}, which is on no road")
+            raise self.error(f"counts lanes from {name}, which is on no road")
         left = facing(self.context, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
         return count_lanes(reference.lane, target.relative_target_lane.value * left)
 

@@ -41,7 +41,7 @@ class LaneOffsetAction(ActionBehaviour):
         if motion.location is None:
             motion.snap_to_lane()
         if motion.location is None:
-            raise self.problem(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+            raise self.error(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
         self._lane = motion.location.road, motion.location.lane
         self._lay(motion.location)
 
@@ -96,10 +96,10 @@ class LaneOffsetAction(ActionBehaviour):
         name, roads = target.relative_target_lane_offset.entity_ref, self.context.roads
         other = self.context.location(name)
         if other is None or roads is None:
-            raise self.problem(f"counts from {name}, which is on no road")
+            raise self.error(f"counts from {name}, which is on no road")
         found = roads.distance(here, other)
         if found is None:
-            raise self.problem(f"counts from {name}, to which no road leads")
+            raise self.error(f"counts from {name}, to which no road leads")
         along = facing(self.context, self.actor.name, here) * same_way(self.context, self.actor.name, name, "lane")
         left = target.relative_target_lane_offset.value * along
         return here.offset + (found[1] + left) * self._way(here)

@@ -75,7 +75,7 @@ class AcquirePositionAction(ActionBehaviour):
             try:
                 route = self.context.roads.route(here, place.location)
             except RouteError as error:
-                raise self.problem(f"finds {error.diagnostics[0].message}", error.diagnostics[0].hint) from None
+                raise self.error(f"finds {error.diagnostics[0].message}", error.diagnostics[0].hint) from None
             follow(self, route)
         elif self.actor.driven:
             goal = self.actor.goal
@@ -107,7 +107,7 @@ class RandomRouteAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         self._starts = 0
         if context.roads is None:
-            raise self.problem("needs a road network", "name one in RoadNetwork/LogicFile")
+            raise self.error("needs a road network", "name one in RoadNetwork/LogicFile")
 
     def initialise(self) -> None:
         """Each start draws a way of its own."""

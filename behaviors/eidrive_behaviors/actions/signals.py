@@ -57,7 +57,7 @@ class TrafficSignalControllerAction(ActionBehaviour):
         cycle = context.signals.cycles.get(action.traffic_signal_controller_ref)
         phases = [phase.name for phase in cycle.phases] if cycle is not None else [action.phase]
         if action.phase not in phases:
-            raise self.problem(
+            raise self.error(
                 f"asks {action.traffic_signal_controller_ref!r} for a phase {action.phase!r}, which it does not have",
                 suggestion(action.phase, phases),
             )

@@ -41,7 +41,7 @@ class TrafficInstanceAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         self._instance: traffic.TrafficGenerator | None = None
         if context.roads is None:
-            raise self.problem("needs lanes to drive on", "name an OpenDRIVE file in RoadNetwork/LogicFile")
+            raise self.error("needs lanes to drive on", "name an OpenDRIVE file in RoadNetwork/LogicFile")
         self.check()
 
     @property
@@ -81,7 +81,7 @@ class TrafficInstanceAction(ActionBehaviour):
         """Raises ScenarioError for a number below 0."""
         for name, value in numbers.items():
             if value is not None and not value >= 0.0:
-                raise self.problem(f"has {name}={value:g}", "give a number of at least 0")
+                raise self.error(f"has {name}={value:g}", "give a number of at least 0")
 
     def mixture(self) -> traffic.TrafficMix:
         """Who the traffic is made of."""
@@ -108,11 +108,11 @@ class TrafficSwarmAction(TrafficInstanceAction):
         )
         speeds = self._speeds()
         if speeds is not None and not 0.0 <= speeds[0] <= speeds[1]:
-            raise self.problem(f"has speeds from {speeds[0]:g} to {speeds[1]:g} m/s", "give 0 <= lower <= upper")
+            raise self.error(f"has speeds from {speeds[0]:g} to {speeds[1]:g} m/s", "give 0 <= lower <= upper")
         for shares in (self._directions(), self._sectors()):
             if shares is not None and (min(shares) < 0.0 or not sum(shares) > 0.0):
                 listed = ", ".join(f"{share:g}" for share in shares)
-                raise self.problem(f"has the shares {listed}", "give shares of at least 0, not all 0")
+                raise self.error(f"has the shares {listed}", "give shares of at least 0, not all 0")
         self._mixture = self.mixture()
 
     def make(self) -> traffic.Swarm:
@@ -172,7 +172,7 @@ class TrafficSourceAction(TrafficInstanceAction):
             for sites in (ground.driving, ground.walking)
         )
         if not len(driving) and not len(walking):
-            raise self.problem(f"lies at x = {x:.1f} m, y = {y:.1f} m, where no lane is near", "move it to a lane")
+            raise self.error(f"lies at x = {x:.1f} m, y = {y:.1f} m, where no lane is near", "move it to a lane")
         return traffic.Source(
             self.traffic_name,
             self.background.key(self.traffic_name),

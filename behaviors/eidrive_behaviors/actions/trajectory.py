@@ -75,11 +75,9 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._timing = action.time_reference.timing
         if self._timing is not None and not has_times(self._trajectory.shape.chosen()):
             self._timing = None
-            remedy = (
-                f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
-            )
+            hint = f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
             what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
-            context.warnings += self.problem(what, f"{remedy}, or write <None/> for the TimeReference").diagnostics
+            context.warnings += self.error(what, f"{hint}, or write <None/> for the TimeReference").diagnostics
 
     @property
     def controls(self) -> Domain:

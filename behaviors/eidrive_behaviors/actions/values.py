@@ -83,7 +83,7 @@ def modified(
     try:
         value = float(text)
     except ValueError:
-        raise behaviour.problem(f"calculates with {name} = {text!r}", "give it a number first") from None
+        raise behaviour.error(f"calculates with {name} = {text!r}", "give it a number first") from None
     if rule.add_value is not None:
         value += rule.add_value.value
     elif rule.multiply_by_value is not None:

@@ -56,8 +56,8 @@ class TimeOfDayCondition(Condition):
         trees = (scenario.document, *scenario.entries.values())
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
             what = "TimeOfDayCondition never holds: no environment of the scenario has a TimeOfDay"
-            remedy = "give one by an EnvironmentAction in Init"
-            context.warnings.append(Diagnostic(what, remedy, self.element.source, self.element.line))
+            hint = "give one by an EnvironmentAction in Init"
+            context.warnings.append(Diagnostic(what, hint, self.element.source, self.element.line))
 
     def holds(self, context: RuntimeContext) -> bool:
         """Compare the clock."""

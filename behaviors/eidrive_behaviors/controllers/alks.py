@@ -79,14 +79,14 @@ class AlksDriver(ControllerModel):
             return ReferenceDriver(self._driver(full_stop))
         memoryless: dict[str, type[Regulation | Rss | Fsm]] = {"Regulation": Regulation, "RSS": Rss, "FSM": Fsm}
         if name not in memoryless:
-            raise self._problem(f"knows no model {name!r}", suggestion(name, MODELS))
+            raise self._diagnostic(f"knows no model {name!r}", suggestion(name, MODELS))
         return memoryless[name](full_stop=full_stop)
 
     def _driver(self, full_stop: bool) -> ReferenceDriverSettings:
         usual = ReferenceDriverSettings()
         mode = self.properties.get("cutInPerceptionDelayMode", "Dist")
         if mode not in ("Dist", "Time"):
-            raise self._problem(f"knows no cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
+            raise self._diagnostic(f"knows no cutInPerceptionDelayMode {mode!r}", suggestion(mode, ("Dist", "Time")))
         return ReferenceDriverSettings(
             pedestrians=number(self._controller, "pedestrianRiskEvaluationTime", usual.pedestrians),
             distance=0.72 if mode == "Dist" else None,
@@ -100,9 +100,9 @@ class AlksDriver(ControllerModel):
         text = self.properties.get(name)
         return usual if text is None else _TRUTH.get(text.strip().lower(), usual)
 
-    def _problem(self, message: str, remedy: str) -> ScenarioError:
+    def _diagnostic(self, message: str, hint: str) -> ScenarioError:
         here = self._controller
-        return ScenarioError(Diagnostic(f"the controller {here.name!r} {message}", remedy, here.source, here.line))
+        return ScenarioError(Diagnostic(f"the controller {here.name!r} {message}", hint, here.source, here.line))
 
 
 _TRUTH: Mapping[str, bool] = {"true": True, "1": True, "false": False, "0": False}

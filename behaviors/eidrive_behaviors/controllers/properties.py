@@ -22,6 +22,6 @@ def number(controller: model.Controller, name: str, usual: Usual, *, least: floa
         value = math.nan
     if math.isfinite(value) and value >= least:
         return value
-    remedy = "give it a number" if least == -math.inf else f"give it a number of at least {least:g}"
+    hint = "give it a number" if least == -math.inf else f"give it a number of at least {least:g}"
     message = f"the controller {controller.name!r} has the property {name} = {entry.value!r}"
-    raise ScenarioError(Diagnostic(message, remedy, entry.source, entry.line))
+    raise ScenarioError(Diagnostic(message, hint, entry.source, entry.line))

@@ -114,8 +114,8 @@ def impossible_routes(context: RoadLintContext) -> Iterator[Diagnostic]:
         try:
             build_route(route, context.roads, context.place, again=True)  # type: ignore[arg-type]
         except InputError as error:
-            for problem in error.diagnostics:
-                yield at(route, problem.message, problem.hint)
+            for diagnostic in error.diagnostics:
+                yield at(route, diagnostic.message, diagnostic.hint)
 
 
 def _routes(context: RoadLintContext) -> Iterator[Route]:

@@ -26,10 +26,10 @@ def missing_places(context: RoadLintContext) -> Iterator[Diagnostic]:
     """A position on a road or lane that is not there."""
     seen: set[Diagnostic] = set()
     for error in context.unresolved.values():
-        for problem in error.diagnostics:
-            if problem not in seen:
-                seen.add(problem)
-                yield problem
+        for diagnostic in error.diagnostics:
+            if diagnostic not in seen:
+                seen.add(diagnostic)
+                yield diagnostic
 
 
 def beyond_ends(context: RoadLintContext) -> Iterator[Diagnostic]:
@@ -68,5 +68,5 @@ def missing_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
         else:
             continue
         if name not in known and _ADDRESS not in name:
-            remedy = suggestion(name, known) if known else "the road file declares none"
-            yield at(element, f"the road network has no traffic signal {name!r}", remedy)
+            hint = suggestion(name, known) if known else "the road file declares none"
+            yield at(element, f"the road network has no traffic signal {name!r}", hint)

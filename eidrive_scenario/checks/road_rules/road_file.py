@@ -13,6 +13,6 @@ def map_warning_rule(rule: str) -> Callable[[RoadLintContext], Iterator[Diagnost
 
     def check(context: RoadLintContext) -> Iterator[Diagnostic]:
         if context.roads is not None:
-            yield from (problem for problem in context.roads.map_warnings if problem.rule == rule)
+            yield from (diagnostic for diagnostic in context.roads.map_warnings if diagnostic.rule == rule)
 
     return check

@@ -115,7 +115,7 @@ class SteppedRange:
 _NOWHERE = Diagnostic("")
 
 
-def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector) -> CartesianProduct:
+def combinations_of(deterministic: Deterministic, collector: DiagnosticCollector) -> CartesianProduct:
     """The distributions in the order of the file; what is wrong with them becomes a finding."""
     both: list[DeterministicMultiParameterDistribution | DeterministicSingleParameterDistribution] = [
         *deterministic.deterministic_multi_parameter_distribution,
@@ -124,39 +124,39 @@ def combinations_of(deterministic: Deterministic, findings: DiagnosticCollector)
     found: list[ValueSource] = []
     for distribution in sorted(both, key=lambda one: one.line):
         if isinstance(distribution, DeterministicMultiParameterDistribution):
-            found.append(_value_sets(distribution, findings))
+            found.append(_value_sets(distribution, collector))
         else:
-            choices = _single(distribution, findings)
+            choices = _single(distribution, collector)
             if choices is not None:
                 found.append(choices)
-    varied_once(((name, origin) for one in found for name, origin in one.names.items()), findings)
+    varied_once(((name, origin) for one in found for name, origin in one.names.items()), collector)
     magnitude = sum(math.log10(one.count) for one in found if one.count)
     if magnitude > math.log10(sys.maxsize):
         count = f"{10.0**magnitude:.1e}" if magnitude < 300.0 else f"1e{int(magnitude)}"
         message = f"the distribution unfolds into {count} runs"
-        remedy = "take wider steps in its ranges"
-        findings.error(message, remedy, source=deterministic.source, line=deterministic.line)
+        hint = "take wider steps in its ranges"
+        collector.error(message, hint, source=deterministic.source, line=deterministic.line)
         return CartesianProduct(())
     return CartesianProduct(tuple(found))
 
 
-def varied_once(names: Iterable[tuple[str, Diagnostic]], findings: DiagnosticCollector) -> None:
+def varied_once(names: Iterable[tuple[str, Diagnostic]], collector: DiagnosticCollector) -> None:
     """Reports every parameter that more than one distribution gives a value."""
     seen: dict[str, Diagnostic] = {}
     for name, origin in names:
         if name in seen:
             message = f"the parameter {name!r} is varied by another distribution too"
-            findings.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
+            collector.error(message, f"see line {seen[name].line}", source=origin.source, line=origin.line)
         seen.setdefault(name, origin)
 
 
-def _value_sets(distribution: DeterministicMultiParameterDistribution, findings: DiagnosticCollector) -> ListedValues:
+def _value_sets(distribution: DeterministicMultiParameterDistribution, collector: DiagnosticCollector) -> ListedValues:
     choices = []
     for value_set in distribution.value_set_distribution.parameter_value_set:
         choice: dict[str, Assignment] = {}
         for one in value_set.parameter_assignment:
             if one.parameter_ref in choice:
-                findings.error(
+                collector.error(
                     f"the set assigns {one.parameter_ref!r} twice", "remove one", source=one.source, line=one.line
                 )
             choice[one.parameter_ref] = Assignment(one.value, place(one))
@@ -165,24 +165,24 @@ def _value_sets(distribution: DeterministicMultiParameterDistribution, findings:
 
 
 def _single(
-    distribution: DeterministicSingleParameterDistribution, findings: DiagnosticCollector
+    distribution: DeterministicSingleParameterDistribution, collector: DiagnosticCollector
 ) -> ValueSource | None:
     name = distribution.parameter_name
     if distribution.distribution_set is not None:
         elements = distribution.distribution_set.element
         return ListedValues(tuple({name: Assignment(one.value, place(one))} for one in elements))
     if distribution.distribution_range is not None:
-        return _steps(name, distribution.distribution_range, findings)
-    refuse_user_defined(distribution, name, "DistributionSet or DistributionRange", findings)
+        return _steps(name, distribution.distribution_range, collector)
+    refuse_user_defined(distribution, name, "DistributionSet or DistributionRange", collector)
     return None
 
 
-def _steps(name: str, given: DistributionRange, findings: DiagnosticCollector) -> SteppedRange | None:
+def _steps(name: str, given: DistributionRange, collector: DiagnosticCollector) -> SteppedRange | None:
     """From the lower limit on, a step at a time, as long as the value is not above the upper limit."""
-    if not valid_range(given.range, findings, finite=True):
+    if not valid_range(given.range, collector, finite=True):
         return None
     if not (math.isfinite(given.step_width) and given.step_width > 0):
-        findings.error(
+        collector.error(
             f"stepWidth is {written(given.step_width)}",
             "give a number above zero",
             source=given.source,
@@ -199,23 +199,23 @@ def _exact(value: float) -> Fraction:
     return Fraction(repr(value))
 
 
-def valid_range(given: Range, findings: DiagnosticCollector, *, finite: bool = False) -> bool:
+def valid_range(given: Range, collector: DiagnosticCollector, *, finite: bool = False) -> bool:
     """Whether the limits are numbers in order; if they are not, that is a finding."""
     lower, upper = given.lower_limit, given.upper_limit
     if math.isnan(lower) or math.isnan(upper) or lower > upper:
         message = f"the range from {written(lower)} to {written(upper)} is empty"
-        findings.error(message, "lowerLimit has to be at most upperLimit", source=given.source, line=given.line)
+        collector.error(message, "lowerLimit has to be at most upperLimit", source=given.source, line=given.line)
         return False
     if math.inf in (lower, -upper) or (finite and math.inf in (-lower, upper)):
         message = f"the range from {written(lower)} to {written(upper)} has no end"
-        findings.error(message, "give finite limits", source=given.source, line=given.line)
+        collector.error(message, "give finite limits", source=given.source, line=given.line)
         return False
     return True
 
 
-def refuse_user_defined(element: Element, name: str, instead: str, findings: DiagnosticCollector) -> None:
+def refuse_user_defined(element: Element, name: str, instead: str, collector: DiagnosticCollector) -> None:
     """What only another tool understands cannot be unfolded."""
-    findings.error(
+    collector.error(
         f"the values of {name!r} come from a UserDefinedDistribution, whose meaning is left to a tool",
         f"write {instead}",
         source=element.source,

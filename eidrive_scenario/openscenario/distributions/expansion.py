@@ -107,25 +107,25 @@ def load_distribution(source: Source, *, seed: float = 1) -> DistributionExpansi
     Raises ScenarioError with everything that is wrong with the file, each as file:line.
     """
     document = open_document(source)
-    findings = DiagnosticCollector()
-    read = read_root(document, findings)
+    collector = DiagnosticCollector()
+    read = read_root(document, collector)
     distribution = read.root.parameter_value_distribution if read is not None else None
-    if read is None or distribution is None or findings.problems:
-        findings.raise_on_error()
+    if read is None or distribution is None or collector.errors:
+        collector.raise_on_error()
         raise ScenarioError(_other_kind(read.root if read else None, document.name))
-    varied = _varied(distribution, seed, findings)
-    report = findings.error if document.path is not None else findings.warning
+    varied = _varied(distribution, seed, collector)
+    report = collector.error if document.path is not None else collector.warning
     scenario = _scenario_file(distribution.scenario_file, document.folder, report)
-    return DistributionExpansion(document.name, scenario, varied, findings.raise_on_error())
+    return DistributionExpansion(document.name, scenario, varied, collector.raise_on_error())
 
 
 def _varied(
-    distribution: ParameterValueDistribution, seed: float, findings: DiagnosticCollector
+    distribution: ParameterValueDistribution, seed: float, collector: DiagnosticCollector
 ) -> CartesianProduct | StochasticSampler:
     if distribution.stochastic is not None:
-        return draws_of(distribution.stochastic, seed, findings)
+        return draws_of(distribution.stochastic, seed, collector)
     assert distribution.deterministic is not None
-    return combinations_of(distribution.deterministic, findings)
+    return combinations_of(distribution.deterministic, collector)
 
 
 def _scenario_file(given: File, folder: Path, report: Callable[..., None]) -> Path:

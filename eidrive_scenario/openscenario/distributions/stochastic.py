@@ -50,22 +50,22 @@ _MOST_EVENTS = 2.0**53
 """Whole numbers beyond have no neighbors among floating-point numbers."""
 
 
-def quantile_of(distribution: StochasticDistribution, findings: DiagnosticCollector) -> Quantile | None:
+def quantile_of(distribution: StochasticDistribution, collector: DiagnosticCollector) -> Quantile | None:
     """How the parameter's value follows from a share; None where the distribution is wrong, which is a finding."""
     chosen = distribution.chosen()
     build = _BUILD.get(type(chosen))
     if build is None:
         instead = ", ".join(sorted(kind.__name__ for kind in _BUILD))
-        refuse_user_defined(chosen, distribution.parameter_name, f"one of {instead}", findings)
+        refuse_user_defined(chosen, distribution.parameter_name, f"one of {instead}", collector)
         return None
-    before = len(findings.problems)
-    quantile: Quantile = build(chosen, findings)
-    if len(findings.problems) > before:
+    before = len(collector.errors)
+    quantile: Quantile = build(chosen, collector)
+    if len(collector.errors) > before:
         return None
     for share in (_SMALLEST, _LARGEST):
         value = quantile(share)
         if isinstance(value, float) and not math.isfinite(value):
-            _wrong(chosen, "reaches beyond what a number can hold", "cut it off at a Range", findings)
+            _wrong(chosen, "reaches beyond what a number can hold", "cut it off at a Range", collector)
             return None
     return quantile
 
@@ -93,17 +93,17 @@ class StochasticSampler:
         return value if isinstance(value, str) else written(value)
 
 
-def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector) -> StochasticSampler:
+def draws_of(stochastic: Stochastic, seed: float, collector: DiagnosticCollector) -> StochasticSampler:
     """The distributions of the parameters; what is wrong with them becomes a finding.
 
     seed    for a file that names no randomSeed
     """
     if stochastic.number_of_test_runs < 1:
         message = "Stochastic asks for no test run"
-        findings.error(message, "give a number above zero", source=stochastic.source, line=stochastic.line)
+        collector.error(message, "give a number above zero", source=stochastic.source, line=stochastic.line)
     distributions = stochastic.stochastic_distribution
-    varied_once(((one.parameter_name, place(one)) for one in distributions), findings)
-    found = {one.parameter_name: quantile_of(one, findings) for one in distributions}
+    varied_once(((one.parameter_name, place(one)) for one in distributions), collector)
+    found = {one.parameter_name: quantile_of(one, collector) for one in distributions}
     return StochasticSampler(
         stochastic.number_of_test_runs,
         float(seed if stochastic.random_seed is None else stochastic.random_seed),
@@ -112,8 +112,8 @@ def draws_of(stochastic: Stochastic, seed: float, findings: DiagnosticCollector)
     )
 
 
-def _uniform(given: UniformDistribution, findings: DiagnosticCollector) -> Quantile:
-    valid_range(given.range, findings, finite=True)
+def _uniform(given: UniformDistribution, collector: DiagnosticCollector) -> Quantile:
+    valid_range(given.range, collector, finite=True)
     return partial(_from_range, given.range.lower_limit, given.range.upper_limit)
 
 
@@ -121,28 +121,28 @@ def _from_range(lower: float, upper: float, share: float) -> float:
     return min(max(lower * (1 - share) + upper * share, lower), upper)
 
 
-def _normal(given: NormalDistribution, findings: DiagnosticCollector) -> Quantile:
-    lower, upper = _limits(given.range, findings)
-    _check_normal(given, findings)
+def _normal(given: NormalDistribution, collector: DiagnosticCollector) -> Quantile:
+    lower, upper = _limits(given.range, collector)
+    _check_normal(given, collector)
     return partial(_from_normal, given.expected_value, math.sqrt(max(given.variance, 0)), lower, upper)
 
 
-def _log_normal(given: LogNormalDistribution, findings: DiagnosticCollector) -> Quantile:
+def _log_normal(given: LogNormalDistribution, collector: DiagnosticCollector) -> Quantile:
     """Expected value and variance are those of the logarithm: the standard lets the former be negative."""
-    lower, upper = _limits(given.range, findings)
-    _check_normal(given, findings)
+    lower, upper = _limits(given.range, collector)
+    _check_normal(given, collector)
     if given.range is not None and lower <= 0:
         _wrong(
-            given.range, f"has the lower limit {written(lower)}", "that of LogNormalDistribution is above 0", findings
+            given.range, f"has the lower limit {written(lower)}", "that of LogNormalDistribution is above 0", collector
         )
     return partial(_from_log_normal, given.expected_value, math.sqrt(max(given.variance, 0)), max(lower, 0), upper)
 
 
-def _check_normal(given: NormalDistribution | LogNormalDistribution, findings: DiagnosticCollector) -> None:
+def _check_normal(given: NormalDistribution | LogNormalDistribution, collector: DiagnosticCollector) -> None:
     if not math.isfinite(given.expected_value):
-        _wrong(given, f"has the expected value {written(given.expected_value)}", "give a finite number", findings)
+        _wrong(given, f"has the expected value {written(given.expected_value)}", "give a finite number", collector)
     if not 0 < given.variance < math.inf:
-        _wrong(given, f"has the variance {written(given.variance)}", "give a number above zero", findings)
+        _wrong(given, f"has the variance {written(given.variance)}", "give a number above zero", collector)
 
 
 def _from_normal(mean: float, deviation: float, lower: float, upper: float, share: float) -> float:
@@ -171,17 +171,19 @@ def _standard_normal(low: float, high: float, share: float) -> float:
     return min(max(float(ndtri_exp(above + math.log(ratio + share * (1 - ratio)))), low), high)
 
 
-def _poisson(given: PoissonDistribution, findings: DiagnosticCollector) -> Quantile:
+def _poisson(given: PoissonDistribution, collector: DiagnosticCollector) -> Quantile:
     mean = given.expected_value
-    lower, upper = _limits(given.range, findings)
+    lower, upper = _limits(given.range, collector)
     low = max(0, math.ceil(lower)) if math.isfinite(lower) else 0
     high = math.floor(upper) if math.isfinite(upper) else None
     if not 0 < mean < _MOST_EVENTS:
-        _wrong(given, f"has the expected value {written(mean)}", f"give one between 0 and {_MOST_EVENTS:.0f}", findings)
+        _wrong(
+            given, f"has the expected value {written(mean)}", f"give one between 0 and {_MOST_EVENTS:.0f}", collector
+        )
     elif high is not None and high < low:
-        _wrong(given, "has a range without a whole number from 0 on", "it counts events", findings)
+        _wrong(given, "has a range without a whole number from 0 on", "it counts events", collector)
     elif _less(mean, low, high, None) == _less(mean, low, high, low):
-        _wrong(given, "has no probability left in its range", "bring range and expected value together", findings)
+        _wrong(given, "has no probability left in its range", "bring range and expected value together", collector)
     return partial(_from_poisson, mean, low, high)
 
 
@@ -214,18 +216,18 @@ def _less(mean: float, low: int, high: int | None, count: int | None) -> float:
     return 1.0 if count is None else float(pdtr(count - 1, mean)) if count > 0 else 0.0
 
 
-def _histogram(given: Histogram, findings: DiagnosticCollector) -> Quantile:
-    if all([valid_range(one.range, findings, finite=True) for one in given.bin]):
-        _check_overlap(given.bin, findings)
+def _histogram(given: Histogram, collector: DiagnosticCollector) -> Quantile:
+    if all([valid_range(one.range, collector, finite=True) for one in given.bin]):
+        _check_overlap(given.bin, collector)
     limits = tuple((one.range.lower_limit, one.range.upper_limit) for one in given.bin)
-    return partial(_from_histogram, limits, _accumulated(given, given.bin, findings))
+    return partial(_from_histogram, limits, _accumulated(given, given.bin, collector))
 
 
-def _check_overlap(bins: tuple[HistogramBin, ...], findings: DiagnosticCollector) -> None:
+def _check_overlap(bins: tuple[HistogramBin, ...], collector: DiagnosticCollector) -> None:
     for before, after in pairwise(sorted(bins, key=lambda one: (one.range.lower_limit, one.range.upper_limit))):
         if after.range.lower_limit < before.range.upper_limit:
             later = max(before, after, key=lambda one: one.line)
-            _wrong(later, "overlaps another", "the ranges of a histogram may only touch", findings)
+            _wrong(later, "overlaps another", "the ranges of a histogram may only touch", collector)
 
 
 def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[float, ...], share: float) -> float:
@@ -233,9 +235,9 @@ def _from_histogram(limits: tuple[tuple[float, float], ...], accumulated: tuple[
     return _from_range(*limits[index], within)
 
 
-def _value_set(given: ProbabilityDistributionSet, findings: DiagnosticCollector) -> Quantile:
+def _value_set(given: ProbabilityDistributionSet, collector: DiagnosticCollector) -> Quantile:
     values = tuple(one.value for one in given.element)
-    return partial(_from_values, values, _accumulated(given, given.element, findings))
+    return partial(_from_values, values, _accumulated(given, given.element, collector))
 
 
 def _from_values(values: tuple[str, ...], accumulated: tuple[float, ...], share: float) -> str:
@@ -245,15 +247,15 @@ def _from_values(values: tuple[str, ...], accumulated: tuple[float, ...], share:
 def _accumulated(
     given: Element,
     parts: tuple[HistogramBin, ...] | tuple[ProbabilityDistributionSetElement, ...],
-    findings: DiagnosticCollector,
+    collector: DiagnosticCollector,
 ) -> tuple[float, ...]:
     """The weights added up from the first part on."""
     for one in parts:
         if not 0 <= one.weight < math.inf:
-            _wrong(one, f"has the weight {written(one.weight)}", "give a number from zero on", findings)
+            _wrong(one, f"has the weight {written(one.weight)}", "give a number from zero on", collector)
     sums = tuple(accumulate(one.weight for one in parts))
     if not 0 < sums[-1] < math.inf and all(0 <= one.weight < math.inf for one in parts):
-        _wrong(given, f"has weights that add up to {written(sums[-1])}", "give weights above zero", findings)
+        _wrong(given, f"has weights that add up to {written(sums[-1])}", "give weights above zero", collector)
     return sums
 
 
@@ -265,16 +267,16 @@ def _weighed(accumulated: tuple[float, ...], share: float) -> tuple[int, float]:
     return index, (reached - start) / (accumulated[index] - start)
 
 
-def _limits(given: Range | None, findings: DiagnosticCollector) -> tuple[float, float]:
+def _limits(given: Range | None, collector: DiagnosticCollector) -> tuple[float, float]:
     if given is None:
         return -math.inf, math.inf
-    valid_range(given, findings)
+    valid_range(given, collector)
     return given.lower_limit, given.upper_limit
 
 
-def _wrong(element: Element, what: str, remedy: str, findings: DiagnosticCollector) -> None:
+def _wrong(element: Element, what: str, hint: str, collector: DiagnosticCollector) -> None:
     kind = type(element).__name__
-    findings.error(f"{kind} {what}", remedy, source=element.source, line=element.line)
+    collector.error(f"{kind} {what}", hint, source=element.source, line=element.line)
 
 
 _BUILD: dict[type[Element], Callable[[Any, DiagnosticCollector], Quantile]] = {

@@ -74,8 +74,8 @@ def _content(path: str | Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        problem = Diagnostic(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
-        raise ScenarioError(problem) from error
+        diagnostic = Diagnostic(f"cannot be read: {reason_of(error)}", "check the path", shortened(str(path)))
+        raise ScenarioError(diagnostic) from error
 
 
 def _from_tree(source: Any) -> Document:
@@ -92,8 +92,8 @@ def _from_tree(source: Any) -> Document:
         return Document(root, str(base or "<element>"), base, base.parent if base else Path(), digest=digest)
     if not isinstance(root, ElementTree.Element):
         what = "this is neither a path nor XML"
-        remedy = "give a path, bytes, an XML tree, or an object with get_element()"
-        raise ScenarioError(Diagnostic(what, remedy, name))
+        hint = "give a path, bytes, an XML tree, or an object with get_element()"
+        raise ScenarioError(Diagnostic(what, hint, name))
     text = _as_written(root, name)
     return Document(parse(text, name), name, None, Path(), text, _digest(text))
 

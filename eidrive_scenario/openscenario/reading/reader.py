@@ -53,10 +53,10 @@ class Reader:
     was built only if `findings` has no problems.
     """
 
-    def __init__(self, source: str, version: Version, findings: DiagnosticCollector) -> None:
+    def __init__(self, source: str, version: Version, collector: DiagnosticCollector) -> None:
         self.source = source
         self.version = version
-        self.findings = findings
+        self.collector = collector
         self.references: list[FoundReference] = []
         self.declared: Scope | None = None
         """The parameters that the element read declares itself."""
@@ -79,7 +79,7 @@ class Reader:
         self._with_text = set(cast(list[etree._Element], _WITH_TEXT(node)))
         self._with_space = set(cast(list[etree._Element], _WITH_SPACE(node)))
         open_assignments = dict(assignments or {})
-        element = self._element(node, cls, lent or Scope(budget=self.findings.budget), open_assignments)
+        element = self._element(node, cls, lent or Scope(budget=self.collector.budget), open_assignments)
         self._unknown_parameters(open_assignments, ())
         return element
 
@@ -120,8 +120,8 @@ class Reader:
                 values[rule.field] = self._value(node, name, text, rule, scope)
             elif name not in _IGNORED:
                 usage = known.other_attributes.get(name)
-                remedy = availability(usage, self.version) if usage else suggestion(name, known.attributes)
-                self._error(f"{node.tag} has no attribute {name!r}", remedy, node)
+                hint = availability(usage, self.version) if usage else suggestion(name, known.attributes)
+                self._error(f"{node.tag} has no attribute {name!r}", hint, node)
         for name, rule in known.attributes.items():
             if rule.required and name not in present:
                 self._error(f"{node.tag} lacks the attribute {name!r}", f"it is {rule.scalar.name}", node)
@@ -133,7 +133,7 @@ class Reader:
         except ExpressionError as error:
             self._flaws += 1
             if error.message:
-                self._error(f"{name} of {node.tag}: {error.message}", error.remedy, node)
+                self._error(f"{name} of {node.tag}: {error.message}", error.hint, node)
         except ValueError as error:
             if text == "None" and not rule.required:
                 self._by_python(name, node, text, "as Python writes what is missing; it is taken so", "leave it out")
@@ -166,7 +166,7 @@ class Reader:
         elif node in self._with_text:
             self._error(f"{node.tag} holds text, where only elements may stand", "remove the text", node)
         elif not known.children and node in self._with_space:
-            self.findings.warning(
+            self.collector.warning(
                 f"{node.tag} holds white space, where the schema wants nothing",
                 f"write <{node.tag} …/>",
                 source=self.source,
@@ -197,9 +197,9 @@ class Reader:
 
     def _chooses_nothing(self, node: etree._Element, cls: type[Element], known: Rules) -> None:
         """Up to 1.2 the schema lets an element choose nothing. That is in use where _MAY_BE_EMPTY says so."""
-        report = self.findings.warning if cls in _MAY_BE_EMPTY else self.findings.error
-        remedy = "it holds one of " + ", ".join(known.choice)
-        report(f"{node.tag} is empty", remedy, source=self.source, line=line_of(node))
+        report = self.collector.warning if cls in _MAY_BE_EMPTY else self.collector.error
+        hint = "it holds one of " + ", ".join(known.choice)
+        report(f"{node.tag} is empty", hint, source=self.source, line=line_of(node))
 
     def _declarations(self, node: etree._Element, scope: Scope, assignments: dict[str, Assignment]) -> Element:
         """Reads declarations one by one, so that each may use those before it."""
@@ -234,18 +234,18 @@ class Reader:
         if not sound:
             scope.parameters[name] = Parameter(name, "", "", "", is_valid=False)
             return declaration
-        declare(scope, declaration, given, self.findings)
+        declare(scope, declaration, given, self.collector)
         return replace(declaration, value=given.text) if given else declaration
 
     def _declared_twice(self, declaration: ParameterDeclaration, other: Parameter) -> None:
         message = f"the parameter {declaration.name!r} is declared twice"
-        report = self.findings.warning if declaration.value == other.declared else self.findings.error
+        report = self.collector.warning if declaration.value == other.declared else self.collector.error
         report(message, "rename or remove one", source=self.source, line=declaration.line)
 
     def _unknown_parameters(self, assignments: Mapping[str, Assignment], declared: Iterable[str]) -> None:
         for name, assignment in assignments.items():
             place = assignment.origin or Diagnostic("", "", self.source)
-            self.findings.error(
+            self.collector.error(
                 f"unknown parameter {name!r}", suggestion(name, declared), source=place.source, line=place.line
             )
 
@@ -255,19 +255,19 @@ class Reader:
         references = value if isinstance(value, tuple) else (value,)
         self.references.extend(FoundReference(reference, kinds) for reference in references)
 
-    def _by_python(self, name: str, node: etree._Element, text: str, what: str, remedy: str) -> None:
+    def _by_python(self, name: str, node: etree._Element, text: str, what: str, hint: str) -> None:
         """Warns of a word of Python's that is none of XML's; scenariogeneration 0.16 writes some."""
         message = f"{name} of {node.tag} is {quoted(text)}, {what}"
-        self.findings.warning(message, remedy, source=self.source, line=line_of(node))
+        self.collector.warning(message, hint, source=self.source, line=line_of(node))
 
     def _deprecated(self, what: str, since: str, node: etree._Element) -> None:
-        self.findings.warning(
+        self.collector.warning(
             f"{what} is deprecated since OpenSCENARIO {since}", source=self.source, line=line_of(node)
         )
 
-    def _error(self, message: str, remedy: str, node: etree._Element) -> None:
+    def _error(self, message: str, hint: str, node: etree._Element) -> None:
         self._flaws += 1
-        self.findings.error(message, remedy, source=self.source, line=line_of(node))
+        self.collector.error(message, hint, source=self.source, line=line_of(node))
 
 
 def _keep_scope(node: etree._Element, scope: Scope, values: dict[str, Any]) -> None:

@@ -28,7 +28,7 @@ class Workaround:
 
     element: str
     message: str
-    remedy: str
+    hint: str
     found: Callable[[etree._Element], bool]
     repair: Callable[[etree._Element], None]
     since: Version = (1, 0)
@@ -36,7 +36,7 @@ class Workaround:
 
 
 def apply_workarounds(
-    root: etree._Element, name: str, version: Version, findings: DiagnosticCollector
+    root: etree._Element, name: str, version: Version, collector: DiagnosticCollector
 ) -> etree._Element:
     """The tree as it is meant: itself, or a copy where something had to be put right, with a warning for each."""
     slips = {slip.element: slip for slip in WORKAROUNDS if slip.since <= version < slip.before}
@@ -45,7 +45,7 @@ def apply_workarounds(
         return root
     for node in wrong:
         slip = slips[str(node.tag)]
-        findings.warning(slip.message, slip.remedy, source=name, line=line_of(node))
+        collector.warning(slip.message, slip.hint, source=name, line=line_of(node))
     meant = copy.deepcopy(root)
     for node in list(meant.iter(*slips)):
         slip = slips[str(node.tag)]

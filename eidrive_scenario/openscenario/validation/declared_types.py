@@ -20,7 +20,7 @@ _TRUTH = ("true", "false")
 """Whatever their case: Python writes capitals."""
 
 
-def check_types(elements: Iterable[Element], findings: DiagnosticCollector) -> None:
+def check_types(elements: Iterable[Element], collector: DiagnosticCollector) -> None:
     """Warns of values that are declared, set or calculated with against the declared type."""
     elements = tuple(elements)
     types: dict[tuple[str, str], set[ParameterType]] = {}
@@ -30,14 +30,14 @@ def check_types(elements: Iterable[Element], findings: DiagnosticCollector) -> N
             if _misfits(one.value, one.variable_type):
                 declared = one.variable_type.value
                 what = f"the variable {one.name!r} is declared as {declared}, but its value is {one.value!r}"
-                findings.warning(what, "it is taken as a text", source=one.source, line=one.line)
+                collector.warning(what, "it is taken as a text", source=one.source, line=one.line)
         elif isinstance(one, ParameterDeclaration):
             types.setdefault(("parameter", one.name), set()).add(one.parameter_type)
     for one in elements:
         if isinstance(one, VariableAction):
-            _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), findings)
+            _check_action(one, "variable", one.variable_ref, types.get(("variable", one.variable_ref)), collector)
         elif isinstance(one, ParameterAction):
-            _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), findings)
+            _check_action(one, "parameter", one.parameter_ref, types.get(("parameter", one.parameter_ref)), collector)
 
 
 def _check_action(
@@ -45,7 +45,7 @@ def _check_action(
     kind: str,
     name: str,
     types: set[ParameterType] | None,
-    findings: DiagnosticCollector,
+    collector: DiagnosticCollector,
 ) -> None:
     """One action; several declarations of a name in different types leave open which one is meant."""
     if types is None or len(types) != 1:
@@ -54,10 +54,10 @@ def _check_action(
     setting = action.set_action
     if setting is not None and _misfits(setting.value, declared):
         what = f"the {kind} {name!r} is declared as {declared.value}, and here set to {setting.value!r}"
-        findings.warning(what, "it is taken as a text", source=setting.source, line=setting.line)
+        collector.warning(what, "it is taken as a text", source=setting.source, line=setting.line)
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
         what = f"the {kind} {name!r} is declared as {declared.value}, and here calculated with"
-        findings.warning(what, "declare it as double", source=action.source, line=action.line)
+        collector.warning(what, "declare it as double", source=action.source, line=action.line)
 
 
 def _misfits(text: object, declared: ParameterType) -> bool:

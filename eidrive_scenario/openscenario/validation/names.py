@@ -46,7 +46,7 @@ def check_names(
     elements: Iterable[Element],
     version: Version,
     entries: Mapping[CatalogReference, Element],
-    findings: DiagnosticCollector,
+    collector: DiagnosticCollector,
 ) -> None:
     """Reports names given twice and references to nothing."""
     elements = list(elements)
@@ -57,7 +57,7 @@ def check_names(
             nameless.add(kind)
             continue
         if name in known[kind] and kind in _UNIQUE:
-            findings.error(
+            collector.error(
                 f"two {_plural(kind)} are named {name!r}",
                 f"the other stands in line {known[kind][name].line}; rename one",
                 source=element.source,
@@ -68,12 +68,12 @@ def check_names(
     exempt = {id(one) for element in elements if isinstance(element, Condition) for one in _criterion(element)}
     exempt |= {id(element.trailer_ref) for element in elements if isinstance(element, Trailer) and _draws_none(element)}
     storyboard = StoryboardNames(root.storyboard, entries)
-    storyboard.check_unique(findings)
+    storyboard.check_unique(collector)
     for element in elements:
         if isinstance(element, StoryboardElementStateCondition):
-            storyboard.check_reference(element, findings)
+            storyboard.check_reference(element, collector)
         elif not isinstance(element, ParameterAssignment) and id(element) not in exempt:
-            _check_references(element, version, complete, findings)
+            _check_references(element, version, complete, collector)
 
 
 def _given(
@@ -103,13 +103,13 @@ def _draws_none(trailer: Trailer) -> bool:
 
 
 def _check_references(
-    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], findings: DiagnosticCollector
+    element: Element, version: Version, known: Mapping[str, Mapping[str, Element]], collector: DiagnosticCollector
 ) -> None:
     for spelling, rule in rules(type(element), version).attributes.items():
         kind = rule.points_to
         name = getattr(element, rule.field) if kind in known else None
         if isinstance(name, str) and name not in known[kind]:
-            findings.error(
+            collector.error(
                 f"{spelling} of {type(element).__name__} names the {kind} {name!r}, which is not there",
                 suggestion(name, known[kind]),
                 source=element.source,

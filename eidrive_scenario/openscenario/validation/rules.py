@@ -35,27 +35,27 @@ _NOTHING_SAID = Orientation()
 
 
 def check_rules(
-    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], findings: DiagnosticCollector
+    root: OpenScenario, version: Version, entries: Mapping[CatalogReference, Element], collector: DiagnosticCollector
 ) -> None:
     """Reports whatever breaks a rule in a scenario or in the catalog entries that it uses."""
     elements = [element for tree in (root, *entries.values()) for element in tree.walk()]
-    check_values(elements, version, findings)
-    check_types(elements, findings)
-    check_names(root, elements, version, entries, findings)
+    check_values(elements, version, collector)
+    check_types(elements, collector)
+    check_names(root, elements, version, entries, collector)
 
 
-def check_values(elements: Sequence[Element], version: Version, findings: DiagnosticCollector) -> None:
+def check_values(elements: Sequence[Element], version: Version, collector: DiagnosticCollector) -> None:
     """Report elements whose values exclude each other, or cannot be calculated with."""
-    flawed = {(problem.source, problem.line) for problem in findings.problems}
+    flawed = {(diagnostic.source, diagnostic.line) for diagnostic in collector.errors}
     for element in elements:
         check = _CHECKS.get(type(element))
         message = unusable(element, version) or (check(element) if check else "")
         if message and (element.source, element.line) not in flawed:
-            findings.error(message, source=element.source, line=element.line)
+            collector.error(message, source=element.source, line=element.line)
         if isinstance(element, Orientation) and element == _NOTHING_SAID:
             what = "Orientation says nothing, which by the standard means the heading 0 of the world"
-            remedy = 'leave it out, or write type="relative", to look along the road'
-            findings.warning(what, remedy, source=element.source, line=element.line)
+            hint = 'leave it out, or write type="relative", to look along the road'
+            collector.warning(what, hint, source=element.source, line=element.line)
 
 
 def _distance(action: LongitudinalDistanceAction) -> str:

@@ -70,21 +70,21 @@ class StoryboardNames:
             elif type(child) in LEVELS:
                 yield from self._below(child, path)
 
-    def check_unique(self, findings: DiagnosticCollector) -> None:
+    def check_unique(self, collector: DiagnosticCollector) -> None:
         """Warns of elements of one kind that have the same name side by side: a reference could mean either."""
         seen: dict[tuple[StoryboardElementType, tuple[str, ...]], Element] = {}
         for named in self.named:
             key = (named.level, named.path)
             other = seen.setdefault(key, named.element)
             if other is not named.element:
-                findings.warning(
+                collector.warning(
                     f"two elements of the kind {named.level.value} are named {named.path[-1]!r}",
                     f"the other stands in line {other.line}",
                     source=named.element.source,
                     line=named.element.line,
                 )
 
-    def check_reference(self, condition: StoryboardElementStateCondition, findings: DiagnosticCollector) -> None:
+    def check_reference(self, condition: StoryboardElementStateCondition, collector: DiagnosticCollector) -> None:
         """Reports a condition on an element that is not there, or is of another kind."""
         reference: str | None = condition.storyboard_element_ref
         wanted: StoryboardElementType | None = condition.storyboard_element_type
@@ -95,11 +95,11 @@ class StoryboardNames:
             return
         if found:
             message = f"{reference!r} is of the kind {found[0].level.value}, not {wanted.value}"
-            remedy = f"write storyboardElementType={found[0].level.value!r}"
+            hint = f"write storyboardElementType={found[0].level.value!r}"
         else:
             message = f"storyboardElementRef names the {wanted.value} {reference!r}, which is not there"
-            remedy = suggestion(reference, {named.path[-1] for named in self.named if named.level is wanted})
-        findings.error(message, remedy, source=condition.source, line=condition.line)
+            hint = suggestion(reference, {named.path[-1] for named in self.named if named.level is wanted})
+        collector.error(message, hint, source=condition.source, line=condition.line)
 
 
 class ReferenceMatch(Generic[T]):

@@ -31,10 +31,10 @@ _PREFIX = "parameter_"
 class ExpressionError(Exception):
     """An expression is wrong: what is wrong, and the remedy."""
 
-    def __init__(self, message: str, remedy: str = "") -> None:
-        super().__init__(message, remedy)
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message, hint)
         self.message = message
-        self.remedy = remedy
+        self.hint = hint
 
 
 def _round(value: float) -> int:
@@ -159,5 +159,5 @@ def _check(tree: ast.Expression, text: str) -> None:
             known = FUNCTIONS if id(node) in called else CONSTANTS
             if node.id not in known:
                 kind = "function" if id(node) in called else "word"
-                remedy = suggestion(node.id, known) if kind == "function" else "a parameter begins with $"
-                raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {quoted(text)}", remedy)
+                hint = suggestion(node.id, known) if kind == "function" else "a parameter begins with $"
+                raise ExpressionError(f"unknown {kind} {node.id!r} in the expression {quoted(text)}", hint)

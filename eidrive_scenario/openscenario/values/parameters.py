@@ -184,7 +184,7 @@ def written(value: Value) -> str:
 
 
 def declare(
-    scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, findings: DiagnosticCollector
+    scope: Scope, declaration: ParameterDeclaration, assignment: Assignment | None, collector: DiagnosticCollector
 ) -> None:
     """Puts a parameter into its scope, once its value fits its type and its constraints."""
     scalar = TYPES[declaration.parameter_type]
@@ -192,7 +192,7 @@ def declare(
     name, text = declaration.name, assignment.text if assignment else declaration.value
     text = _without_fraction(text, scalar)
     if not fits_type(_without_fraction(declaration.value, scalar), scalar):
-        findings.warning(
+        collector.warning(
             f"the parameter {name!r} is declared as {declaration.parameter_type.value}, but its default is "
             f"{quoted(declaration.value)}",
             "it is taken as a text",
@@ -205,7 +205,7 @@ def declare(
             raise ValueError(f"at most {MAX_TEXT} characters are read")
         value = scalar.convert(text)
     except ValueError as error:
-        findings.error(
+        collector.error(
             f"the parameter {quoted(name)} is {quoted(text)}, which is not {scalar.name}",
             str(error),
             source=place.source,
@@ -219,13 +219,13 @@ def declare(
         fits = not groups or any(_holds(group, value, scalar) for group in groups)
     except ValueError as error:
         message = f"a constraint of the parameter {name!r} is not {scalar.name}"
-        findings.error(message, str(error), source=declaration.source, line=declaration.line)
+        collector.error(message, str(error), source=declaration.source, line=declaration.line)
         return
     if not fits:
         allowed = " or ".join(
             " and ".join(f"{one.rule.value} {one.value}" for one in group.value_constraint) for group in groups
         )
-        findings.constraint_error(
+        collector.constraint_error(
             f"the parameter {name!r} is {quoted(text)}, outside its constraints",
             f"it has to be {allowed}",
             source=place.source,

@@ -39,10 +39,10 @@ def resolve_references(
     """
     if scope is None:
         return data
-    problems: list[Diagnostic] = []
-    resolved = _resolve(data, scope, path, source, line, lines or {}, problems)
-    if problems:
-        raise SettingError(problems)
+    diagnostics: list[Diagnostic] = []
+    resolved = _resolve(data, scope, path, source, line, lines or {}, diagnostics)
+    if diagnostics:
+        raise SettingError(diagnostics)
     return resolved
 
 
@@ -53,16 +53,17 @@ def _resolve(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
-    problems: list[Diagnostic],
+    diagnostics: list[Diagnostic],
 ) -> Any:
     line = lines.get(path, line)
     if isinstance(data, Mapping):
         return {
-            key: _resolve(value, scope, _below(path, key), source, line, lines, problems) for key, value in data.items()
+            key: _resolve(value, scope, _below(path, key), source, line, lines, diagnostics)
+            for key, value in data.items()
         }
     if isinstance(data, list | tuple):
         return [
-            _resolve(value, scope, _below(path, place), source, line, lines, problems)
+            _resolve(value, scope, _below(path, place), source, line, lines, diagnostics)
             for place, value in enumerate(data)
         ]
     if not is_reference(data):
@@ -72,7 +73,7 @@ def _resolve(
     except ExpressionError as error:
         if error.message:
             what = f"setting {path!r}: {error.message}" if path else error.message
-            problems.append(Diagnostic(what, error.remedy, source, line))
+            diagnostics.append(Diagnostic(what, error.hint, source, line))
         return data
 
 

@@ -37,15 +37,15 @@ def torchscript_is_allowed(option: bool) -> bool:
 def refused_torchscript(path: Path) -> SettingError:
     """The error for TorchScript weights without permission."""
     message = f"weights {quoted(str(path))} are TorchScript, which can execute any code with your rights"
-    remedy = f"export the model to ONNX; or, if you trust it, run with --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
-    return SettingError(Diagnostic(message, remedy))
+    hint = f"export the model to ONNX; or, if you trust it, run with --allow-torchscript or {ALLOW_TORCHSCRIPT}=1"
+    return SettingError(Diagnostic(message, hint))
 
 
 def check_weights_exist(path: Path) -> None:
     """Raise SettingError if the path does not lead to a regular file. Nothing of the file is read."""
     if not is_regular_file(path):
-        remedy = "check `weights` of the detector's settings"
-        raise SettingError(Diagnostic(f"no file {quoted(str(path))} with weights", remedy))
+        hint = "check `weights` of the detector's settings"
+        raise SettingError(Diagnostic(f"no file {quoted(str(path))} with weights", hint))
 
 
 def read_weights(path: Path) -> bytes:

@@ -81,8 +81,8 @@ def load(path: Path) -> tuple[Description, YoloV5 | Ssd]:
         )
     except _DAMAGED as error:
         reason = shortened(str(error), 200) if type(error) is ValueError else type(error).__name__
-        remedy = "give a file that training/train.py has written, or an ONNX model (.onnx)"
-        raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", remedy)) from error
+        hint = "give a file that training/train.py has written, or an ONNX model (.onnx)"
+        raise SettingError(Diagnostic(f"weights {quoted(str(path))} do not fit: {reason}", hint)) from error
     return description, network
 
 

@@ -20,7 +20,7 @@ class MapWarning(NamedTuple):
     rule: str
     kind: str
     message: str
-    remedy: str
+    hint: str
     line: int | None
 
 
@@ -39,4 +39,4 @@ def _told(flaws: list[MapWarning], source: str) -> Diagnostic:
         lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
         more = ", …" if len(flaws) > 1 + SHOWN else ""
         message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
-    return Diagnostic(message, first.remedy, source, first.line, first.rule)
+    return Diagnostic(message, first.hint, source, first.line, first.rule)

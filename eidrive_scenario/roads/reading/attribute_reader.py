@@ -29,20 +29,20 @@ class AttributeReader:
 
     def __init__(self, source: str) -> None:
         self.source = source
-        self.problems: list[Diagnostic] = []
+        self.errors: list[Diagnostic] = []
         self.map_warnings: list[MapWarning] = []
         self._spent: dict[str, float] = {}
 
-    def report_error(self, element: etree._Element | None, message: str, remedy: str) -> None:
+    def report_error(self, element: etree._Element | None, message: str, hint: str) -> None:
         """Remember a problem at an element."""
-        self.append_diagnostic(Diagnostic(message, remedy, self.source, line_of(element)))
+        self.append_diagnostic(Diagnostic(message, hint, self.source, line_of(element)))
 
-    def append_diagnostic(self, problem: Diagnostic) -> None:
+    def append_diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember a problem. Raises RoadError with all of them once there are too many."""
-        self.problems.append(problem)
-        if len(self.problems) >= MOST:
-            last = Diagnostic(f"reading ends after {MOST} errors", "", self.source, problem.line)
-            raise RoadError([*sorted(self.problems, key=lambda one: one.line or 0), last])
+        self.errors.append(diagnostic)
+        if len(self.errors) >= MOST:
+            last = Diagnostic(f"reading ends after {MOST} errors", "", self.source, diagnostic.line)
+            raise RoadError([*sorted(self.errors, key=lambda one: one.line or 0), last])
 
     def spend(self, element: etree._Element, what: str, amount: float, limit: float) -> None:
         """Count what takes memory or time; the element that exceeds the limit is a problem."""
@@ -51,10 +51,10 @@ class AttributeReader:
         if before <= limit < before + amount:
             self.report_error(element, f"the file has more than {limit:g} {what}", "split it")
 
-    def report_warning(self, element: etree._Element, rule: str, kind: str, message: str, remedy: str) -> None:
+    def report_warning(self, element: etree._Element, rule: str, kind: str, message: str, hint: str) -> None:
         """Remember what is against the standard, and is read all the same."""
         if len(self.map_warnings) < MOST_DOUBTS:
-            self.map_warnings.append(MapWarning(rule, kind, message, remedy, line_of(element)))
+            self.map_warnings.append(MapWarning(rule, kind, message, hint, line_of(element)))
 
     @overload
     def number(self, element: etree._Element, name: str) -> float: ...
@@ -73,8 +73,8 @@ class AttributeReader:
         value = _number(text)
         if abs(value) <= LARGEST:
             return value
-        remedy = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
-        self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", remedy)
+        hint = f"give a number of at most {LARGEST:g}" if math.isfinite(value) else "give a finite number"
+        self.report_error(element, f"<{element.tag}> has {name}={quoted(text)}", hint)
         return 0.0
 
     def mark_number(self, element: etree._Element, name: str, default: float | None) -> float | None:
@@ -90,8 +90,8 @@ class AttributeReader:
 
     def doubt_mark(self, element: etree._Element, what: str) -> None:
         """Remember what is missing or wrong in a road mark."""
-        message, remedy = f"{what}, and is drawn without it", "correct it, or take the element out"
-        self.report_warning(element, "road-mark", "road marks that are not complete", message, remedy)
+        message, hint = f"{what}, and is drawn without it", "correct it, or take the element out"
+        self.report_warning(element, "road-mark", "road marks that are not complete", message, hint)
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
         """A piece of a cubic: its start and a, b, c, d."""
@@ -145,8 +145,8 @@ class AttributeReader:
 
     def _missing(self, element: etree._Element, name: str) -> None:
         near = suggestion(name, map(str, element.attrib)) if element.attrib else ""
-        remedy = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
-        self.report_error(element, f"<{element.tag}> lacks the attribute {name!r}", remedy)
+        hint = f"{near} (rename it to {name})" if near.startswith("did you mean") else "add it"
+        self.report_error(element, f"<{element.tag}> lacks the attribute {name!r}", hint)
 
 
 def _number(text: str) -> float:

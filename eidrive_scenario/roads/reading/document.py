@@ -39,37 +39,39 @@ def read_road_text(path: Path) -> bytes:
     try:
         return read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
-        problem = Diagnostic(f"cannot read: {reason_of(error)}", "give the path of an OpenDRIVE file", str(path))
-        raise RoadError(problem) from error
+        diagnostic = Diagnostic(f"cannot read: {reason_of(error)}", "give the path of an OpenDRIVE file", str(path))
+        raise RoadError(diagnostic) from error
 
 
 def parse_road_map(text: bytes, source: str) -> RoadMap:
     """OpenDRIVE; `source` names it in errors. Raises RoadError with every finding, its line and what would be right."""
     root = _parse(text, source)
-    findings = AttributeReader(source)
-    elements = [(findings.text(element, "id"), element) for element in root.iterfind("road")]
+    collector = AttributeReader(source)
+    elements = [(collector.text(element, "id"), element) for element in root.iterfind("road")]
     roads: dict[str, Road] = {}
     objects: list[RoadObject] = []
     for number, element in elements:
         if number in roads:
-            findings.report_error(element, f"road {number!r} occurs twice", "give each road its own id")
-        roads[number] = _read_road(number, element, findings)
-        objects.extend(read_objects(number, element, findings))
+            collector.report_error(element, f"road {number!r} occurs twice", "give each road its own id")
+        roads[number] = _read_road(number, element, collector)
+        objects.extend(read_objects(number, element, collector))
     if not elements:
-        findings.report_error(root, "there is no <road>", "add at least one")
+        collector.report_error(root, "there is no <road>", "add at least one")
     junctions = {}
     for element in root.iterfind("junction"):
-        junction = _read_junction(element, roads, findings)
+        junction = _read_junction(element, roads, collector)
         junctions[junction.id] = junction
-    roads = {number: _with_sound_links(road, roads, junctions, findings) for number, road in roads.items()}
-    signals = read_signals(elements, roads, findings)
-    controllers = read_controllers(root, signals, findings)
-    header = _read_header(root, findings)
-    if not findings.problems:
-        check_extent(roads, findings)
-    if findings.problems:
-        raise RoadError(sorted(findings.problems, key=lambda problem: problem.line or 0))
-    return RoadMap(source, header, roads, junctions, signals, controllers, tuple(objects), tuple(findings.map_warnings))
+    roads = {number: _with_sound_links(road, roads, junctions, collector) for number, road in roads.items()}
+    signals = read_signals(elements, roads, collector)
+    controllers = read_controllers(root, signals, collector)
+    header = _read_header(root, collector)
+    if not collector.errors:
+        check_extent(roads, collector)
+    if collector.errors:
+        raise RoadError(sorted(collector.errors, key=lambda diagnostic: diagnostic.line or 0))
+    return RoadMap(
+        source, header, roads, junctions, signals, controllers, tuple(objects), tuple(collector.map_warnings)
+    )
 
 
 def _parse(text: bytes, source: str) -> etree._Element:
@@ -84,7 +86,7 @@ def _parse(text: bytes, source: str) -> etree._Element:
     return root
 
 
-def _read_header(root: etree._Element, findings: AttributeReader) -> Header:
+def _read_header(root: etree._Element, collector: AttributeReader) -> Header:
     header = root.find("header")
     if header is None:
         return Header()
@@ -97,44 +99,44 @@ def _read_header(root: etree._Element, findings: AttributeReader) -> Header:
         vendor=header.get("vendor", ""),
         date=header.get("date", ""),
         geo_reference=(header.findtext("geoReference") or "").strip(),
-        offset=_read_offset(header.find("offset"), findings),
+        offset=_read_offset(header.find("offset"), collector),
     )
 
 
-def _read_offset(element: etree._Element | None, findings: AttributeReader) -> tuple[float, float, float, float]:
+def _read_offset(element: etree._Element | None, collector: AttributeReader) -> tuple[float, float, float, float]:
     if element is None:
         return 0.0, 0.0, 0.0, 0.0
-    x, y, z, turn = (findings.number(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    x, y, z, turn = (collector.number(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return x, y, z, turn
 
 
-def _read_road(number: str, element: etree._Element, findings: AttributeReader) -> Road:
-    length = findings.number(element, "length")
+def _read_road(number: str, element: etree._Element, collector: AttributeReader) -> Road:
+    length = collector.number(element, "length")
     if length <= 0.0 and element.get("length") is not None:
-        findings.report_error(element, f"road {number!r} has length {length:g} m", "give a positive length")
+        collector.report_error(element, f"road {number!r} has length {length:g} m", "give a positive length")
     if length > LONGEST:
-        findings.report_error(element, f"road {number!r} has length {length:g} m", f"at most {LONGEST:g} m are read")
+        collector.report_error(element, f"road {number!r} has length {length:g} m", f"at most {LONGEST:g} m are read")
         length = 1.0
     rule = element.get("rule", "RHT")
     if rule not in ("RHT", "LHT"):
-        findings.report_error(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
-    reference = read_reference_line(element, length, findings)
+        collector.report_error(element, f"road {number!r} has rule={rule!r}", suggestion(rule, ("RHT", "LHT")))
+    reference = read_reference_line(element, length, collector)
     length = reference.length
     lanes = element.find("lanes")
     lane_offset = Polynomials()
     sections: tuple[LaneSection, ...] = ()
     if lanes is None:
-        findings.report_error(element, f"road {number!r} has no <lanes>", "add its lanes")
+        collector.report_error(element, f"road {number!r} has no <lanes>", "add its lanes")
     else:
-        lane_offset = read_lane_offset(lanes, findings)
-        sections = read_sections(lanes, length, lane_offset, findings)
+        lane_offset = read_lane_offset(lanes, collector)
+        sections = read_sections(lanes, length, lane_offset, collector)
     junction = element.get("junction", "-1")
     for profile in element.iterfind("lateralProfile/*"):
-        level = [findings.number(profile, name, 0.0) == 0.0 for name in "abcd"]
+        level = [collector.number(profile, name, 0.0) == 0.0 for name in "abcd"]
         if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
             message = f"road {number!r} has <{profile.tag}>, which is not read: its cross section is straight"
-            remedy = "say the slope by <superelevation>"
-            findings.report_warning(profile, "road-surface", "cross sections that are not read", message, remedy)
+            hint = "say the slope by <superelevation>"
+            collector.report_warning(profile, "road-surface", "cross sections that are not read", message, hint)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -142,58 +144,58 @@ def _read_road(number: str, element: etree._Element, findings: AttributeReader) 
         rule="LHT" if rule == "LHT" else "RHT",
         junction_id=None if junction in ("-1", "") else junction,
         reference=reference,
-        elevation=_profile(element, "elevationProfile/elevation", findings),
-        superelevation=_profile(element, "lateralProfile/superelevation", findings),
+        elevation=_profile(element, "elevationProfile/elevation", collector),
+        superelevation=_profile(element, "lateralProfile/superelevation", collector),
         lane_offset=lane_offset,
         sections=sections,
-        predecessor=_read_link(element.find("link/predecessor"), findings),
-        successor=_read_link(element.find("link/successor"), findings),
-        types=tuple(sorted(_read_types(element, findings), key=lambda kind: kind.s)),
+        predecessor=_read_link(element.find("link/predecessor"), collector),
+        successor=_read_link(element.find("link/successor"), collector),
+        types=tuple(sorted(_read_types(element, collector), key=lambda kind: kind.s)),
         line=line_of(element),
         section_starts=tuple(section.s for section in sections),
     )
 
 
-def _profile(road: etree._Element, path: str, findings: AttributeReader) -> Polynomials:
-    return Polynomials(findings.polynomial(element, "s") for element in road.iterfind(path))
+def _profile(road: etree._Element, path: str, collector: AttributeReader) -> Polynomials:
+    return Polynomials(collector.polynomial(element, "s") for element in road.iterfind(path))
 
 
-def _read_types(road: etree._Element, findings: AttributeReader) -> list[RoadType]:
+def _read_types(road: etree._Element, collector: AttributeReader) -> list[RoadType]:
     types = []
     for element in road.iterfind("type"):
         speed = element.find("speed")
-        limit = None if speed is None else read_speed(speed, findings)
-        types.append(RoadType(findings.number(element, "s"), element.get("type", "unknown"), limit))
+        limit = None if speed is None else read_speed(speed, collector)
+        types.append(RoadType(collector.number(element, "s"), element.get("type", "unknown"), limit))
     return types
 
 
-def _read_link(element: etree._Element | None, findings: AttributeReader) -> RoadLink | None:
+def _read_link(element: etree._Element | None, collector: AttributeReader) -> RoadLink | None:
     if element is None:
         return None
-    kind = findings.text(element, "elementType", "road")
+    kind = collector.text(element, "elementType", "road")
     if kind not in ("road", "junction"):
-        findings.report_error(
+        collector.report_error(
             element, f"<{element.tag}> has elementType={kind!r}", suggestion(kind, ("road", "junction"))
         )
         return None
-    number = findings.text(element, "elementId")
+    number = collector.text(element, "elementId")
     if kind == "road" and element.get("elementS") is not None:
         # Of virtual junctions (1.6 to 1.8): a way into or out of a road between its ends.
         message = f"a road leads to road {number!r} between its ends, and ends there instead"
-        remedy = "split that road there, and join the parts by a junction"
-        findings.report_warning(element, "road-link", "roads that lead to others between their ends", message, remedy)
+        hint = "split that road there, and join the parts by a junction"
+        collector.report_warning(element, "road-link", "roads that lead to others between their ends", message, hint)
         return None
-    contact = findings.contact(element, "contactPoint")
+    contact = collector.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
 
 
-def _read_junction(element: etree._Element, roads: dict[str, Road], findings: AttributeReader) -> Junction:
+def _read_junction(element: etree._Element, roads: dict[str, Road], collector: AttributeReader) -> Junction:
     connections = []
     for connection in element.iterfind("connection"):
-        read = _read_connection(connection, roads, findings)
+        read = _read_connection(connection, roads, collector)
         if read is not None:
             connections.append(read)
-    number, kind = findings.text(element, "id"), element.get("type", "default")
+    number, kind = collector.text(element, "id"), element.get("type", "default")
     if kind == "virtual":
         connections = [one for one in connections if _ends_at(roads[one.incoming_road], number)]
     return Junction(
@@ -201,7 +203,7 @@ def _read_junction(element: etree._Element, roads: dict[str, Road], findings: At
         name=element.get("name", ""),
         type=kind,
         connections=tuple(connections),
-        controllers=tuple(findings.text(controller, "id") for controller in element.iterfind("controller")),
+        controllers=tuple(collector.text(controller, "id") for controller in element.iterfind("controller")),
     )
 
 
@@ -211,29 +213,29 @@ def _ends_at(road: Road, junction: str) -> bool:
     return any(link is not None and (link.element_type, link.element_id) == ("junction", junction) for link in ends)
 
 
-def _read_connection(element: etree._Element, roads: dict[str, Road], findings: AttributeReader) -> Connection | None:
+def _read_connection(element: etree._Element, roads: dict[str, Road], collector: AttributeReader) -> Connection | None:
     incoming = element.get("incomingRoad")
     connecting = element.get("connectingRoad", element.get("linkedRoad"))
     if incoming is None or connecting is None:
         if element.get("type") != "virtual":
-            findings.report_error(element, "<connection> lacks incomingRoad or connectingRoad", "give both")
+            collector.report_error(element, "<connection> lacks incomingRoad or connectingRoad", "give both")
         return None
     missing = [number for number in (incoming, connecting) if number not in roads]
     for number in missing:
-        findings.report_error(
+        collector.report_error(
             element, f"<connection> names road {number!r}, which does not exist", suggestion(number, roads)
         )
     links = tuple(
-        (findings.integer(link, "from"), findings.integer(link, "to")) for link in element.iterfind("laneLink")
+        (collector.integer(link, "from"), collector.integer(link, "to")) for link in element.iterfind("laneLink")
     )
-    contact = findings.contact(element, "contactPoint") or "start"
+    contact = collector.contact(element, "contactPoint") or "start"
     if missing:
         return None
     return Connection(element.get("id", ""), incoming, connecting, contact, links, line_of(element))
 
 
 def _with_sound_links(
-    road: Road, roads: dict[str, Road], junctions: dict[str, Junction], findings: AttributeReader
+    road: Road, roads: dict[str, Road], junctions: dict[str, Junction], collector: AttributeReader
 ) -> Road:
     """The road, which ends where it links to a junction that does not exist: SUMO writes dead ends like that."""
 
@@ -243,13 +245,13 @@ def _with_sound_links(
             return link
         message = f"road {road.id!r} links to {link.element_type} {link.element_id!r}, which does not exist"
         if link.element_type == "road":
-            findings.append_diagnostic(
-                Diagnostic(message, suggestion(link.element_id, known), findings.source, link.line)
+            collector.append_diagnostic(
+                Diagnostic(message, suggestion(link.element_id, known), collector.source, link.line)
             )
             return link
-        remedy = "take the link out, or add the junction with its connections"
-        findings.map_warnings.append(
-            MapWarning("road-link", "roads that lead to no junction", message, remedy, link.line)
+        hint = "take the link out, or add the junction with its connections"
+        collector.map_warnings.append(
+            MapWarning("road-link", "roads that lead to no junction", message, hint, link.line)
         )
         return None
 

@@ -21,19 +21,19 @@ MAX_LANE_LENGTH = 2e7
 _SHARES = (0.0, 0.5, 1.0)
 
 
-def check_extent(roads: Mapping[str, Road], findings: AttributeReader) -> None:
+def check_extent(roads: Mapping[str, Road], collector: AttributeReader) -> None:
     """Report roads whose size nothing can be calculated with."""
     lanes = 0.0
     for road in roads.values():
-        _check_geometries(road, findings)
+        _check_geometries(road, collector)
         lanes += sum(section.length * len(section.lanes) for section in road.sections)
-        _check_cross_section(road, findings)
+        _check_cross_section(road, collector)
     if lanes > MAX_LANE_LENGTH:
         message = f"the lanes are {lanes:g} m long in total"
-        findings.append_diagnostic(Diagnostic(message, f"at most {MAX_LANE_LENGTH:g} m are read", findings.source, 1))
+        collector.append_diagnostic(Diagnostic(message, f"at most {MAX_LANE_LENGTH:g} m are read", collector.source, 1))
 
 
-def _check_geometries(road: Road, findings: AttributeReader) -> None:
+def _check_geometries(road: Road, collector: AttributeReader) -> None:
     """A cubic may leave its start further than by its length, unlike all other geometries."""
     farthest: dict[int | None, float] = {}
     for curve in road.reference.curves:
@@ -47,10 +47,10 @@ def _check_geometries(road: Road, findings: AttributeReader) -> None:
             farthest[line] = max(away, farthest.get(line, 0.0))
     for line, away in farthest.items():
         message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
-        findings.append_diagnostic(Diagnostic(message, f"at most {MAX_SHAPE:g} m are read", findings.source, line))
+        collector.append_diagnostic(Diagnostic(message, f"at most {MAX_SHAPE:g} m are read", collector.source, line))
 
 
-def _check_cross_section(road: Road, findings: AttributeReader) -> None:
+def _check_cross_section(road: Road, collector: AttributeReader) -> None:
     for section in road.sections:
         for share in _SHARES:
             ds = share * section.length
@@ -59,14 +59,14 @@ def _check_cross_section(road: Road, findings: AttributeReader) -> None:
             edges = [abs(offset + lane.side * lane.outer.value(ds)) for lane in outermost]
             if not max(edges) <= MAX_WIDTH:
                 message = f"a lane of road {road.id!r} reaches {max(edges):g} m from the reference line"
-                findings.append_diagnostic(
-                    Diagnostic(message, f"at most {MAX_WIDTH:g} m are read", findings.source, road.line)
+                collector.append_diagnostic(
+                    Diagnostic(message, f"at most {MAX_WIDTH:g} m are read", collector.source, road.line)
                 )
                 return
             height = abs(road.elevation.value(section.s + ds))
             if not height <= MAX_HEIGHT:
                 message = f"road {road.id!r} is {height:g} m high"
-                findings.append_diagnostic(
-                    Diagnostic(message, f"at most {MAX_HEIGHT:g} m are read", findings.source, road.line)
+                collector.append_diagnostic(
+                    Diagnostic(message, f"at most {MAX_HEIGHT:g} m are read", collector.source, road.line)
                 )
                 return

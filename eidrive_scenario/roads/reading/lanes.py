@@ -22,41 +22,41 @@ ZERO = Polynomials()
 CENTER = Lane(id=0, type="none", width=ZERO, inner=ZERO, outer=ZERO, center=ZERO)
 
 
-def read_speed(element: etree._Element, findings: AttributeReader) -> float | None:
+def read_speed(element: etree._Element, collector: AttributeReader) -> float | None:
     """The limit of a <speed> in m/s; inf for 'no limit', None for 'undefined'."""
-    text = findings.text(element, "max")
+    text = collector.text(element, "max")
     if text in ("no limit", "undefined"):
         return math.inf if text == "no limit" else None
     unit = element.get("unit", "m/s")
     if unit not in UNITS:
-        findings.report_error(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
-    return findings.number(element, "max") * UNITS.get(unit, 1.0)
+        collector.report_error(element, f"<speed> has unit={unit!r}", "give m/s, km/h or mph")
+    return collector.number(element, "max") * UNITS.get(unit, 1.0)
 
 
-def read_lane_offset(lanes: etree._Element, findings: AttributeReader) -> Polynomials:
+def read_lane_offset(lanes: etree._Element, collector: AttributeReader) -> Polynomials:
     """The distance of lane 0 from the reference line."""
-    return Polynomials(findings.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
+    return Polynomials(collector.polynomial(element, "s") for element in lanes.iterfind("laneOffset"))
 
 
 def read_sections(
-    lanes: etree._Element, length: float, lane_offset: Polynomials, findings: AttributeReader
+    lanes: etree._Element, length: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[LaneSection, ...]:
     """The lane sections of a road in the order of s; a section of no length is left out."""
     found = sorted(
-        ((min(max(findings.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
+        ((min(max(collector.number(element, "s"), 0.0), length), element) for element in lanes.iterfind("laneSection")),
         key=lambda pair: pair[0],
     )
     if not found:
-        findings.report_error(lanes, "<lanes> has no <laneSection>", "add at least one")
+        collector.report_error(lanes, "<lanes> has no <laneSection>", "add at least one")
         return ()
-    if any(findings.flag(element, "singleSide") for _, element in found):
+    if any(collector.flag(element, "singleSide") for _, element in found):
         found = _join_sides(found)
     ends = [*(s for s, _ in found[1:]), length]
     sections: list[LaneSection] = []
     left_out: list[Mapping[int, Lane]] = []
     for (s, element), end in zip(found, ends, strict=True):
         start = s if sections else 0.0
-        read = _read_section(element, start, lane_offset, findings)
+        read = _read_section(element, start, lane_offset, collector)
         if end - s <= 1e-6 and (sections or len(found) > 1):
             if sections:
                 sections[-1] = replace(sections[-1], lanes=_led_past(sections[-1].lanes, read, "successors"))
@@ -67,7 +67,7 @@ def read_sections(
         left_out.clear()
         sections.append(LaneSection(len(sections), start, max(end - start, 0.0), read))
     if not sections:
-        findings.report_error(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
+        collector.report_error(lanes, "no <laneSection> lies on the road", "let the first begin at s=0")
     return tuple(sections)
 
 
@@ -128,55 +128,55 @@ def _continue_link(lane: etree._Element, name: str) -> None:
 
 
 def _read_section(
-    section: etree._Element, s: float, lane_offset: Polynomials, findings: AttributeReader
+    section: etree._Element, s: float, lane_offset: Polynomials, collector: AttributeReader
 ) -> dict[int, Lane]:
     found: dict[int, etree._Element] = {}
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         for element in section.iterfind(f"{side}/lane"):
-            number = findings.integer(element, "id")
+            number = collector.integer(element, "id")
             wrong = (number > 0) - (number < 0) != sign
             message = f"lane {number} stands under <{side}>"
-            remedy = "left lanes have ids above 0, the center lane 0, right lanes below 0"
+            hint = "left lanes have ids above 0, the center lane 0, right lanes below 0"
             if wrong and number and sign:
                 # Its id is what links and positions name it by.
                 kind = "lanes under the wrong side"
-                findings.report_warning(element, "lane-side", kind, f"{message}, and is taken by its id", remedy)
+                collector.report_warning(element, "lane-side", kind, f"{message}, and is taken by its id", hint)
             elif wrong:
-                findings.report_error(element, message, remedy)
+                collector.report_error(element, message, hint)
                 continue
             if number in found:
-                findings.report_error(
+                collector.report_error(
                     element, f"lane {number} occurs twice in its section", "give each lane its own id"
                 )
             else:
                 found[number] = element
     center = found.get(0)
-    lanes = {0: CENTER if center is None else _lane(center, 0, ZERO, ZERO, findings)}
+    lanes = {0: CENTER if center is None else _lane(center, 0, ZERO, ZERO, collector)}
     offset = lane_offset.shifted(s)
     for sign in (1, -1):
         edge = ZERO
         for number in sorted((n for n in found if n * sign > 0), key=abs):
-            lane = _lane(found[number], number, edge, offset, findings)
+            lane = _lane(found[number], number, edge, offset, collector)
             lanes[number] = lane
             edge = lane.outer
     if not any(lanes):
-        findings.report_error(
+        collector.report_error(
             section, "<laneSection> has no lane beside the center", "add a lane under <left> or <right>"
         )
     return {number: lanes[number] for number in sorted(lanes, reverse=True)}
 
 
 def _lane(
-    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: AttributeReader
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, collector: AttributeReader
 ) -> Lane:
     begin = float(element.get(ORIGIN, "0"))
     width, width_from = ZERO, 0.0
     if number:
-        width, width_from = _read_width(element, number, inner, lane_offset, findings)
+        width, width_from = _read_width(element, number, inner, lane_offset, collector)
     outer = inner if number == 0 else combine([(1.0, inner), (1.0, width)])
     center = inner if number == 0 else combine([(1.0, inner), (0.5, width)])
     link = element.find("link")
-    speeds = ((findings.number(e, "sOffset") + begin, read_speed(e, findings)) for e in element.iterfind("speed"))
+    speeds = ((collector.number(e, "sOffset") + begin, read_speed(e, collector)) for e in element.iterfind("speed"))
     return Lane(
         id=number,
         type=element.get("type", "none"),
@@ -184,13 +184,15 @@ def _lane(
         inner=inner,
         outer=outer,
         center=center,
-        predecessors=_linked(link, "predecessor", findings),
-        successors=_linked(link, "successor", findings),
-        level=findings.flag(element, "level"),
+        predecessors=_linked(link, "predecessor", collector),
+        successors=_linked(link, "successor", collector),
+        level=collector.flag(element, "level"),
         direction=element.get("direction", "standard"),
-        road_marks=tuple(sorted(_read_marks(element, begin, findings), key=lambda mark: mark.s_offset)),
+        road_marks=tuple(sorted(_read_marks(element, begin, collector), key=lambda mark: mark.s_offset)),
         heights=tuple(
-            LaneHeight(findings.number(e, "sOffset") + begin, findings.number(e, "inner"), findings.number(e, "outer"))
+            LaneHeight(
+                collector.number(e, "sOffset") + begin, collector.number(e, "inner"), collector.number(e, "outer")
+            )
             for e in element.iterfind("height")
         ),
         speeds=tuple(sorted((s, limit) for s, limit in speeds if limit is not None)),
@@ -200,15 +202,15 @@ def _lane(
 
 
 def _read_width(
-    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, findings: AttributeReader
+    element: etree._Element, number: int, inner: Polynomials, lane_offset: Polynomials, collector: AttributeReader
 ) -> tuple[Polynomials, float]:
     """Width over ds, and the ds from which on the file gives it.
 
     A <border> counts from the reference line; <width> wins where both are given (clause 11.7).
     """
     begin = float(element.get(ORIGIN, "0"))
-    widths = [findings.polynomial(e, "sOffset") for e in element.iterfind("width")]
-    borders = [findings.polynomial(e, "sOffset") for e in element.iterfind("border")]
+    widths = [collector.polynomial(e, "sOffset") for e in element.iterfind("width")]
+    borders = [collector.polynomial(e, "sOffset") for e in element.iterfind("border")]
     given = Polynomials(widths or borders)
     width_from = min((start for start, *_ in widths or borders), default=math.inf) + begin
     if begin:
@@ -219,21 +221,21 @@ def _read_width(
     return combine([(side, given), (-side, lane_offset), (-1.0, inner)]), width_from
 
 
-def _linked(link: etree._Element | None, name: str, findings: AttributeReader) -> tuple[int, ...]:
-    return () if link is None else tuple(findings.integer(element, "id") for element in link.iterfind(name))
+def _linked(link: etree._Element | None, name: str, collector: AttributeReader) -> tuple[int, ...]:
+    return () if link is None else tuple(collector.integer(element, "id") for element in link.iterfind(name))
 
 
-def _read_marks(element: etree._Element, begin: float, findings: AttributeReader) -> Iterable[RoadMark]:
+def _read_marks(element: etree._Element, begin: float, collector: AttributeReader) -> Iterable[RoadMark]:
     for mark in element.iterfind("roadMark"):
         weight = mark.get("weight", "standard")
-        width = findings.mark_number(mark, "width", None)
+        width = collector.mark_number(mark, "width", None)
         lines = (
-            _read_line(line, width or MARK_WIDTHS.get(weight, 0.12), findings) for line in mark.iterfind("type/line")
+            _read_line(line, width or MARK_WIDTHS.get(weight, 0.12), collector) for line in mark.iterfind("type/line")
         )
         if mark.get("type") is None:
-            findings.doubt_mark(mark, "<roadMark> lacks the attribute 'type'")
+            collector.doubt_mark(mark, "<roadMark> lacks the attribute 'type'")
         yield RoadMark(
-            s_offset=(findings.mark_number(mark, "sOffset", 0.0) or 0.0) + begin,
+            s_offset=(collector.mark_number(mark, "sOffset", 0.0) or 0.0) + begin,
             type=mark.get("type", "none"),
             weight=weight,
             color=mark.get("color", "standard"),
@@ -243,19 +245,19 @@ def _read_marks(element: etree._Element, begin: float, findings: AttributeReader
         )
 
 
-def _read_line(line: etree._Element, usual: float, findings: AttributeReader) -> RoadMarkLine | None:
+def _read_line(line: etree._Element, usual: float, collector: AttributeReader) -> RoadMarkLine | None:
     """A line of a road mark; None where its dashes are not given, as the type of the mark then says how it looks."""
-    length, space = (findings.mark_number(line, name, None) for name in ("length", "space"))
+    length, space = (collector.mark_number(line, name, None) for name in ("length", "space"))
     missing = [name for name in ("length", "space") if line.get(name) is None]
     if missing:
         names = " and ".join(repr(name) for name in missing)
-        findings.doubt_mark(line, f"<line> lacks the attribute {names}")
+        collector.doubt_mark(line, f"<line> lacks the attribute {names}")
     if length is None or space is None:
         return None
     return RoadMarkLine(
         length=length,
         space=space,
-        t_offset=findings.mark_number(line, "tOffset", 0.0) or 0.0,
-        s_offset=findings.mark_number(line, "sOffset", 0.0) or 0.0,
-        width=findings.mark_number(line, "width", 0.0) or usual,
+        t_offset=collector.mark_number(line, "tOffset", 0.0) or 0.0,
+        s_offset=collector.mark_number(line, "sOffset", 0.0) or 0.0,
+        width=collector.mark_number(line, "width", 0.0) or usual,
     )

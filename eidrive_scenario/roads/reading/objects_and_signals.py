@@ -30,7 +30,7 @@ FURTHEST = 1e6
 
 
 def read_signals(
-    elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], findings: AttributeReader
+    elements: list[tuple[str, etree._Element]], roads: Mapping[str, Road], collector: AttributeReader
 ) -> dict[str, Signal]:
     """The signals of all roads by id, with the references that other roads make to them.
 
@@ -42,105 +42,105 @@ def read_signals(
     for number, element in elements:
         road = roads[number]
         for signal in element.iterfind("signals/signal"):
-            read = _read_signal(road, signal, findings)
+            read = _read_signal(road, signal, collector)
             same = same_id[read.id] = same_id.get(read.id, 0) + 1
             key = read.id
             while key in signals:
                 key, same = f"{read.id}#{same}", same + 1
             signals[key] = read
         for reference in element.iterfind("signals/signalReference"):
-            references.append((findings.text(reference, "id"), _read_place(road, reference, findings), reference))
+            references.append((collector.text(reference, "id"), _read_place(road, reference, collector), reference))
     for number, place, reference in references:
         if number in signals:
             signals[number] = replace(signals[number], references=(*signals[number].references, place))
         else:
-            findings.report_error(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
+            collector.report_error(reference, f"reference to signal {number!r}, which does not exist", "correct the id")
     return signals
 
 
-def _read_place(road: Road, element: etree._Element, findings: AttributeReader) -> SignalPlace:
+def _read_place(road: Road, element: etree._Element, collector: AttributeReader) -> SignalPlace:
     orientation = element.get("orientation", "none")
-    s = findings.number(element, "s")
+    s = collector.number(element, "s")
     held = min(max(s, 0.0), road.length)
     if abs(s - held) > BEYOND:
         message = f"a signal stands at s = {s:g} m of road {road.id!r}, and is put at s = {held:g} m"
-        remedy = f"the road runs from 0 to {road.length:g} m"
-        findings.report_warning(element, "signal-off-road", "signals beyond their roads", message, remedy)
+        hint = f"the road runs from 0 to {road.length:g} m"
+        collector.report_warning(element, "signal-off-road", "signals beyond their roads", message, hint)
     return SignalPlace(
         road=road.id,
         s=held,
-        t=findings.number(element, "t"),
+        t=collector.number(element, "t"),
         orientation=orientation if orientation in ("+", "-") else "none",
         validity=tuple(
-            (findings.integer(v, "fromLane"), findings.integer(v, "toLane")) for v in element.iterfind("validity")
+            (collector.integer(v, "fromLane"), collector.integer(v, "toLane")) for v in element.iterfind("validity")
         ),
     )
 
 
-def _read_signal(road: Road, element: etree._Element, findings: AttributeReader) -> Signal:
+def _read_signal(road: Road, element: etree._Element, collector: AttributeReader) -> Signal:
     return Signal(
-        id=findings.text(element, "id"),
+        id=collector.text(element, "id"),
         name=element.get("name", ""),
-        type=findings.text(element, "type"),
+        type=collector.text(element, "type"),
         subtype=element.get("subtype", ""),
         country=element.get("country", ""),
-        value=findings.number(element, "value", None),
+        value=collector.number(element, "value", None),
         unit=element.get("unit", ""),
         text=element.get("text", ""),
-        dynamic=findings.flag(element, "dynamic"),
-        place=_read_place(road, element, findings),
-        z_offset=findings.number(element, "zOffset", 0.0),
-        h_offset=findings.number(element, "hOffset", 0.0),
-        width=findings.number(element, "width", 0.0),
-        height=findings.number(element, "height", 0.0),
+        dynamic=collector.flag(element, "dynamic"),
+        place=_read_place(road, element, collector),
+        z_offset=collector.number(element, "zOffset", 0.0),
+        h_offset=collector.number(element, "hOffset", 0.0),
+        width=collector.number(element, "width", 0.0),
+        height=collector.number(element, "height", 0.0),
     )
 
 
 def read_controllers(
-    root: etree._Element, signals: dict[str, Signal], findings: AttributeReader
+    root: etree._Element, signals: dict[str, Signal], collector: AttributeReader
 ) -> dict[str, SignalController]:
     """Groups of signals by id."""
     controllers = {}
     for element in root.iterfind("controller"):
         members = []
         for control in element.iterfind("control"):
-            number = findings.text(control, "signalId")
+            number = collector.text(control, "signalId")
             if number not in signals:
-                findings.report_error(control, f"control of signal {number!r}, which does not exist", "correct the id")
+                collector.report_error(control, f"control of signal {number!r}, which does not exist", "correct the id")
             members.append(number)
-        number = findings.text(element, "id")
+        number = collector.text(element, "id")
         controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
     return controllers
 
 
-def read_objects(road: str, element: etree._Element, findings: AttributeReader) -> list[RoadObject]:
+def read_objects(road: str, element: etree._Element, collector: AttributeReader) -> list[RoadObject]:
     """The objects of one road."""
-    return [_read_object(road, item, findings) for item in element.iterfind("objects/object")]
+    return [_read_object(road, item, collector) for item in element.iterfind("objects/object")]
 
 
-def _read_object(road: str, element: etree._Element, findings: AttributeReader) -> RoadObject:
+def _read_object(road: str, element: etree._Element, collector: AttributeReader) -> RoadObject:
     def number(name: str) -> float:
-        return findings.number(element, name, 0.0)
+        return collector.number(element, name, 0.0)
 
     for name in ("length", "width", "height", "radius"):
         if abs(number(name)) > LARGEST_OBJECT:
-            findings.report_error(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
+            collector.report_error(element, f"<object> has {name}={number(name):g}", f"give at most {LARGEST_OBJECT:g}")
     for name in ("t", "zOffset"):
         if abs(number(name)) > FURTHEST:
-            findings.report_error(
+            collector.report_error(
                 element, f"<object> has {name}={number(name):g}", f"give a number within {FURTHEST:g}"
             )
-    findings.spend(element, "objects", 1, MOST_PLACED)
+    collector.spend(element, "objects", 1, MOST_PLACED)
     outlines = [*element.iterfind("outline"), *element.iterfind("outlines/outline")]
-    corners = [tuple(_read_corners(outline, findings)) for outline in outlines]
+    corners = [tuple(_read_corners(outline, collector)) for outline in outlines]
     return RoadObject(
         id=element.get("id", ""),
         name=element.get("name", ""),
         type=element.get("type", "none"),
         subtype=element.get("subtype", ""),
         road=road,
-        s=findings.number(element, "s"),
-        t=findings.number(element, "t"),
+        s=collector.number(element, "s"),
+        t=collector.number(element, "t"),
         z_offset=number("zOffset"),
         heading=number("hdg"),
         pitch=number("pitch"),
@@ -151,44 +151,44 @@ def _read_object(road: str, element: etree._Element, findings: AttributeReader) 
         height=number("height"),
         radius=number("radius"),
         outlines=tuple(outline for outline in corners if len(outline) >= 3),
-        repeats=tuple(_read_repeat(repeat, element, findings) for repeat in element.iterfind("repeat")),
+        repeats=tuple(_read_repeat(repeat, element, collector) for repeat in element.iterfind("repeat")),
     )
 
 
-def _read_corners(outline: etree._Element, findings: AttributeReader) -> list[Corner]:
+def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[Corner]:
     corners = []
     for corner in outline:
         if corner.tag == "cornerRoad":
-            x, y, z = findings.number(corner, "s"), findings.number(corner, "t"), findings.number(corner, "dz", 0.0)
+            x, y, z = collector.number(corner, "s"), collector.number(corner, "t"), collector.number(corner, "dz", 0.0)
         elif corner.tag == "cornerLocal":
-            x, y, z = findings.number(corner, "u"), findings.number(corner, "v"), findings.number(corner, "z", 0.0)
+            x, y, z = collector.number(corner, "u"), collector.number(corner, "v"), collector.number(corner, "z", 0.0)
         else:
             continue
         if max(abs(x), abs(y), abs(z)) > FURTHEST:
-            findings.report_error(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
+            collector.report_error(corner, f"<{corner.tag}> lies beyond {FURTHEST:g} m", "correct its place")
             continue
-        corners.append(Corner(corner.tag == "cornerRoad", x, y, z, findings.number(corner, "height", 0.0)))
+        corners.append(Corner(corner.tag == "cornerRoad", x, y, z, collector.number(corner, "height", 0.0)))
     return corners
 
 
-def _read_repeat(repeat: etree._Element, element: etree._Element, findings: AttributeReader) -> Repeat:
+def _read_repeat(repeat: etree._Element, element: etree._Element, collector: AttributeReader) -> Repeat:
     def pair(name: str, own: str) -> tuple[float, float]:
-        fallback = findings.number(element, own, 0.0)
-        start = findings.number(repeat, f"{name}Start", fallback)
-        return start, findings.number(repeat, f"{name}End", start)
+        fallback = collector.number(element, own, 0.0)
+        start = collector.number(repeat, f"{name}Start", fallback)
+        return start, collector.number(repeat, f"{name}End", start)
 
-    length, distance = findings.number(repeat, "length"), findings.number(repeat, "distance", 0.0)
+    length, distance = collector.number(repeat, "length"), collector.number(repeat, "distance", 0.0)
     if length > MOST_REPEATED * (distance if distance > 0.0 else 1.0):
         message = f"<repeat> has length={length:g} and distance={distance:g}: the object stands there too often"
-        findings.report_error(repeat, message, f"at most {MOST_REPEATED} of it are read")
+        collector.report_error(repeat, message, f"at most {MOST_REPEATED} of it are read")
         length = 0.0
     step = distance if distance > 0.0 else 1.0
-    findings.spend(repeat, "places of objects", max(length, 0.0) / step, MOST_PLACED)
+    collector.spend(repeat, "places of objects", max(length, 0.0) / step, MOST_PLACED)
     for name, own in (("width", "width"), ("height", "height"), ("t", "t"), ("zOffset", "zOffset")):
         if max(map(abs, pair(name, own))) > LARGEST_OBJECT:
-            findings.report_error(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
+            collector.report_error(repeat, f"<repeat> has a {name} beyond {LARGEST_OBJECT:g} m", "correct it")
     return Repeat(
-        s=findings.number(repeat, "s", findings.number(element, "s", 0.0)),
+        s=collector.number(repeat, "s", collector.number(element, "s", 0.0)),
         length=length,
         distance=distance,
         t=pair("t", "t"),

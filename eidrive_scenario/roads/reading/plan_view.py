@@ -20,44 +20,44 @@ SHORTEST = 1e-9
 """Geometries of no length occur in real maps and are left out [m]."""
 
 
-def read_reference_line(road: etree._Element, length: float, findings: AttributeReader) -> ReferenceLine:
+def read_reference_line(road: etree._Element, length: float, collector: AttributeReader) -> ReferenceLine:
     """The reference line of a <road>.
 
     Its length is that of the geometry where the road states one that differs by more than 1 %.
     """
     plan = road.find("planView")
     if plan is None:
-        findings.report_error(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
+        collector.report_error(road, f"road {road.get('id')!r} has no <planView>", "add its geometry")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     found: list[Curve] = []
     for geometry in plan.iterfind("geometry"):
-        found.extend(_read_geometry(geometry, findings))
+        found.extend(_read_geometry(geometry, collector))
     if not found:
-        findings.report_error(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
+        collector.report_error(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     found.sort(key=lambda curve: curve.s)
     covered = found[-1].s + found[-1].length
     if abs(covered - length) > max(0.01 * length, 0.1):
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
-        remedy = "correct the length or complete the geometry"
-        findings.report_warning(road, "geometry-gap", "lengths that are not those of the geometry", what, remedy)
+        hint = "correct the length or complete the geometry"
+        collector.report_warning(road, "geometry-gap", "lengths that are not those of the geometry", what, hint)
         length = covered
     return ReferenceLine(found, length)
 
 
-def _read_geometry(geometry: etree._Element, findings: AttributeReader) -> Sequence[Curve]:
-    s, x, y, h, length = (findings.number(geometry, name) for name in ("s", "x", "y", "hdg", "length"))
+def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequence[Curve]:
+    s, x, y, h, length = (collector.number(geometry, name) for name in ("s", "x", "y", "hdg", "length"))
     if length <= SHORTEST:
         if length < 0.0:
-            findings.report_error(geometry, f"<geometry> has length={length:g}", "give a positive length")
+            collector.report_error(geometry, f"<geometry> has length={length:g}", "give a positive length")
         return []
     if length > LONGEST:
-        findings.report_error(geometry, f"<geometry> has length={length:g}", f"at most {LONGEST:g} m are read")
+        collector.report_error(geometry, f"<geometry> has length={length:g}", f"at most {LONGEST:g} m are read")
         return []
     shape = next((child for child in geometry if isinstance(child.tag, str) and child.tag != "userData"), None)
     if shape is None:
-        findings.report_error(
+        collector.report_error(
             geometry, "<geometry> says no shape", "add one of " + ", ".join(f"<{kind}>" for kind in KINDS)
         )
         return []
@@ -65,29 +65,31 @@ def _read_geometry(geometry: etree._Element, findings: AttributeReader) -> Seque
     if shape.tag == "line":
         return [Arc(s, x, y, h, length, line=line)]
     if shape.tag == "arc":
-        return [Arc(s, x, y, h, length, findings.number(shape, "curvature"), line=line)]
+        return [Arc(s, x, y, h, length, collector.number(shape, "curvature"), line=line)]
     if shape.tag == "spiral":
-        start, end = findings.number(shape, "curvStart"), findings.number(shape, "curvEnd")
+        start, end = collector.number(shape, "curvStart"), collector.number(shape, "curvEnd")
         return [curves.spiral(s, x, y, h, length, start, end, line)]
     if shape.tag == "poly3":
-        a, b, c, d = (findings.number(shape, name) for name in "abcd")
-        findings.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
+        a, b, c, d = (collector.number(shape, name) for name in "abcd")
+        collector.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
         return curves.poly3(s, x, y, h, length, (a, b, c, d), line)
     if shape.tag == "paramPoly3":
-        return [_read_param_poly3(shape, s, x, y, h, length, findings)]
-    findings.report_error(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
+        return [_read_param_poly3(shape, s, x, y, h, length, collector)]
+    collector.report_error(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
     return []
 
 
 def _read_param_poly3(
-    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, findings: AttributeReader
+    shape: etree._Element, s: float, x: float, y: float, h: float, length: float, collector: AttributeReader
 ) -> Cubic:
-    u0, u1, u2, u3 = (findings.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
-    v0, v1, v2, v3 = (findings.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
+    u0, u1, u2, u3 = (collector.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
+    v0, v1, v2, v3 = (collector.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
     span = shape.get("pRange", "normalized")
     if span not in ("arcLength", "normalized"):
-        findings.report_error(shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized")))
+        collector.report_error(
+            shape, f"<paramPoly3> has pRange={span!r}", suggestion(span, ("arcLength", "normalized"))
+        )
     if not any((u1, u2, u3, v1, v2, v3)):
-        findings.report_error(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
+        collector.report_error(shape, "<paramPoly3> stays in one point", "give the polynomials of its u and v")
     pace = 1.0 if span == "arcLength" else 1.0 / length
     return Cubic(s, x, y, h, length, (u0, u1, u2, u3), (v0, v1, v2, v3), pace, line=line_of(shape.getparent()))

@@ -77,7 +77,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def actor(self) -> Actor:
         """The actor that the action is about."""
         if self.actor_name is None:
-            raise self.problem("has no actor", "put it into a ManeuverGroup with Actors")
+            raise self.error("has no actor", "put it into a ManeuverGroup with Actors")
         return self.context.actors[self.actor_name]
 
     def settle(self) -> None:
@@ -107,7 +107,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
         self.stop(Status.INVALID)
         self.context.release(self)
         why = f"{who} is not in the world"
-        self.context.warnings += self.problem(f"is not performed: {why}", "let it wait for the entity").diagnostics
+        self.context.warnings += self.error(f"is not performed: {why}", "let it wait for the entity").diagnostics
         return why
 
     def check_decision(self) -> None:
@@ -124,10 +124,10 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
                     text = f"left actor {actor.name!r} with {name} = {value!r} (expected finite numbers)"
                     raise InvalidResult(self, "update", text)
 
-    def problem(self, message: str, remedy: str = "") -> ScenarioError:
+    def error(self, message: str, hint: str = "") -> ScenarioError:
         """An error at the place of this action in the file."""
         where = self.action
-        return ScenarioError(Diagnostic(f"{type(where).__name__} {message}", remedy, where.source, where.line))
+        return ScenarioError(Diagnostic(f"{type(where).__name__} {message}", hint, where.source, where.line))
 
 
 def _is_finite(value: object) -> bool:

@@ -76,13 +76,13 @@ def unassigned_controller_warnings(actors: Mapping[str, Actor], wanted: Mapping[
     """Warnings of controllers that name no module of ours and for which nothing stands in."""
     names = {controller.name for actor in actors.values() for controller in actor.controllers}
     astray = sorted(name for name in wanted if name not in names)
-    remedy = "give it the property module=eidrive, or let something stand in for it"
+    hint = "give it the property module=eidrive, or let something stand in for it"
     if astray:
-        remedy += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
+        hint += f"; the stand-in for {', '.join(map(repr, astray))} found no controller of that name"
     alone = [
         Diagnostic(
             f"the controller {controller.name!r} of {actor.name} is not known: {actor.name} keeps lane and speed",
-            remedy,
+            hint,
             controller.source,
             controller.line,
         )

@@ -54,8 +54,8 @@ def build_route(
     except RouteError as error:
         what = "round the closed" if again and route.closed else "along the"
         message = f"no way leads {what} route {route.name!r}: {error.diagnostics[0].message}"
-        remedy = "change its waypoints" + (', or say closed="false"' if again and route.closed else "")
-        raise ScenarioError(Diagnostic(message, remedy, route.source, route.line)) from error
+        hint = "change its waypoints" + (', or say closed="false"' if again and route.closed else "")
+        raise ScenarioError(Diagnostic(message, hint, route.source, route.line)) from error
 
 
 def _through(

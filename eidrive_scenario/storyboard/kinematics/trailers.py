@@ -43,7 +43,7 @@ def pairs(actors: Mapping[str, Actor]) -> Iterator[tuple[Actor, Actor]]:
 
 def check_acyclic(actors: Mapping[str, Actor]) -> None:
     """Raises ScenarioError for those that draw themselves, directly or over others."""
-    problems = []
+    diagnostics = []
     for name, actor in actors.items():
         train: list[str] = []
         while actor.trailer is not None and actor.trailer in actors and actor.trailer not in train:
@@ -51,9 +51,9 @@ def check_acyclic(actors: Mapping[str, Actor]) -> None:
             actor = actors[actor.trailer]
         if name in train:
             where = actors[name].entity
-            problems.append(Diagnostic(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
-    if problems:
-        raise ScenarioError(problems)
+            diagnostics.append(Diagnostic(f"{name!r} is a trailer of itself", "uncouple one", where.source, where.line))
+    if diagnostics:
+        raise ScenarioError(diagnostics)
 
 
 def pose_behind(front: Actor, back: Actor, *, straight: bool = False) -> Pose:

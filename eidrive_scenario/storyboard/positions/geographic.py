@@ -86,8 +86,8 @@ def _angles(frame: model.GeoPosition, context: RuntimeContext) -> tuple[float, f
             )
             context.warnings.append(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
     else:
-        remedy = "give latitudeDeg and longitudeDeg"
-        raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", remedy, frame.source, frame.line))
+        hint = "give latitudeDeg and longitudeDeg"
+        raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", hint, frame.source, frame.line))
     if in_degrees:
         latitude, longitude = math.radians(latitude), math.radians(longitude)
     if abs(latitude) > math.pi / 2.0 or abs(longitude) > 2.0 * math.pi:

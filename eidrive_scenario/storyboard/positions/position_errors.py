@@ -25,6 +25,6 @@ def road_origin(frame: Any, context: RuntimeContext) -> LaneLocation:
     return here
 
 
-def position_error(frame: model.Element, message: str, remedy: str = "") -> ScenarioError:
+def position_error(frame: model.Element, message: str, hint: str = "") -> ScenarioError:
     """Return the error for a position, with its file and line."""
-    return ScenarioError(Diagnostic(f"{type(frame).__name__} {message}", remedy, frame.source, frame.line))
+    return ScenarioError(Diagnostic(f"{type(frame).__name__} {message}", hint, frame.source, frame.line))

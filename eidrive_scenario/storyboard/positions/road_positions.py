@@ -140,9 +140,9 @@ def _on_road(frame: model.RoadPosition | model.LanePosition, context: RuntimeCon
     on_road = min(max(s, 0.0), length)
     if abs(on_road - s) > 1e-3:
         message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
-        problem = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
-        if problem not in context.warnings:
-            context.warnings.append(problem)
+        diagnostic = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
+        if diagnostic not in context.warnings:
+            context.warnings.append(diagnostic)
     return on_road
 
 

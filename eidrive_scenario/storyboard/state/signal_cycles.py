@@ -81,13 +81,15 @@ def cycle_errors(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
     """What makes no sense in the declarations."""
     for cycle in cycles.values():
         if (cycle.element.delay or 0.0) < 0.0:
-            yield _problem(cycle, f"has a delay of {cycle.element.delay:g} s", "give a number of seconds, at least 0")
+            yield _diagnostic(
+                cycle, f"has a delay of {cycle.element.delay:g} s", "give a number of seconds, at least 0"
+            )
         for phase in cycle.phases:
             if not phase.duration >= 0.0:
-                remedy = "give a number of seconds, at least 0, or INF"
-                yield _problem(cycle, f"has a phase of {phase.duration:g} s", remedy, phase)
+                hint = "give a number of seconds, at least 0, or INF"
+                yield _diagnostic(cycle, f"has a phase of {phase.duration:g} s", hint, phase)
         if cycle in _leaders(cycle):
-            yield _problem(cycle, "is its own reference, directly or over others", "take a reference out")
+            yield _diagnostic(cycle, "is its own reference, directly or over others", "take a reference out")
 
 
 def cycle_warnings(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
@@ -97,16 +99,16 @@ def cycle_warnings(cycles: Mapping[str, SignalCycle]) -> Iterator[Diagnostic]:
         if not reference:
             if cycle.element.delay:
                 message = "has a delay to no controller: it counts from the start"
-                yield _problem(cycle, message, "name a controller in `reference`")
+                yield _diagnostic(cycle, message, "name a controller in `reference`")
         elif leader is None:
             message = f"refers to {reference!r}, which has no phases here: its delay counts from the start"
-            yield _problem(cycle, message, suggestion(reference, cycles))
+            yield _diagnostic(cycle, message, suggestion(reference, cycles))
         elif cycle.element.delay is None:
             message = f"refers to {reference!r} without a delay: they go together"
-            yield _problem(cycle, message, 'write delay="0"')
+            yield _diagnostic(cycle, message, 'write delay="0"')
         elif leader.total != cycle.total:
             message = f"takes {cycle.total:g} s for its phases, its reference {reference!r} {leader.total:g} s"
-            yield _problem(cycle, message, "a delay makes sense between cycles of one length")
+            yield _diagnostic(cycle, message, "a delay makes sense between cycles of one length")
 
 
 def _leaders(cycle: SignalCycle) -> list[SignalCycle]:
@@ -128,6 +130,6 @@ def _group(name: str, roads: RoadNetwork | None) -> tuple[str, ...]:
     return found.signals if found is not None else ()
 
 
-def _problem(cycle: SignalCycle, message: str, remedy: str, at: model.Element | None = None) -> Diagnostic:
+def _diagnostic(cycle: SignalCycle, message: str, hint: str, at: model.Element | None = None) -> Diagnostic:
     where = at or cycle.element
-    return Diagnostic(f"TrafficSignalController {cycle.name!r} {message}", remedy, where.source, where.line)
+    return Diagnostic(f"TrafficSignalController {cycle.name!r} {message}", hint, where.source, where.line)

@@ -29,8 +29,8 @@ class Signals:
         }
         controllers = declared.traffic_signal_controller if declared is not None else ()
         self.cycles: Mapping[str, SignalCycle] = signal_cycles(controllers, roads)
-        self.problems = tuple(cycle_errors(self.cycles))
-        self.warnings = () if self.problems else tuple(cycle_warnings(self.cycles))
+        self.errors = tuple(cycle_errors(self.cycles))
+        self.warnings = () if self.errors else tuple(cycle_warnings(self.cycles))
         self._states: dict[str, str] = {}
         self._running: dict[str, int | None] = {}
         self._spelled: dict[str, str] = {}
@@ -80,9 +80,9 @@ class Signals:
         """What is odd about the name of a signal; its state is kept by that name all the same."""
         if self.identify(name) in self._colors:
             return None
-        remedy = suggestion(name, self._colors) if self._colors else "the road network has no signals"
+        hint = suggestion(name, self._colors) if self._colors else "the road network has no signals"
         message = f"the road network has no signal {name!r}: its state is kept, and nowhere to be seen"
-        return Diagnostic(message, remedy, element.source, element.line)
+        return Diagnostic(message, hint, element.source, element.line)
 
     def _shown_in(self, cycle: SignalCycle, phase: model.Phase) -> dict[str, str]:
         """A phase's states by signal; a group's is that of each of its signals, and of its own name without any."""

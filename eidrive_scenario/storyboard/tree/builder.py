@@ -66,7 +66,7 @@ class Builder:
         self._context = context
         self._actions = actions
         self._conditions = conditions
-        self._problems: list[Diagnostic] = []
+        self._diagnostics: list[Diagnostic] = []
         self._made: list[Condition] = []
         self._selections = Selections(scenario)
 
@@ -81,10 +81,10 @@ class Builder:
             try:
                 condition.bind(self._context)
             except ScenarioError as error:
-                self._problems += error.diagnostics
-        self._problems += self._context.signals.problems
-        if self._problems:
-            raise ScenarioError(sorted(dict.fromkeys(self._problems), key=lambda p: (p.source, p.line or 0)))
+                self._diagnostics += error.diagnostics
+        self._diagnostics += self._context.signals.errors
+        if self._diagnostics:
+            raise ScenarioError(sorted(dict.fromkeys(self._diagnostics), key=lambda p: (p.source, p.line or 0)))
         return init, root
 
     def _init(self, actions: model.InitActions) -> list[ActionBehaviour]:
@@ -126,7 +126,7 @@ class Builder:
             try:
                 maneuvers.append(self._context.catalog_entry(reference, model.Maneuver, group))
             except ScenarioError as error:
-                self._problems += error.diagnostics
+                self._diagnostics += error.diagnostics
         children = [self._maneuver(maneuver, path, cast) for maneuver in maneuvers]
         return ManeuverGroupElement(self._context, path, children, limit=group.maximum_execution_count)
 
@@ -175,7 +175,7 @@ class Builder:
                         raise RegistryError(f"actions {name!r} ({self._actions.value(name)}) is no ActionBehaviour")
                     behaviours.append(made)
             except ScenarioError as error:
-                self._problems += error.diagnostics
+                self._diagnostics += error.diagnostics
         return behaviours
 
     def _wait(self, name: str, trigger: model.Trigger | None) -> WaitForTrigger | None:
@@ -191,7 +191,7 @@ class Builder:
         try:
             condition = self._condition(entry)
         except ScenarioError as error:
-            self._problems += error.diagnostics
+            self._diagnostics += error.diagnostics
             return None
         if condition is None:
             return None
@@ -223,8 +223,8 @@ class Builder:
         """Whether something of that name is registered; if not, that is a problem."""
         if name in registry:
             return True
-        remedy = f"take it out, or install a package that registers it; {suggestion(name, registry)}"
-        self._problems.append(Diagnostic(otherwise, remedy, leaf.source, leaf.line))
+        hint = f"take it out, or install a package that registers it; {suggestion(name, registry)}"
+        self._diagnostics.append(Diagnostic(otherwise, hint, leaf.source, leaf.line))
         return False
 
     def _entities(self, name: str) -> list[str]:
@@ -232,7 +232,7 @@ class Builder:
         try:
             return self._selections.members(name)
         except ScenarioError as error:
-            self._problems += error.diagnostics
+            self._diagnostics += error.diagnostics
             return []
 
 

@@ -31,7 +31,7 @@ class InitBlock(Composite):
         while waiting:
             late = [behaviour for behaviour in waiting if not self._started(behaviour)]
             if len(late) == len(waiting):
-                raise late[0].problem("refers to an entity that nobody places", "place that entity in Init")
+                raise late[0].error("refers to an entity that nobody places", "place that entity in Init")
             waiting = late
         for behaviour in self.running:
             behaviour.settle()

@@ -27,14 +27,14 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     if not found:
         return []
     places = dict(_places(scenario))
-    problems = []
+    diagnostics = []
     for element in found[:_SHOWN]:
         source, line = places.get(element.record.path, (str(scenario.path or ""), None))
         skipped = sum(transition is ElementTransition.SKIP for _, transition in element.record.transitions)
         why = "its start trigger was not fulfilled" if element.start_leaf is not None else "nothing started it"
         if skipped:
             why = f"it was skipped {skipped} times by its priority" if skipped > 1 else "it was skipped by its priority"
-        problems.append(
+        diagnostics.append(
             Diagnostic(
                 f"{element.kind} {element.name!r} never started: {why} until the run ended at {time:.2f} s ({end})",
                 f"eidrive run --explain {element.name!r} states what its trigger lacked",
@@ -45,8 +45,8 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
     if len(found) > _SHOWN:
         more = len(found) - _SHOWN
         what = f"{more} more {'act or event' if more == 1 else 'acts and events'} never started"
-        problems.append(Diagnostic(what, "eidrive run --log - shows those that did", str(scenario.path or "")))
-    return problems
+        diagnostics.append(Diagnostic(what, "eidrive run --log - shows those that did", str(scenario.path or "")))
+    return diagnostics
 
 
 def _unstarted(element: StoryElement) -> Iterator[StoryElement]:

@@ -57,18 +57,18 @@ class Asn1Encoder:
         try:
             import asn1tools
         except ImportError as error:
-            remedy = "install it: pip install 'eidrive-scenario[asn1]'"
-            raise SettingError(Diagnostic("asn1_files needs the package asn1tools", remedy, source, line)) from error
+            hint = "install it: pip install 'eidrive-scenario[asn1]'"
+            raise SettingError(Diagnostic("asn1_files needs the package asn1tools", hint, source, line)) from error
         for file in files:
             if not is_regular_file(file):
-                problem = Diagnostic(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
-                raise SettingError(problem)
+                diagnostic = Diagnostic(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
+                raise SettingError(diagnostic)
         try:
             texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
             self._modules = asn1tools.compile_string("\n".join(texts), "uper")
         except OSError as error:
-            problem = Diagnostic(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
-            raise SettingError(problem) from error
+            diagnostic = Diagnostic(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
+            raise SettingError(diagnostic) from error
         except Exception as error:  # asn1tools raises errors of many kinds for modules that are wrong
             names = ", ".join(str(file) for file in files)
             message = f"{names}: {_without_quotes(error)}"
@@ -81,7 +81,9 @@ class Asn1Encoder:
             for kind in kinds:
                 self._try(kind)
         except SettingError as error:
-            raise SettingError([replace(problem, source=source, line=line) for problem in error.diagnostics]) from error
+            raise SettingError(
+                [replace(diagnostic, source=source, line=line) for diagnostic in error.diagnostics]
+            ) from error
 
     def _try(self, kind: str) -> None:
         """Encode messages of this kind with and without what is optional."""
@@ -103,8 +105,8 @@ class Asn1Encoder:
             encoded: bytes = self._modules.encode(TYPES[message.kind], value)
         except Exception as error:  # of many kinds, such as AttributeError for a type that refers to itself
             why = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without all that we wanted to say
-            remedy = "docs/channels.md says after which standards messages are laid out"
-            raise SettingError(Diagnostic(f"the ASN.1 modules take no {message.kind}: {why}", remedy)) from error
+            hint = "docs/channels.md says after which standards messages are laid out"
+            raise SettingError(Diagnostic(f"the ASN.1 modules take no {message.kind}: {why}", hint)) from error
         return encoded
 
     def decode(self, kind: str, data: bytes) -> Any:

@@ -152,8 +152,8 @@ def _number(spec: ActorSpec, name: str, default: float, *, zero: bool = False, b
         value = math.nan
     if not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0)) and value < below):
         bound = "at least 0" if zero else "above 0"
-        remedy = f"give a number {bound}" + (f" and at most {below:g}" if below < math.inf else "")
-        raise SettingError(Diagnostic(f"{spec.name!r}: Property {name!r} is {text!r}", remedy))
+        hint = f"give a number {bound}" + (f" and at most {below:g}" if below < math.inf else "")
+        raise SettingError(Diagnostic(f"{spec.name!r}: Property {name!r} is {text!r}", hint))
     return value
 
 

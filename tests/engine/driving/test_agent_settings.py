@@ -130,4 +130,4 @@ def test_a_wrong_property_says_where_and_what_would_be_right(entries: list[tuple
 def test_all_findings_come_at_once() -> None:
     with pytest.raises(SettingError) as caught:
         settings(("detector", "x"), ("color", "red"), ("range", "-1"))
-    assert [problem.line for problem in caught.value.diagnostics] == [12, 14, 13]
+    assert [diagnostic.line for diagnostic in caught.value.diagnostics] == [12, 14, 13]

@@ -63,7 +63,7 @@ def test_check_plan_numbers_in_range_accepts(made: Plan) -> None:
         (plan(points=POINTS[:1], speeds=np.ones(1)), "returned points of shape (1, 2) and speeds of shape (1,)"),
     ],
 )
-def test_check_plan_numbers_out_of_range_refuses(made: Any, problem: str) -> None:
+def test_check_plan_numbers_out_of_range_refuses(made: Any, diagnostic: str) -> None:
     with pytest.raises(InvalidResult) as caught:
         check_plan(StraightPlanner(), made)
-    assert str(caught.value).startswith(f"plan {problem}")
+    assert str(caught.value).startswith(f"plan {diagnostic}")

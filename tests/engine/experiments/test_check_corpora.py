@@ -80,7 +80,7 @@ def found(maps: None) -> dict[str, Counter[str]]:
             scenario = load_scenario(path)
         except ScenarioError:
             continue
-        rules = Counter(problem.rule for _, problem in run_rules(scenario))
+        rules = Counter(diagnostic.rule for _, diagnostic in run_rules(scenario))
         counts[path.relative_to(CORPORA).as_posix()] = rules
     return counts
 

@@ -92,7 +92,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def findings(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
+def collector(folder: Path, *fragments: str, text: str = SCENARIO) -> list[tuple[Level, Diagnostic]]:
     """What the rules find in the scaffold with elements put in their places."""
     root = etree.fromstring(text)
     for fragment in fragments:
@@ -132,7 +132,7 @@ def put(root: etree._Element, element: etree._Element) -> None:
 
 
 def broken(folder: Path, *fragments: str) -> set[str]:
-    return {problem.rule for _, problem in findings(folder, *fragments)}
+    return {diagnostic.rule for _, diagnostic in collector(folder, *fragments)}
 
 
 def documented() -> Iterator[tuple[str, str, str]]:
@@ -157,20 +157,20 @@ def test_the_document_has_every_rule_with_its_level() -> None:
 
 
 def test_the_scaffold_breaks_no_rule(folder: Path) -> None:
-    assert findings(folder) == []
+    assert collector(folder) == []
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_each_example_breaks_its_rule_and_no_other(folder: Path, name: str) -> None:
     level, example = EXAMPLES[name]
-    found = findings(folder, example)
-    assert {problem.rule for _, problem in found} == {name}
+    found = collector(folder, example)
+    assert {diagnostic.rule for _, diagnostic in found} == {name}
     assert {level.value for level, _ in found} == {level}
     in_roads = etree.fromstring(f"<Fragment>{example}</Fragment>")[0].tag in OF_ROADS
-    for _, problem in found:
-        assert problem.source == str(folder / ("street.xodr" if in_roads else "scenario.xosc"))
-        assert problem.line is not None
-        assert problem.hint
+    for _, diagnostic in found:
+        assert diagnostic.source == str(folder / ("street.xodr" if in_roads else "scenario.xosc"))
+        assert diagnostic.line is not None
+        assert diagnostic.hint
 
 
 def test_backwards_a_car_is_no_faster(folder: Path) -> None:
@@ -179,7 +179,7 @@ def test_backwards_a_car_is_no_faster(folder: Path) -> None:
 
 
 def test_a_rule_can_be_left_out(folder: Path) -> None:
-    findings(folder, "<StopTrigger/>")
+    collector(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
     assert list(run_rules(scenario, ["no-stop-trigger"])) == []
     with pytest.raises(SettingError, match="there is no rule 'no-stop'; did you mean 'no-stop-trigger'"):

@@ -188,9 +188,9 @@ def test_wrong_settings_are_told_with_file_and_line(
     path = edited(tmp_path, replacement)
     with pytest.raises(InputError, match=expected) as caught:
         Simulation(load_scenario(path), seed=1)
-    problem = caught.value.diagnostics[0]
-    assert problem.source == str(path)
-    assert "fusion" in path.read_text().splitlines()[(problem.line or 0) - 1]
+    diagnostic = caught.value.diagnostics[0]
+    assert diagnostic.source == str(path)
+    assert "fusion" in path.read_text().splitlines()[(diagnostic.line or 0) - 1]
 
 
 def test_a_run_with_lidars(tmp_path: Path) -> None:

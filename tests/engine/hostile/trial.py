@@ -82,7 +82,7 @@ def _child(path: Path, writer: int, cpu_limit: int, run: Callable[[Path], None])
         os.dup2(silence, 2)
         run(path)
     except InputError as error:
-        kind, detail = "refused", "\n".join(str(problem) for problem in error.diagnostics)[:3000]
+        kind, detail = "refused", "\n".join(str(diagnostic) for diagnostic in error.diagnostics)[:3000]
     except EidriveError as error:
         kind, detail = "refused", str(error)[:3000]
     except MemoryError:

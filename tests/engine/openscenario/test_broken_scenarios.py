@@ -51,12 +51,12 @@ def test_broken_file_is_refused_where_it_is_wrong(name: str, monkeypatch: pytest
     path = BROKEN / f"{name}.xosc"
     with pytest.raises(ScenarioError) as caught:
         load_scenario(path)
-    problems = caught.value.diagnostics
-    assert [problem.line for problem in problems] == [line for line, _ in EXPECTED[name]]
-    for problem, (line, text) in zip(problems, EXPECTED[name], strict=True):
-        assert problem.source == str(path)
-        assert str(problem).startswith(f"{path}:{line}: ")
-        assert text in str(problem)
+    diagnostics = caught.value.diagnostics
+    assert [diagnostic.line for diagnostic in diagnostics] == [line for line, _ in EXPECTED[name]]
+    for diagnostic, (line, text) in zip(diagnostics, EXPECTED[name], strict=True):
+        assert diagnostic.source == str(path)
+        assert str(diagnostic).startswith(f"{path}:{line}: ")
+        assert text in str(diagnostic)
 
 
 @pytest.mark.parametrize("name", ["xml_bomb", "external_entity"])

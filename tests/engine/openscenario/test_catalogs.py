@@ -120,7 +120,7 @@ def test_what_is_not_there_is_named_at_the_reference(
     line = 1 + next(number for number, text in enumerate(path.read_text().splitlines()) if "<CatalogRef" in text)
     with pytest.raises(ScenarioError, match=message) as caught:
         load_scenario(path)
-    assert [(problem.source, problem.line) for problem in caught.value.diagnostics] == [(str(path), line)]
+    assert [(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics] == [(str(path), line)]
 
 
 def test_entry_name_that_occurs_twice_is_an_error_with_both_lines(
@@ -131,9 +131,9 @@ def test_entry_name_that_occurs_twice_is_an_error_with_both_lines(
     catalog = shelf("Drivers.xosc", "Drivers", "".join(map(named.format, ("calm", "wild", "calm"))))
     with pytest.raises(ScenarioError) as caught:
         load_scenario(scene(reference("Drivers", "calm")))
-    (problem,) = caught.value.diagnostics
-    assert (problem.source, problem.line) == (str(catalog), 4)
-    assert problem.message == "the catalog has a second entry 'calm'; the first is at line 2"
+    (diagnostic,) = caught.value.diagnostics
+    assert (diagnostic.source, diagnostic.line) == (str(catalog), 4)
+    assert diagnostic.message == "the catalog has a second entry 'calm'; the first is at line 2"
     load_scenario(scene(reference("Drivers", "wild")))
 
 
@@ -152,7 +152,7 @@ def test_mistakes_in_an_entry_carry_the_catalog_and_its_line(
     )
     with pytest.raises(ScenarioError) as caught:
         load_scenario(scene(reference("Drivers", "driver")))
-    assert {(problem.source, problem.line) for problem in caught.value.diagnostics} == {(str(catalog), 5)}
+    assert {(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics} == {(str(catalog), 5)}
 
 
 def test_a_catalog_of_before_1_0_is_read_with_a_warning(shelf: Callable[..., Path], scene: Callable[..., Path]) -> None:

@@ -89,13 +89,13 @@ def test_what_is_no_expression_is_refused(text: str) -> None:
 def test_a_misspelt_function_is_named_with_its_nearest() -> None:
     with pytest.raises(ExpressionError) as caught:
         evaluate("squrt(4)", {})
-    assert caught.value.remedy == "did you mean 'sqrt'?"
+    assert caught.value.hint == "did you mean 'sqrt'?"
 
 
 def test_a_bare_word_may_lack_its_dollar() -> None:
     with pytest.raises(ExpressionError) as caught:
         evaluate("speed + 1", {"speed": 3})
-    assert caught.value.remedy == "a parameter begins with $"
+    assert caught.value.hint == "a parameter begins with $"
 
 
 def test_text_is_joined_where_a_bare_word_stands() -> None:

@@ -81,8 +81,8 @@ def check(scenario_xml: Callable[..., bytes]) -> Check:
         init = parts.pop("init", PLACE)
         scenario = load_scenario(scenario_xml(story=story, init=init, stop=stop, **parts))
         survey = LintContext(scenario)
-        problems = [problem for rule in RULES for problem in rule.run(survey)]
-        return [problem.rule for problem in sorted(problems, key=lambda problem: problem.line or 0)]
+        diagnostics = [diagnostic for rule in RULES for diagnostic in rule.run(survey)]
+        return [diagnostic.rule for diagnostic in sorted(diagnostics, key=lambda diagnostic: diagnostic.line or 0)]
 
     return found
 

@@ -94,7 +94,7 @@ def test_whole_parameter_with_fraction_of_zero_meets_constraints_as_a_number(
         if fits:
             scenario = load_scenario(text, values)
             assert float(scenario.parameters["P"]) == float(value)
-            assert not any("declared as" in problem.message for problem in scenario.warnings)
+            assert not any("declared as" in diagnostic.message for diagnostic in scenario.warnings)
         else:
             with pytest.raises(ScenarioError, match="outside its constraints"):
                 load_scenario(text, values)

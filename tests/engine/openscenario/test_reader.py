@@ -18,10 +18,10 @@ CURVE = """<Trajectory name="t" closed="false"><Shape><Polyline>
 </Polyline></Shape></Trajectory>"""
 
 
-def problems_of(xml: bytes) -> list[str]:
+def diagnostics_of(xml: bytes) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(xml)
-    return [problem.message for problem in caught.value.diagnostics]
+    return [diagnostic.message for diagnostic in caught.value.diagnostics]
 
 
 def private(action: str) -> str:
@@ -57,11 +57,11 @@ def test_text_between_tags_is_kept(scenario_xml: Build) -> None:
 
 
 def test_text_where_none_belongs_is_refused(scenario_xml: Build) -> None:
-    assert problems_of(scenario_xml(init="stray")) == ["Actions holds text, where only elements may stand"]
+    assert diagnostics_of(scenario_xml(init="stray")) == ["Actions holds text, where only elements may stand"]
 
 
 def test_what_a_later_version_made_optional_is_required_before(scenario_xml: Build) -> None:
-    assert problems_of(scenario_xml(minor=1)) == ["Storyboard lacks the element Story"]
+    assert diagnostics_of(scenario_xml(minor=1)) == ["Storyboard lacks the element Story"]
     assert load_scenario(scenario_xml(minor=2)).version == (1, 2)
 
 
@@ -94,14 +94,14 @@ def test_deprecated_use_is_a_warning(scenario_xml: Build) -> None:
     ],
 )
 def test_structure_is_checked(scenario_xml: Build, action: str, message: str) -> None:
-    found = problems_of(scenario_xml(init=private(f"<PrivateAction>{action}</PrivateAction>")))
+    found = diagnostics_of(scenario_xml(init=private(f"<PrivateAction>{action}</PrivateAction>")))
     assert any(one.startswith(message) for one in found)
 
 
 def test_a_second_corner_is_missed(scenario_xml: Build) -> None:
     first, _, _ = CURVE.partition('<Vertex time="1">')
     xml = scenario_xml(init=private(TRAJECTORY.format(inside=f"{first}</Polyline></Shape></Trajectory>")))
-    assert problems_of(xml) == ["Polyline lacks another Vertex"]
+    assert diagnostics_of(xml) == ["Polyline lacks another Vertex"]
 
 
 def test_an_attribute_of_a_newer_version_says_so(scenario_xml: Build) -> None:
@@ -120,7 +120,7 @@ def test_an_empty_action_is_a_warning_and_an_empty_position_is_not(
         "Action is empty"
     ]
     teleport = private("<PrivateAction><TeleportAction><Position/></TeleportAction></PrivateAction>")
-    assert problems_of(scenario_xml(minor=2, init=teleport)) == ["Position is empty"]
+    assert diagnostics_of(scenario_xml(minor=2, init=teleport)) == ["Position is empty"]
 
 
 def test_schema_location_may_be_given(scenario_xml: Build) -> None:
@@ -148,7 +148,7 @@ def test_a_byte_order_mark_and_another_encoding_are_read(scenario_xml: Build) ->
     ],
 )
 def test_other_files_are_refused(xml: bytes, message: str) -> None:
-    assert any(message in found for found in problems_of(xml))
+    assert any(message in found for found in diagnostics_of(xml))
 
 
 def test_catalogs_are_documents_too() -> None:
@@ -157,7 +157,7 @@ def test_catalogs_are_documents_too() -> None:
     document = read_document(xml)
     assert document.catalog is not None
     assert document.catalog.name == "Routes"
-    assert problems_of(xml) == ["this is a catalog, not a scenario"]
+    assert diagnostics_of(xml) == ["this is a catalog, not a scenario"]
 
 
 def test_distributions_are_documents_too() -> None:

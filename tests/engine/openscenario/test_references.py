@@ -15,10 +15,10 @@ from eidrive_scenario.settings import key_lines, load_yaml
 
 
 def scope_of(**parameters: tuple[ParameterType, str]) -> Scope:
-    scope, findings = Scope(), DiagnosticCollector()
+    scope, collector = Scope(), DiagnosticCollector()
     for name, (kind, value) in parameters.items():
-        declare(scope, ParameterDeclaration(name=name, parameter_type=kind, value=value), None, findings)
-    assert not findings.problems
+        declare(scope, ParameterDeclaration(name=name, parameter_type=kind, value=value), None, collector)
+    assert not collector.errors
     return scope
 
 
@@ -85,16 +85,19 @@ def test_value_of_a_parameter_is_not_resolved_again() -> None:
         ("{a: ${2 ** 3}}", "a.xosc:1: setting 'a': "),
     ],
 )
-def test_wrong_reference_is_reported_with_line_and_key(text: str, problem: str) -> None:
+def test_wrong_reference_is_reported_with_line_and_key(text: str, diagnostic: str) -> None:
     with pytest.raises(SettingError) as caught:
         resolved(text)
-    assert str(caught.value).startswith(problem)
+    assert str(caught.value).startswith(diagnostic)
 
 
 def test_all_wrong_references_are_reported_together() -> None:
     with pytest.raises(SettingError) as caught:
         resolved("{a: $X, b: [$Y, $Latency]}")
-    assert [problem.message.split(":")[0] for problem in caught.value.diagnostics] == ["setting 'a'", "setting 'b.0'"]
+    assert [diagnostic.message.split(":")[0] for diagnostic in caught.value.diagnostics] == [
+        "setting 'a'",
+        "setting 'b.0'",
+    ]
 
 
 def test_settings_without_scope_stay_as_they_are() -> None:

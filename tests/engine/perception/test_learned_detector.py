@@ -234,7 +234,7 @@ def test_without_torch_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     ],
 )
 def test_weights_with_unusable_description_are_refused(
-    changes: dict[str, object], problem: str, tmp_path: Path
+    changes: dict[str, object], diagnostic: str, tmp_path: Path
 ) -> None:
     pytest.importorskip("torch", reason="needs the extra 'learned'")
     with np.load(SHIPPED / "yolov5.npz") as stored:
@@ -244,4 +244,4 @@ def test_weights_with_unusable_description_are_refused(
     np.savez(path, **arrays)
     with pytest.raises(SettingError) as error:
         build_network("yolov5", LearnedSettings(weights=str(path)))
-    assert f"do not fit: {problem}" in str(error.value)
+    assert f"do not fit: {diagnostic}" in str(error.value)

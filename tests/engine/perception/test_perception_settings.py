@@ -38,7 +38,7 @@ def write(tmp_path: Path) -> Write:
 def told(path: Path, **options: str) -> list[str]:
     with pytest.raises(InputError) as error:
         Simulation(load_for_seed(path, 1, {}), settings=RunSettings(**options))  # type: ignore[arg-type]
-    return [str(problem) for problem in error.value.diagnostics]
+    return [str(diagnostic) for diagnostic in error.value.diagnostics]
 
 
 def line_of(path: Path, word: str) -> int:
@@ -60,9 +60,9 @@ def line_of(path: Path, word: str) -> int:
 )
 def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: str, words: str) -> None:
     path = write(**{name: value})
-    (problem,) = told(path)
-    assert problem.startswith(f"{path}:{line_of(path, name)}: ")
-    assert words in problem
+    (diagnostic,) = told(path)
+    assert diagnostic.startswith(f"{path}:{line_of(path, name)}: ")
+    assert words in diagnostic
 
 
 @pytest.mark.parametrize(
@@ -84,9 +84,9 @@ def test_a_wrong_property_is_told_with_its_line(write: Write, name: str, value: 
 )
 def test_a_wrong_sensor_is_told_with_its_line(write: Write, value: str, words: str) -> None:
     path = write(sensors=value)
-    (problem,) = told(path)
-    assert problem.startswith(f"{path}:{line_of(path, 'sensors')}: ")
-    assert words in problem
+    (diagnostic,) = told(path)
+    assert diagnostic.startswith(f"{path}:{line_of(path, 'sensors')}: ")
+    assert words in diagnostic
 
 
 def test_weights_that_do_not_fit_are_told_with_their_line_before_the_run(write: Write, tmp_path: Path) -> None:
@@ -105,8 +105,8 @@ def test_weights_that_do_not_fit_are_told_with_their_line_before_the_run(write: 
 
 
 def test_a_latency_as_long_as_reports_live_makes_no_sense(write: Write) -> None:
-    (problem,) = told(write(detector_latency="1.5"))
-    assert "report_timeout is 1 s" in problem
+    (diagnostic,) = told(write(detector_latency="1.5"))
+    assert "report_timeout is 1 s" in diagnostic
 
 
 def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> None:
@@ -115,11 +115,13 @@ def test_settings_of_a_detector_are_checked_with_their_line(write: Write) -> Non
         '<Property name="detector" value="oracle"/>', '<Property name="detector" value="lidar"/>'
     )
     path.write_text(text)
-    problems = told(path)
+    diagnostics = told(path)
     line = line_of(path, "detector_settings")
-    assert all(problem.startswith(f"{path}:{line}: ") for problem in problems if "detector_settings" not in problem)
-    assert any("'min_points' is 0" in problem for problem in problems)
-    assert any("did you mean 'off_road'?" in problem for problem in problems)
+    assert all(
+        diagnostic.startswith(f"{path}:{line}: ") for diagnostic in diagnostics if "detector_settings" not in diagnostic
+    )
+    assert any("'min_points' is 0" in diagnostic for diagnostic in diagnostics)
+    assert any("did you mean 'off_road'?" in diagnostic for diagnostic in diagnostics)
 
 
 def test_settings_of_the_detector_in_the_file_do_not_bother_one_by_option(write: Write) -> None:
@@ -131,15 +133,15 @@ def test_settings_of_the_detector_in_the_file_do_not_bother_one_by_option(write:
 
 def test_a_sensor_that_the_detector_lacks_is_told_with_the_line_of_the_sensors(write: Write) -> None:
     path = write(sensors="[truth]")
-    (problem,) = told(path, detector="lidar")
-    assert problem.startswith(f"{path}:{line_of(path, 'sensors')}: ")
-    assert "needs a sensor of kind lidar" in problem
+    (diagnostic,) = told(path, detector="lidar")
+    assert diagnostic.startswith(f"{path}:{line_of(path, 'sensors')}: ")
+    assert "needs a sensor of kind lidar" in diagnostic
 
 
 def test_an_unknown_detector_by_option_names_the_option(write: Write) -> None:
-    (problem,) = told(write(), detector="ldiar")
-    assert problem.startswith("--detector: ")
-    assert "did you mean 'lidar'?" in problem
+    (diagnostic,) = told(write(), detector="ldiar")
+    assert diagnostic.startswith("--detector: ")
+    assert "did you mean 'lidar'?" in diagnostic
 
 
 class Collector:

@@ -86,10 +86,10 @@ def test_detections_of_finite_numbers_are_accepted(found: Detections) -> None:
         (lambda: (), "returned an object of type tuple"),
     ],
 )
-def test_detections_of_anything_else_are_refused(make: Callable[[], Any], problem: str) -> None:
+def test_detections_of_anything_else_are_refused(make: Callable[[], Any], diagnostic: str) -> None:
     with pytest.raises(InvalidResult) as caught:
         check_detections(Given(), "detect", make())
-    assert str(caught.value).startswith(f"detect {problem}")
+    assert str(caught.value).startswith(f"detect {diagnostic}")
 
 
 def test_results_of_derived_classes_of_others_are_checked() -> None:
@@ -109,8 +109,8 @@ def test_results_of_derived_classes_of_others_are_checked() -> None:
     ],
 )
 def test_detector_class_that_declares_nonsense_is_named(
-    name: str, value: object, problem: str, monkeypatch: pytest.MonkeyPatch
+    name: str, value: object, diagnostic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(OracleDetector, name, value)
-    with pytest.raises(RegistryError, match=rf"detectors 'oracle' \(.*:OracleDetector\): {problem}"):
+    with pytest.raises(RegistryError, match=rf"detectors 'oracle' \(.*:OracleDetector\): {diagnostic}"):
         build_detector(AgentSettings(detector="oracle"))

@@ -22,10 +22,10 @@ from eidrive_scenario.storyboard.state.commands import CustomCommand
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 
-def problems(text: str, **given: object) -> list[str]:
+def diagnostics(text: str, **given: object) -> list[str]:
     with pytest.raises(SettingError) as caught:
         parse_criteria(text, source="a.xosc", line=10, **given)  # type: ignore[arg-type]
-    return [str(problem) for problem in caught.value.diagnostics]
+    return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
 def test_one_criterion() -> None:
@@ -73,7 +73,7 @@ def test_several_of_one_kind_get_numbers() -> None:
 
 def test_every_mistake_is_named_where_it_stands() -> None:
     text = "\n  colision: {of: Ego}\n  min_distance:\n    of: Ego\n    too: Incoming\n  time_limit: {within: 0}\n"
-    assert problems(text) == [
+    assert diagnostics(text) == [
         "a.xosc:11: unknown criterion 'colision'; did you mean 'collision'?",
         "a.xosc:12: setting 'to' is missing; add it",
         "a.xosc:14: unknown setting 'too'; did you mean 'to'?",
@@ -83,10 +83,10 @@ def test_every_mistake_is_named_where_it_stands() -> None:
 
 def test_what_is_looked_at_has_to_be_there() -> None:
     known = {"entities": ["Ego", "Incoming"], "monitors": ["CutIn"]}
-    assert problems("monitor: {of: CutInn}", **known) == [
+    assert diagnostics("monitor: {of: CutInn}", **known) == [
         "a.xosc:10: monitor looks at 'CutInn', which is no monitor of this scenario; did you mean 'CutIn'?"
     ]
-    assert problems("monitor: {of: CutIn}", monitors=[]) == [
+    assert diagnostics("monitor: {of: CutIn}", monitors=[]) == [
         "a.xosc:10: monitor looks at 'CutIn', which is no monitor of this scenario; it declares none"
     ]
     assert len(parse_criteria("monitor: {of: CutIn}", entities=[], monitors=["CutIn"])) == 1
@@ -102,14 +102,14 @@ def test_what_is_looked_at_has_to_be_there() -> None:
     ],
 )
 def test_settings_without_meaning(text: str, told: str) -> None:
-    (problem,) = problems(text)
-    assert problem.startswith("a.xosc:10: ")
-    assert told in problem
+    (diagnostic,) = diagnostics(text)
+    assert diagnostic.startswith("a.xosc:10: ")
+    assert told in diagnostic
 
 
 def test_in_a_list_each_has_its_own_lines() -> None:
     text = "[collision: {off_: A},\n collision: {of: B},\n collision: {\n of: C, with: 3}]"
-    assert [problem.split(": ")[0] for problem in problems(text)] == [
+    assert [diagnostic.split(": ")[0] for diagnostic in diagnostics(text)] == [
         "a.xosc:10",
         "a.xosc:10",
         "a.xosc:13",
@@ -118,32 +118,33 @@ def test_in_a_list_each_has_its_own_lines() -> None:
 
 
 def test_an_actor_that_the_scenario_does_not_have() -> None:
-    assert problems("min_distance: {of: Ego, to: Incomming}", entities=["Ego", "Incoming"]) == [
+    assert diagnostics("min_distance: {of: Ego, to: Incomming}", entities=["Ego", "Incoming"]) == [
         "a.xosc:10: min_distance looks at 'Incomming', which is no entity of this scenario; did you mean 'Incoming'?"
     ]
 
 
 @pytest.mark.parametrize("text", ["", "collision", "3", "[1, 2]", "[]"])
 def test_what_declares_nothing(text: str) -> None:
-    (problem,) = problems(text)
-    assert "declares no criterion; write min_distance: {of: Ego" in problem
+    (diagnostic,) = diagnostics(text)
+    assert "declares no criterion; write min_distance: {of: Ego" in diagnostic
 
 
 def test_settings_that_are_no_mapping() -> None:
-    (problem,) = problems("max_speed: 13")
+    (diagnostic,) = diagnostics("max_speed: 13")
     assert (
-        problem == "a.xosc:10: max_speed is given 13; write max_speed: {…} with the settings name, fatal, of, at_most"
+        diagnostic
+        == "a.xosc:10: max_speed is given 13; write max_speed: {…} with the settings name, fatal, of, at_most"
     )
 
 
 def test_broken_yaml() -> None:
-    (problem,) = problems("collision: {of: Ego")
-    assert problem.startswith("a.xosc:10: not valid YAML")
+    (diagnostic,) = diagnostics("collision: {of: Ego")
+    assert diagnostic.startswith("a.xosc:10: not valid YAML")
 
 
 def test_a_criterion_that_would_get_lost() -> None:
-    (problem,) = problems("collision: {of: A}\ncollision: {of: B}")
-    assert problem.startswith("a.xosc:11: not valid YAML: 'collision' stands here twice")
+    (diagnostic,) = diagnostics("collision: {of: A}\ncollision: {of: B}")
+    assert diagnostic.startswith("a.xosc:11: not valid YAML: 'collision' stands here twice")
 
 
 @pytest.mark.parametrize(("kind", "passed"), [("exitSuccess", True), ("exitFailure", False)])

@@ -88,7 +88,7 @@ def test_a_lane_inside_the_center_of_its_bend_does_not_turn_round(road: Text, ma
 def test_numbers_that_no_road_has_are_refused(road: Text, map_of: Text) -> None:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(map_of(road(geometry=geometry(0.0, 1e12, 100.0))), "town.xodr")
-    assert [str(problem) for problem in caught.value.diagnostics] == [
+    assert [str(diagnostic) for diagnostic in caught.value.diagnostics] == [
         "town.xodr:1: <geometry> has x='1000000000000.0'; give a number of at most 1e+09"
     ]
 
@@ -102,16 +102,16 @@ def test_a_route_over_a_jump_of_the_map_has_no_more_points_than_its_lanes(road: 
     assert line[[0, -1], 0] == pytest.approx([10.0, 9e8 + 40.0])
 
 
-def problems(text: str) -> list[str]:
+def diagnostics(text: str) -> list[str]:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(text, "town.xodr")
-    return [str(problem) for problem in caught.value.diagnostics]
+    return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
 @pytest.mark.parametrize("text", ["1_0", "\u0663", "nan", "1,5"])
 def test_numbers_are_written_as_in_xml(road: Text, map_of: Text, text: str) -> None:
     lanes = section().replace('a="4"', f'a="{text}"', 1).replace('id="-1"', f'id="-{text}"', 1)
-    found = problems(map_of(road(lanes=lanes)))
+    found = diagnostics(map_of(road(lanes=lanes)))
     assert f"town.xodr:1: <width> has a={text!r}; give a finite number" in found
     assert f"town.xodr:1: <lane> has id={'-' + text!r}; give a whole number" in found
 
@@ -119,7 +119,7 @@ def test_numbers_are_written_as_in_xml(road: Text, map_of: Text, text: str) -> N
 def test_an_object_that_repeats_without_end(road: Text, map_of: Text) -> None:
     repeat = '<repeat s="0" length="50" distance="1e-9" tStart="3" tEnd="3"/>'
     objects = f'<objects><object id="1" type="pole" s="0" t="3" radius="0.1" height="1">{repeat}</object></objects>'
-    assert problems(map_of(road(extra=objects))) == [
+    assert diagnostics(map_of(road(extra=objects))) == [
         "town.xodr:1: <repeat> has length=50 and distance=1e-09: the object stands there too often; "
         "at most 100000 of it are read"
     ]

@@ -15,10 +15,10 @@ from eidrive_scenario.roads import RoadNetwork, surface_meshes
 Text = Callable[..., str]
 
 
-def problems(text: str) -> list[str]:
+def diagnostics(text: str) -> list[str]:
     with pytest.raises(RoadError) as caught:
         RoadNetwork.parse(text, "town.xodr")
-    return [str(problem) for problem in caught.value.diagnostics]
+    return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
@@ -28,16 +28,16 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 def test_a_document_type_is_refused_before_anything_is_read() -> None:
     bomb = '<!DOCTYPE x [<!ENTITY a "b"><!ENTITY c "&a;&a;&a;&a;">]><OpenDRIVE>&c;</OpenDRIVE>'
-    (found,) = problems(bomb)
+    (found,) = diagnostics(bomb)
     assert found.startswith("town.xodr:1: the file has a document type declaration (DOCTYPE)")
     outside = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/hostname">]><OpenDRIVE>&a;</OpenDRIVE>'
-    assert problems(outside) == [found]
+    assert diagnostics(outside) == [found]
 
 
 def test_broken_xml_and_other_xml() -> None:
-    (found,) = problems("<OpenDRIVE>\n<road></OpenDRIVE>")
+    (found,) = diagnostics("<OpenDRIVE>\n<road></OpenDRIVE>")
     assert found.startswith("town.xodr:2: not well-formed XML: an end tag does not match its start tag")
-    assert problems("<OpenSCENARIO/>") == [
+    assert diagnostics("<OpenSCENARIO/>") == [
         "town.xodr:1: the root element is not <OpenDRIVE>; is this another kind of file?"
     ]
 
@@ -50,7 +50,7 @@ def test_all_findings_come_in_one_go_with_line_and_remedy(road: Text, map_of: Te
         "\n" + road("2", link='<successor elementType="road" elementId="7" contactPoint="begin"/>'),
         "\n" + road("3", geometry='<geometry s="0" x="0" y="0" hdg="0" length="100"><spline/></geometry>'),
     )
-    assert problems(text) == [
+    assert diagnostics(text) == [
         "town.xodr:2: <geometry> has y='nan'; give a finite number",
         "town.xodr:2: <arc> lacks the attribute 'curvature'; did you mean 'curvatur'? (rename it to curvature)",
         "town.xodr:3: road '1' occurs twice; give each road its own id",
@@ -73,7 +73,7 @@ def one_lane(number: int) -> str:
 
 def test_lanes_that_occur_twice_or_are_no_center(road: Text, map_of: Text) -> None:
     center, right = f"<center>{one_lane(0)}{one_lane(1)}</center>", f"<right>{one_lane(-1)}{one_lane(-1)}</right>"
-    found = problems(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
+    found = diagnostics(map_of(road(lanes=sides(f"<left>{one_lane(0)}</left>", center, right))))
     assert [line.split(": ", 1)[1] for line in found] == [
         "lane 0 stands under <left>; left lanes have ids above 0, the center lane 0, right lanes below 0",
         "lane 1 stands under <center>; left lanes have ids above 0, the center lane 0, right lanes below 0",
@@ -169,7 +169,7 @@ def test_incomplete_line_of_a_road_mark_is_a_warning_and_drawn_by_its_type(
 def test_curve_that_leads_immensely_far_is_refused(road: Text, map_of: Text, curve: str) -> None:
     """A grid over such a road would take gigabytes."""
     text = road("1", geometry=f'<geometry s="0" x="0" y="0" hdg="0" length="100">{curve}</geometry>')
-    far = [found for found in problems(map_of(text)) if "a geometry of road '1' leads " in found]
+    far = [found for found in diagnostics(map_of(text)) if "a geometry of road '1' leads " in found]
     assert len(far) == 1
     assert "at most 1e+06 m are read" in far[0]
 
@@ -258,7 +258,7 @@ def test_signals_references_and_controllers(road: Text, map_of: Text) -> None:
 
 def test_a_reference_to_a_signal_that_does_not_exist(road: Text, map_of: Text) -> None:
     extra = '<signals><signalReference s="5" t="3" id="9" orientation="-"/></signals>'
-    (found,) = problems(map_of(road(extra=extra)))
+    (found,) = diagnostics(map_of(road(extra=extra)))
     assert found == "town.xodr:1: reference to signal '9', which does not exist; correct the id"
 
 
@@ -290,7 +290,7 @@ def test_a_garbled_file_is_refused_or_gives_a_network_that_works(library: Path, 
     except RoadError as error:
         refused = error.diagnostics
     if refused:
-        assert all(problem.message and problem.hint for problem in refused)
+        assert all(diagnostic.message and diagnostic.hint for diagnostic in refused)
         return
     network.locate([0.0, 30.0], [0.0, 5.0])
     for key in list(network.graph)[:8]:

@@ -26,7 +26,7 @@ def section(s: float, *right: str) -> str:
 
 def told(text: str) -> list[tuple[str, str]]:
     """Rule and message of each finding."""
-    return [(problem.rule, problem.message) for problem in RoadNetwork.parse(text, "town.xodr").map_warnings]
+    return [(diagnostic.rule, diagnostic.message) for diagnostic in RoadNetwork.parse(text, "town.xodr").map_warnings]
 
 
 def two_lines(s: float = 50.0, x: float = 50.0, y: float = 0.0, h: float = 0.0) -> str:
@@ -59,8 +59,8 @@ def test_a_length_that_is_not_that_of_the_geometry(road: Text, map_of: Text) -> 
 
 def test_each_kind_is_told_once_with_the_places_of_the_others(road: Text, map_of: Text) -> None:
     text = map_of(*("\n" + road(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
-    (problem,) = RoadNetwork.parse(text, "town.xodr").map_warnings
-    assert str(problem) == (
+    (diagnostic,) = RoadNetwork.parse(text, "town.xodr").map_warnings
+    assert str(diagnostic) == (
         "town.xodr:3: road '0' jumps by 1 m at s = 50 m; 7 more of such jumps: line 5, 7, 9, 11, …; "
         "let each geometry begin where the one before ends"
     )
@@ -191,8 +191,8 @@ def test_real_maps_are_not_flooded(corpora: Path) -> None:
     """Every map gives a finding or none for each kind; those below are true ones, looked up in the files."""
     found = {}
     for file in sorted(corpora.rglob("*.xodr")):
-        for problem in RoadNetwork.load(file).map_warnings:
-            found.setdefault((file.name, problem.rule), []).append(problem.line)
+        for diagnostic in RoadNetwork.load(file).map_warnings:
+            found.setdefault((file.name, diagnostic.rule), []).append(diagnostic.line)
     assert found == {
         ("SampleDatabase.xodr", "lane-width"): [1807, 1807],
         ("SampleDatabase.xodr", "geometry-gap"): [3237, 3237],

@@ -180,7 +180,7 @@ def test_an_unknown_signal_is_told_with_the_nearest_one() -> None:
     ],
 )
 def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalController], expected: str) -> None:
-    assert any(expected in str(problem) for problem in signals(*controllers).problems)
+    assert any(expected in str(diagnostic) for diagnostic in signals(*controllers).errors)
 
 
 @pytest.mark.parametrize(
@@ -194,5 +194,5 @@ def test_declarations_that_make_no_sense(controllers: list[model.TrafficSignalCo
 )
 def test_declarations_that_are_odd(controllers: list[model.TrafficSignalController], expected: str) -> None:
     found = signals(*controllers)
-    assert found.problems == ()
-    assert any(expected in str(problem) for problem in found.warnings)
+    assert found.errors == ()
+    assert any(expected in str(diagnostic) for diagnostic in found.warnings)

@@ -148,9 +148,9 @@ def test_all_that_cannot_be_executed_is_named_at_once_with_its_line(build: Any) 
             everywhere=swarm,
             registered=Registry("actions", all_but_one),
         )
-    messages = [problem.message for problem in caught.value.diagnostics]
+    messages = [diagnostic.message for diagnostic in caught.value.diagnostics]
     assert messages == ["TrafficStopAction is not executed yet"] * 2
-    assert all(problem.line for problem in caught.value.diagnostics)
+    assert all(diagnostic.line for diagnostic in caught.value.diagnostics)
 
 
 def test_a_reference_to_no_element_is_an_error_with_the_nearest_name(build: Any) -> None:

@@ -120,4 +120,4 @@ def test_encoder_of_a_hostile_module_is_refused(tmp_path: Path, types: str) -> N
     path.write_text(f"M DEFINITIONS AUTOMATIC TAGS ::= BEGIN\n{types}\nEND\n")
     with pytest.raises(SettingError) as caught:
         Asn1Encoder([path], ["cam"], source="scene.xosc", line=7)
-    assert all((problem.source, problem.line) == ("scene.xosc", 7) for problem in caught.value.diagnostics)
+    assert all((diagnostic.source, diagnostic.line) == ("scene.xosc", 7) for diagnostic in caught.value.diagnostics)

@@ -111,7 +111,7 @@ def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
     file.write_text("model: composed\nloss:\n  kind: bernoulli\nspeed: 3\n")
     with pytest.raises(SettingError) as caught:
         load_profile(file)
-    assert [str(problem) for problem in caught.value.diagnostics] == [
+    assert [str(diagnostic) for diagnostic in caught.value.diagnostics] == [
         f"{file}:2: setting 'loss.bernoulli.probability' is missing; add it",
         f"{file}:4: unknown setting 'speed'; known: delay, description, loss, model, name, own_perception, reordering",
     ]
@@ -151,10 +151,12 @@ def test_each_wrong_key_is_told_with_its_own_line_however_deep_it_stands(tmp_pat
     }
     with pytest.raises(SettingError) as caught:
         load_profile(file)
-    assert {str(problem) for problem in caught.value.diagnostics} == {f"{file}:{line}: {told[line]}" for line in told}
+    assert {str(diagnostic) for diagnostic in caught.value.diagnostics} == {
+        f"{file}:{line}: {told[line]}" for line in told
+    }
     with pytest.raises(SettingError) as caught:
         load_profile("\n  " + DEEP.replace("\n", "\n  "), origin="scenario.xosc", line=40)
-    assert {problem.line for problem in caught.value.diagnostics} == {40 + line for line in told}
+    assert {diagnostic.line for diagnostic in caught.value.diagnostics} == {40 + line for line in told}
 
 
 @pytest.mark.parametrize(

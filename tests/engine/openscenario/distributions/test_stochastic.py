@@ -220,7 +220,7 @@ def test_what_is_wrong_is_said_with_its_line(stochastic: Write, distribution: st
     path = stochastic(distribution)
     with pytest.raises(ScenarioError) as caught:
         load_distribution(path)
-    assert [(problem.source, problem.line) for problem in caught.value.diagnostics] == [(str(path), line)]
+    assert [(diagnostic.source, diagnostic.line) for diagnostic in caught.value.diagnostics] == [(str(path), line)]
     assert message in str(caught.value)
 
 
