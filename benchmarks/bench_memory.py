@@ -32,7 +32,7 @@ SCENARIO = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-
 <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles><Properties/>
 </Vehicle><ObjectController><Controller name="station"><Properties><Property name="module" value="eidrive"/>
 </Properties></Controller></ObjectController></ScenarioObject></Entities><Storyboard><Init><Actions>
-<Private entitiref="Ego">
+<Private entityRef="Ego">
 <PrivateAction><TeleportAction><Position><LanePosition roadId="{road_id}" laneId="{lane}" s="200"/></Position>
 </TeleportAction></PrivateAction><PrivateAction><LongitudinalAction><SpeedAction>
 <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>

@@ -33,19 +33,19 @@ VEHICLE = """<Vehicle name="car" vehicleCategory="car"><BoundingBox><Center x="1
 <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
 <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles></Vehicle>"""
 SWARM = """<GlobalAction><TrafficAction trafficName="swarm"><TrafficSwarmAction innerRadius="10" semiMajorAxis="{reach}"
-semiMinorAxis="{reach}" numberOfVehicles="{count}" offset="0"><CentralObject entitiref="car0"/>
+semiMinorAxis="{reach}" numberOfVehicles="{count}" offset="0"><CentralObject entityRef="car0"/>
 </TrafficSwarmAction></TrafficAction></GlobalAction>"""
-PLACED = """<Private entitiref="car{n}"><PrivateAction><TeleportAction><Position>
+PLACED = """<Private entityRef="car{n}"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="{road}" laneId="{lane}" s="{s:.2f}"/></Position></TeleportAction></PrivateAction>
 <PrivateAction><LongitudinalAction><SpeedAction>
 <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
 <SpeedActionTarget><AbsoluteTargetSpeed value="{speed:.2f}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
 </PrivateAction></Private>"""
 GROUP = """<ManeuverGroup name="g{n}" maximumExecutionCount="1"><Actors selectTriggeringEntities="false">
-<Entitiref entitiref="car{n}"/></Actors><Maneuver name="m{n}"><Event name="e{n}" priority="override">
+<EntityRef entityRef="car{n}"/></Actors><Maneuver name="m{n}"><Event name="e{n}" priority="override">
 <Action name="a{n}"><PrivateAction>{action}</PrivateAction></Action><StartTrigger><ConditionGroup>
 <Condition name="c{n}" delay="0" conditionEdge="rising"><ByEntityCondition>
-<TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="car{n}"/></TriggeringEntities><EntityCondition>
+<TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="car{n}"/></TriggeringEntities><EntityCondition>
 <TraveledDistanceCondition value="{distance:.1f}"/></EntityCondition></ByEntityCondition></Condition></ConditionGroup>
 </StartTrigger></Event></Maneuver></ManeuverGroup>"""
 ACTIONS = (

@@ -35,7 +35,7 @@ _CAR = """
   </Properties></Controller></ObjectController>
 </ScenarioObject>"""
 _START = """
-<Private entitiref="{name}">
+<Private entityRef="{name}">
   <PrivateAction><TeleportAction><Position>
     <LanePosition roadId="1" laneId="{lane}" s="{s:g}"/>
   </Position></TeleportAction></PrivateAction>

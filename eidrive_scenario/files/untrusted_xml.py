@@ -185,7 +185,7 @@ _KINDS_OF_ERRORS = {
         "ERR_UNSUPPORTED_ENCODING": "the encoding is not supported",
         "ERR_UNKNOWN_ENCODING": "the encoding is not supported",
         "ERR_UNDECLARED_ENTITY": "an entity is not declared",
-        "ERR_ENTITIREF_SEMICOL_MISSING": "a reference lacks its semicolon",
+        "ERR_ENTITYREF_SEMICOL_MISSING": "a reference lacks its semicolon",
         "ERR_NAME_REQUIRED": "a name is expected",
         "ERR_ATTRIBUTE_NOT_STARTED": "the value of an attribute is not quoted",
         "ERR_ATTRIBUTE_NOT_FINISHED": "the value of an attribute is not closed",

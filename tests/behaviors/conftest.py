@@ -29,7 +29,7 @@ SCENARIO = """<OpenSCENARIO>
   <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork>
   <Entities>{cars}</Entities>
   <Storyboard><Init><Actions>{everywhere}
-    <Private entitiref="Ego">{ego}</Private><Private entitiref="Other">{other}</Private></Actions></Init>
+    <Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private></Actions></Init>
     {story}</Storyboard></OpenSCENARIO>"""
 
 CRUISE = """<ObjectController><Controller name="cruise" controllerType="movement"><Properties>{properties}</Properties>

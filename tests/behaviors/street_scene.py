@@ -12,7 +12,7 @@ OURS = """<ObjectController><Controller name="c" controllerType="movement"><Prop
   <Property name="module" value="eidrive"/></Properties></Controller></ObjectController>"""
 
 GROUP = """<ManeuverGroup name="group {number}" maximumExecutionCount="1">
-  <Actors selectTriggeringEntities="false"><Entitiref entitiref="{actor}"/></Actors>
+  <Actors selectTriggeringEntities="false"><EntityRef entityRef="{actor}"/></Actors>
   <Maneuver name="maneuver {number}"><Event name="event {number}" priority="parallel">
   <Action name="action {number}">{action}</Action>{trigger}</Event></Maneuver></ManeuverGroup>"""
 TRIGGER = """<StartTrigger><ConditionGroup><Condition name="c" delay="0" conditionEdge="{edge}">{condition}</Condition>

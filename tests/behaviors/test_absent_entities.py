@@ -7,19 +7,19 @@ from typing import Any
 import pytest
 from street_scene import after, everywhere, private
 
-DELETE = everywhere('<EntityAction entitiref="Other"><DeleteEntityAction/></EntityAction>')
+DELETE = everywhere('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
 TO_OTHER_S_LANE = private(
     '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" dynamicsDimension="time" '
-    'value="1"/><LaneChangeTarget><RelativeTargetLane entitiref="Other" value="0"/></LaneChangeTarget>'
+    'value="1"/><LaneChangeTarget><RelativeTargetLane entityRef="Other" value="0"/></LaneChangeTarget>'
     "</LaneChangeAction></LateralAction>"
 )
 BESIDE_OTHER = private(
     '<LateralAction><LaneOffsetAction continuous="true"><LaneOffsetActionDynamics dynamicsShape="step"/>'
-    '<LaneOffsetTarget><RelativeTargetLaneOffset entitiref="Other" value="1"/></LaneOffsetTarget>'
+    '<LaneOffsetTarget><RelativeTargetLaneOffset entityRef="Other" value="1"/></LaneOffsetTarget>'
     "</LaneOffsetAction></LateralAction>"
 )
 BEHIND_EGO = private(
-    '<LongitudinalAction><LongitudinalDistanceAction entitiref="Ego" distance="20" continuous="false" '
+    '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="20" continuous="false" '
     'freespace="false"/></LongitudinalAction>'
 )
 DRIVE_TO = private(
@@ -66,7 +66,7 @@ def test_what_is_not_performed_is_said_at_the_end(run: Any) -> None:
 def test_who_is_deleted_and_added_at_one_instant_is_moved(run: Any) -> None:
     """Deleted and added in one event, Other is where it was added in the next view, as after a teleport."""
     back = everywhere(
-        '<EntityAction entitiref="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
+        '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
         "</Position></AddEntityAction></EntityAction>"
     )
     others = {"Other": (-2, 150.0, 10.0)}
@@ -89,12 +89,12 @@ PROFILE = private(
     "</SpeedProfileAction></LongitudinalAction>"
 )
 TOGETHER = private(
-    '<SynchronizeAction masterEntitiref="Ego"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
+    '<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="400"/>'
     '</TargetPositionMaster><TargetPosition><LanePosition roadId="1" laneId="-1" s="400"/></TargetPosition>'
     "</SynchronizeAction>"
 )
 BACK = everywhere(
-    '<EntityAction entitiref="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
+    '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="300"/>'
     "</Position></AddEntityAction></EntityAction>"
 )
 
@@ -123,7 +123,7 @@ def test_who_enters_at_the_instant_of_his_action_does_it(scene: Any, order: tupl
 
 
 def test_an_ego_that_drives_itself_may_be_deleted(run: Any) -> None:
-    delete = everywhere('<EntityAction entitiref="Ego"><DeleteEntityAction/></EntityAction>')
+    delete = everywhere('<EntityAction entityRef="Ego"><DeleteEntityAction/></EntityAction>')
     add = BACK.replace('"Other"', '"Ego"')
     played = run(2, ("Ego", delete, after(0.475)), ("Ego", add, after(0.975)), others={"Other": (-2, 150.0, 10.0)})
     there = ["Ego" in frame.view for frame in played.frames]

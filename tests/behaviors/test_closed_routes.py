@@ -114,7 +114,7 @@ def test_a_closed_route_without_a_way_back_is_an_error(run: Any) -> None:
 def test_along_the_assigned_route_it_may_be_further(run: Any, algorithm: str, far: bool) -> None:
     """The end of road 2 is 50 + 62.8 + 100 m ahead along the route, and 50 + 62.8 m behind by road 4."""
     position = '<Position><LanePosition roadId="2" laneId="-1" s="100"/></Position>'
-    condition = f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>
+    condition = f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><DistanceCondition freespace="false" rule="greaterThan" value="200"
       coordinateSystem="road" relativeDistanceType="longitudinal" routingAlgorithm="{algorithm}">{position}
       </DistanceCondition></EntityCondition></ByEntityCondition>"""

@@ -14,7 +14,7 @@ NOTHING = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traff
 
 
 def of(condition: str, entity: str = "Ego", rule: str = "any") -> str:
-    names = "".join(f'<Entitiref entitiref="{name}"/>' for name in entity.split())
+    names = "".join(f'<EntityRef entityRef="{name}"/>' for name in entity.split())
     return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="{rule}">{names}</TriggeringEntities>
       <EntityCondition>{condition}</EntityCondition></ByEntityCondition>"""
 
@@ -54,16 +54,16 @@ def speed(value: float, seconds: float) -> str:
     ("condition", "time"),
     [
         # 50 m less 10 m/s · t; headways at 20 m/s; both reach 4 m ahead and 1 m behind
-        ('<RelativeDistanceCondition entitiref="Other" freespace="false" relativeDistanceType="longitudinal" '
+        ('<RelativeDistanceCondition entityRef="Other" freespace="false" relativeDistanceType="longitudinal" '
          'rule="lessThan" value="29.5"/>', 2.1),
-        ('<RelativeDistanceCondition entitiref="Other" freespace="true" relativeDistanceType="longitudinal" '
+        ('<RelativeDistanceCondition entityRef="Other" freespace="true" relativeDistanceType="longitudinal" '
          'coordinateSystem="lane" rule="lessThan" value="29.5"/>', 1.6),
-        ('<RelativeDistanceCondition entitiref="Other" freespace="false" relativeDistanceType="euclidianDistance" '
+        ('<RelativeDistanceCondition entityRef="Other" freespace="false" relativeDistanceType="euclidianDistance" '
          'rule="lessOrEqual" value="30"/>', 2.0),
-        ('<TimeHeadwayCondition entitiref="Other" freespace="false" rule="lessThan" value="1.495" '
+        ('<TimeHeadwayCondition entityRef="Other" freespace="false" rule="lessThan" value="1.495" '
          'relativeDistanceType="longitudinal" coordinateSystem="road"/>', 2.1),
         ('<TimeToCollisionCondition freespace="true" rule="lessThan" value="2.45" coordinateSystem="lane" '
-         'relativeDistanceType="longitudinal"><TimeToCollisionConditionTarget><Entitiref entitiref="Other"/>'
+         'relativeDistanceType="longitudinal"><TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
          "</TimeToCollisionConditionTarget></TimeToCollisionCondition>", 2.1),
         ('<DistanceCondition freespace="false" rule="lessThan" value="49" coordinateSystem="road" '
          'relativeDistanceType="longitudinal"><Position><LanePosition roadId="1" laneId="-1" s="200"/></Position>'
@@ -71,7 +71,7 @@ def speed(value: float, seconds: float) -> str:
         ('<ReachPositionCondition tolerance="5"><Position><LanePosition roadId="1" laneId="-2" s="150"/></Position>'
          "</ReachPositionCondition>", 2.4),
         ('<TraveledDistanceCondition value="39.9"/>', 2.0),
-        ('<CollisionCondition><Entitiref entitiref="Other"/></CollisionCondition>', 4.5),
+        ('<CollisionCondition><EntityRef entityRef="Other"/></CollisionCondition>', 4.5),
         ('<CollisionCondition><ByType type="vehicle"/></CollisionCondition>', 4.5),
     ],
 )  # fmt: skip
@@ -112,7 +112,7 @@ def test_distances_along_the_trajectory_that_is_followed(
     [
         ('<SpeedCondition rule="lessThan" value="10.5"/>', 2.0),
         ('<SpeedCondition rule="lessThan" value="10.5" direction="longitudinal"/>', 2.0),
-        ('<RelativeSpeedCondition entitiref="Other" rule="lessThan" value="0.5"/>', 2.0),
+        ('<RelativeSpeedCondition entityRef="Other" rule="lessThan" value="0.5"/>', 2.0),
         ('<AccelerationCondition rule="greaterThan" value="4.9"/>', 0.1),
         ('<AccelerationCondition rule="lessThan" value="-4.9" direction="longitudinal"/>', 0.1),
         ('<StandStillCondition duration="0.95"/>', 5.0),
@@ -137,9 +137,9 @@ def test_any_and_all(scene: Any) -> None:
 
 
 def test_who_is_not_in_the_world_fulfils_nothing(scene: Any) -> None:
-    gone = '<GlobalAction><EntityAction entitiref="Other"><DeleteEntityAction/></EntityAction></GlobalAction>'
+    gone = '<GlobalAction><EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction></GlobalAction>'
     near = of(
-        '<RelativeDistanceCondition entitiref="Other" freespace="false" relativeDistanceType="longitudinal" '
+        '<RelativeDistanceCondition entityRef="Other" freespace="false" relativeDistanceType="longitudinal" '
         'rule="lessThan" value="29.5"/>'
     )
     played = scene(
@@ -161,7 +161,7 @@ def test_the_speed_of_approach_is_along_the_axis_of_the_distance(scene: Any, fra
     """Ego has 100 m towards +y at 20 m/s, Other 50 m towards +x at 10 m/s: 5 s, of which 4 are left after 1."""
     condition = of(
         f'<TimeToCollisionCondition freespace="false" rule="lessOrEqual" value="4" coordinateSystem="{frame}" '
-        f'relativeDistanceType="{kind}"><TimeToCollisionConditionTarget><Entitiref entitiref="Other"/>'
+        f'relativeDistanceType="{kind}"><TimeToCollisionConditionTarget><EntityRef entityRef="Other"/>'
         "</TimeToCollisionConditionTarget></TimeToCollisionCondition>"
     )
     across = """<PrivateAction><TeleportAction><Position><WorldPosition x="300" y="-102" h="1.5707963267948966"/>
@@ -171,14 +171,14 @@ def test_the_speed_of_approach_is_along_the_axis_of_the_distance(scene: Any, fra
 
 
 def test_a_standing_entity_has_a_headway_without_end(scene: Any) -> None:
-    condition = '<TimeHeadwayCondition entitiref="Other" freespace="false" rule="greaterThan" value="1000"/>'
+    condition = '<TimeHeadwayCondition entityRef="Other" freespace="false" rule="greaterThan" value="1000"/>'
     assert first(scene(0.5, ("Ego", NOTHING, of(condition)), ego=(-1, 100, 0))) == 0.0
 
 
 def test_who_moves_away_has_no_time_to_collision(scene: Any) -> None:
     condition = (
         '<TimeToCollisionCondition freespace="false" rule="greaterThan" value="0"><TimeToCollisionConditionTarget>'
-        '<Entitiref entitiref="Other"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>'
+        '<EntityRef entityRef="Other"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>'
     )
     assert first(scene(1, ("Ego", NOTHING, of(condition)), ego=(-1, 100, 5))) is None
 
@@ -202,7 +202,7 @@ def test_off_the_road_again_counts_from_then_on_though_nobody_asked_in_between(s
 
 def test_who_comes_back_has_not_stood_still_while_away(scene: Any) -> None:
     """Deleted at 0.5 s, back at 2.0 s, seen there at 2.1 s."""
-    entity = '<GlobalAction><EntityAction entitiref="Other">{}</EntityAction></GlobalAction>'
+    entity = '<GlobalAction><EntityAction entityRef="Other">{}</EntityAction></GlobalAction>'
     back = """<AddEntityAction><Position><LanePosition roadId="1" laneId="-1" s="500"/></Position></AddEntityAction>"""
     away = ("Ego", entity.format("<DeleteEntityAction/>"), after(0.45))
     still = of('<StandStillCondition duration="0.95"/>', "Other")
@@ -216,7 +216,7 @@ def test_angles(scene: Any) -> None:
       </TeleportAction></PrivateAction>"""
     world = of('<AngleCondition angleType="heading" angle="0.5" angleTolerance="0.1" coordinateSystem="world"/>')
     lane = of('<AngleCondition angleType="heading" angle="0.5" angleTolerance="0.1" coordinateSystem="lane"/>')
-    other = of('<RelativeAngleCondition entitiref="Other" angleType="heading" angle="-2.64" angleTolerance="0.01"/>')
+    other = of('<RelativeAngleCondition entityRef="Other" angleType="heading" angle="-2.64" angleTolerance="0.01"/>')
     for condition in (world, lane, other):
         played = scene(0.5, ("Ego", NOTHING, condition), ("Ego", turn.format(0.5)), other=(1, 150, 0))
         assert first(played) == pytest.approx(0.1)

@@ -15,7 +15,7 @@ from eidrive_scenario.simulation import RunSettings, Simulation
 SCENARIO = """<OpenSCENARIO>
   <FileHeader revMajor="1" revMinor="3" date="2024-01-01T00:00:00" description="scene" author="test"/>
   <CatalogLocations/><RoadNetwork><LogicFile filepath="street.xodr"/></RoadNetwork><Entities>{cars}</Entities>
-  <Storyboard><Init><Actions><Private entitiref="Ego">{ego}</Private><Private entitiref="Other">{other}</Private>
+  <Storyboard><Init><Actions><Private entityRef="Ego">{ego}</Private><Private entityRef="Other">{other}</Private>
   </Actions></Init></Storyboard></OpenSCENARIO>"""
 JOYSTICK = """<ObjectController name="seat"><Controller name="joystick" controllerType="movement"><Properties/>
   </Controller></ObjectController>"""

@@ -13,9 +13,9 @@ from eidrive_scenario.errors import InputError
 
 CARS = {"Ego": (-1, 100.0, 20.0), "Second": (-2, 120.0, 10.0), "Third": (-2, 300.0, 10.0)}
 MANY = """<EntitySelection name="all"><Members><ByType objectType="vehicle"/></Members></EntitySelection>
-  <EntitySelection name="slow"><Members><Entitiref entitiref="Second"/><Entitiref entitiref="Third"/></Members>
+  <EntitySelection name="slow"><Members><EntityRef entityRef="Second"/><EntityRef entityRef="Third"/></Members>
   </EntitySelection>
-  <EntitySelection name="nested"><Members><Entitiref entitiref="slow"/><Entitiref entitiref="Second"/></Members>
+  <EntitySelection name="nested"><Members><EntityRef entityRef="slow"/><EntityRef entityRef="Second"/></Members>
   </EntitySelection>"""
 SPEED = private(
     '<LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>'
@@ -36,7 +36,7 @@ def group(run: Any) -> Callable[..., Watched]:
 
 def by(entities: str, condition: str, rule: str = "any") -> str:
     return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="{rule}">
-      <Entitiref entitiref="{entities}"/></TriggeringEntities>
+      <EntityRef entityRef="{entities}"/></TriggeringEntities>
       <EntityCondition>{condition}</EntityCondition></ByEntityCondition>"""
 
 
@@ -61,19 +61,19 @@ def test_who_of_a_selection_is_taken_over_frees_all_of_it(group: Any) -> None:
 
 
 def test_so_it_is_with_actions_of_init(group: Any) -> None:
-    init = f'<Private entitiref="slow">{SLOW_DOWN}</Private>'
+    init = f'<Private entityRef="slow">{SLOW_DOWN}</Private>'
     played = group(3, ("Second", SPEED, after(0.95)), init=init)
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
 
 
 def test_actors_that_are_named_one_by_one_are_taken_over_one_by_one(group: Any) -> None:
-    named = 'Second"/><Entitiref entitiref="Third'
+    named = 'Second"/><EntityRef entityRef="Third'
     played = group(3, (named, SLOW_DOWN), ("Second", SPEED, after(0.95)))
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 6])
 
 
 def test_who_of_a_selection_is_deleted_leaves_the_others_to_it(group: Any) -> None:
-    delete = everywhere('<EntityAction entitiref="Second"><DeleteEntityAction/></EntityAction>')
+    delete = everywhere('<EntityAction entityRef="Second"><DeleteEntityAction/></EntityAction>')
     played = group(3, ("slow", SLOW_DOWN), ("Ego", delete, after(0.95)))
     assert played.of("Third", "speed")[-1] == pytest.approx(6)
 
@@ -89,7 +89,7 @@ def test_a_group_triggers_by_any_or_all_of_its_members(group: Any) -> None:
 def test_a_condition_towards_a_group_holds_towards_any_member(group: Any) -> None:
     """Ego is 20 m behind Second and 10 m/s faster: 10 m at 1 s; 200 m behind Third."""
     near = (
-        '<RelativeDistanceCondition entitiref="slow" relativeDistanceType="longitudinal" value="10" freespace="false"'
+        '<RelativeDistanceCondition entityRef="slow" relativeDistanceType="longitudinal" value="10" freespace="false"'
     )
     near = by("Ego", f'{near} coordinateSystem="road" rule="lessOrEqual"/>')
     played = group(2, ("Ego", NOTHING, near))
@@ -104,7 +104,7 @@ def test_a_condition_towards_a_group_holds_towards_any_member(group: Any) -> Non
 def test_a_free_lane_is_free_of_all_members(group: Any) -> None:
     """Both of the group are in lane -2; Ego's own lane is free, and in front of it nobody drives there within 50 m."""
     free = """<RelativeClearanceCondition distanceForward="{}" distanceBackward="0" freeSpace="false"
-      oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/><Entitiref entitiref="slow"/>
+      oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/><EntityRef entityRef="slow"/>
       </RelativeClearanceCondition>"""
     assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(5)))).begun("event 0") == [0.0]
     assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(50)))).begun("event 0") == []
@@ -157,33 +157,33 @@ def test_who_triggers_late_or_by_an_end_is_who_did_it_then(group: Any) -> None:
 @pytest.mark.element("EntitySelection")
 def test_a_group_without_members_is_near_nobody_and_in_nobody_s_way(group: Any) -> None:
     nobody = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'
-    near = """<RelativeDistanceCondition entitiref="walkers" relativeDistanceType="longitudinal" value="1000"
+    near = """<RelativeDistanceCondition entityRef="walkers" relativeDistanceType="longitudinal" value="1000"
       freespace="false" rule="lessThan"/>"""
     assert group(0.5, ("Ego", NOTHING, by("Ego", near)), more=nobody).begun("event 0") == []
     free = """<RelativeClearanceCondition distanceForward="50" distanceBackward="0" freeSpace="false"
       oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/>{}</RelativeClearanceCondition>"""
-    walkers = free.format('<Entitiref entitiref="walkers"/>')
+    walkers = free.format('<EntityRef entityRef="walkers"/>')
     assert group(0.5, ("Ego", NOTHING, by("Ego", free.format(""))), more=nobody).begun("event 0") == []
     assert group(0.5, ("Ego", NOTHING, by("Ego", walkers)), more=nobody).begun("event 0") == [0.0]
 
 
 def test_a_group_is_deleted_and_one_car_is_meant_where_one_has_to_be(group: Any) -> None:
-    delete = everywhere('<EntityAction entitiref="slow"><DeleteEntityAction/></EntityAction>')
+    delete = everywhere('<EntityAction entityRef="slow"><DeleteEntityAction/></EntityAction>')
     played = group(1, ("Ego", delete, after(0.5)))
     assert played.frames[0].view.names == ("Ego", "Second", "Third")
     assert played.frames[-1].view.names == ("Ego",)
     follow = private(
-        '<LongitudinalAction><LongitudinalDistanceAction entitiref="{}" freespace="false" continuous="false" '
+        '<LongitudinalAction><LongitudinalDistanceAction entityRef="{}" freespace="false" continuous="false" '
         'distance="30"/></LongitudinalAction>'
     )
     with pytest.raises(InputError, match="names the selection 'slow' of 2 entities"):
         group(1, ("Ego", follow.format("slow")))
-    alone = '<EntitySelection name="one"><Members><Entitiref entitiref="Second"/></Members></EntitySelection>'
+    alone = '<EntitySelection name="one"><Members><EntityRef entityRef="Second"/></Members></EntitySelection>'
     assert group(8, ("Ego", follow.format("one")), more=alone).result.end_reason == "stop trigger"
 
 
 def test_a_group_in_a_circle_is_an_error(group: Any) -> None:
-    ring = '<EntitySelection name="{}"><Members><Entitiref entitiref="{}"/></Members></EntitySelection>'
+    ring = '<EntitySelection name="{}"><Members><EntityRef entityRef="{}"/></Members></EntitySelection>'
     with pytest.raises(InputError, match="is a member of itself"):
         group(1, ("a", SPEED), more=ring.format("a", "b") + ring.format("b", "a"))
 
@@ -207,7 +207,7 @@ def test_an_external_object_is_where_and_what_the_road_network_says(run: Any) ->
 def test_an_unknown_external_object_is_a_box_where_the_scenario_puts_it(run: Any) -> None:
     external = '<ScenarioObject name="Thing"><ExternalObjectReference name="elsewhere"/></ScenarioObject>'
     add = everywhere(
-        '<EntityAction entitiref="Thing"><AddEntityAction><Position><WorldPosition x="140" y="-2" h="0"/></Position>'
+        '<EntityAction entityRef="Thing"><AddEntityAction><Position><WorldPosition x="140" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
     played = run(1, ("Ego", add, after(0.5)), more=external)
@@ -222,7 +222,7 @@ def test_a_selection_by_type_knows_external_objects(run: Any) -> None:
     chosen = '<EntitySelection name="outer"><Members><ByType objectType="external"/></Members></EntitySelection>'
     put = private('<TeleportAction><Position><WorldPosition x="140" y="-2" h="0"/></Position></TeleportAction>')
     add = everywhere(
-        '<EntityAction entitiref="outer"><AddEntityAction><Position><WorldPosition x="150" y="-2" h="0"/></Position>'
+        '<EntityAction entityRef="outer"><AddEntityAction><Position><WorldPosition x="150" y="-2" h="0"/></Position>'
         "</AddEntityAction></EntityAction>"
     )
     played = run(1, ("outer", put, after(0.5)), more=external + chosen, globally=add)

@@ -32,22 +32,22 @@ LEFT_HAND = ' rule="LHT"'
 
 def put(name: str, road: int, lane: int, s: float, turned: bool = False) -> str:
     orientation = '<Orientation type="relative" h="3.141592653589793"/>' if turned else ""
-    return f"""<Private entitiref="{name}"><PrivateAction><TeleportAction><Position>
+    return f"""<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
       <LanePosition roadId="{road}" laneId="{lane}" s="{s}">{orientation}</LanePosition></Position></TeleportAction>
       </PrivateAction></Private>"""
 
 
 def set_speed(name: str, value: float) -> str:
-    return f"""<Private entitiref="{name}"><PrivateAction><LongitudinalAction><SpeedAction>
+    return f"""<Private entityRef="{name}"><PrivateAction><LongitudinalAction><SpeedAction>
       <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
       <SpeedActionTarget><AbsoluteTargetSpeed value="{value}"/></SpeedActionTarget></SpeedAction></LongitudinalAction>
       </PrivateAction></Private>"""
 
 
 def clear(opposite: str, lanes: str = 'from="-1" to="1"') -> str:
-    return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>
+    return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><RelativeClearanceCondition distanceForward="60" distanceBackward="30"
-      freeSpace="false" oppositeLanes="{opposite}"><RelativeLaneRange {lanes}/><Entitiref entitiref="Other"/>
+      freeSpace="false" oppositeLanes="{opposite}"><RelativeLaneRange {lanes}/><EntityRef entityRef="Other"/>
       </RelativeClearanceCondition></EntityCondition></ByEntityCondition>"""
 
 

@@ -22,7 +22,7 @@ def lane(number: int) -> str:
 
 
 def beside(count: int, entity: str = "Ego") -> str:
-    return f'<RelativeTargetLane entitiref="{entity}" value="{count}"/>'
+    return f'<RelativeTargetLane entityRef="{entity}" value="{count}"/>'
 
 
 @pytest.mark.element("LaneChangeAction")
@@ -141,7 +141,7 @@ def test_an_offset_beside_somebody_follows_him_where_it_is_continuous(scene: Any
     played = scene(
         6,
         ("Other", change(lane(-2), "linear", "time", 3)),
-        ("Ego", offset('<RelativeTargetLaneOffset entitiref="Other" value="1"/>', "true", "")),
+        ("Ego", offset('<RelativeTargetLaneOffset entityRef="Other" value="1"/>', "true", "")),
     )
     assert played.at(0.1).y == pytest.approx(-1.0)
     assert played.at(5.0).y == pytest.approx(-5.0)
@@ -150,7 +150,7 @@ def test_an_offset_beside_somebody_follows_him_where_it_is_continuous(scene: Any
 
 @pytest.mark.element("LateralDistanceAction")
 def test_a_lateral_distance_is_kept_beside(scene: Any) -> None:
-    action = """<PrivateAction><LateralAction><LateralDistanceAction entitiref="Other" distance="3" freespace="false"
+    action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="3" freespace="false"
       continuous="false" coordinateSystem="lane" displacement="leftToReferencedEntity">
       <DynamicConstraints maxSpeed="1"/></LateralDistanceAction></LateralAction></PrivateAction>"""
     played = scene(5, ("Ego", action))
@@ -161,7 +161,7 @@ def test_a_lateral_distance_is_kept_beside(scene: Any) -> None:
 @pytest.mark.element("LateralDistanceAction")
 def test_free_space_beside_is_from_flank_to_flank(scene: Any) -> None:
     """Two cars of 2 m: their middles are 2.5 m apart; within a limit of acceleration the way there is a spring's."""
-    action = """<PrivateAction><LateralAction><LateralDistanceAction entitiref="Other" distance="0.5" freespace="true"
+    action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="0.5" freespace="true"
       continuous="true" coordinateSystem="lane" displacement="rightToReferencedEntity">
       <DynamicConstraints maxAcceleration="4"/></LateralDistanceAction></LateralAction></PrivateAction>"""
     played = scene(12, ("Ego", action))
@@ -240,7 +240,7 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Any
     if later:
         played = run(3, ("Ego", action, after(0.45)), driven=False, during=look)
     else:
-        played = run(3, driven=False, init=f'<Private entitiref="Ego">{action}</Private>', during=look)
+        played = run(3, driven=False, init=f'<Private entityRef="Ego">{action}</Private>', during=look)
     start = 0.5 if later else 0.0
     for frame, x in zip(played.frames, played.x("Ego"), strict=True):
         if frame.view.time > start + 0.1:
@@ -267,7 +267,7 @@ def test_a_distance_in_the_own_frame_does_not_make_the_actor_swing(scene: Any) -
 
     Other looks the other way, so that its left is to the right of Ego.
     """
-    action = """<PrivateAction><LateralAction><LateralDistanceAction entitiref="Other" distance="2.5" freespace="true"
+    action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="2.5" freespace="true"
       continuous="true" coordinateSystem="entity" displacement="leftToReferencedEntity"/>
       </LateralAction></PrivateAction>"""
     played = scene(5, ("Ego", action), ego=(-1, 100.0, 20.0), other=(1, 100.0, -20.0))
@@ -283,7 +283,7 @@ def test_an_action_of_init_that_a_younger_one_ends_leaves_its_trajectory(run: An
         followed[round(frame.view.time, 3)] = simulation.storyboard.context.actors["Ego"].trajectory is not None
 
     aside = offset('<AbsoluteTargetLaneOffset value="1"/>')
-    init = f'<Private entitiref="Ego">{trajectory(CORNER, "<None/>")}</Private>'
+    init = f'<Private entityRef="Ego">{trajectory(CORNER, "<None/>")}</Private>'
     run(1, ("Ego", aside, after(0.45)), driven=False, init=init, during=look)
     assert followed[0.4]
     assert not followed[0.6]

@@ -22,7 +22,7 @@ def absolute(value: float) -> str:
 
 def relative(value: float, kind: str, continuous: bool = False) -> str:
     return (
-        f'<RelativeTargetSpeed entitiref="Other" value="{value}" speedTargetValueType="{kind}" '
+        f'<RelativeTargetSpeed entityRef="Other" value="{value}" speedTargetValueType="{kind}" '
         f'continuous="{str(continuous).lower()}"/>'
     )
 
@@ -192,7 +192,7 @@ def test_a_profile_stays_below_the_largest_speed(scene: Any) -> None:
 
 def keep(attributes: str, limits: str = "") -> str:
     return f"""<PrivateAction><LongitudinalAction>
-      <LongitudinalDistanceAction entitiref="Other" {attributes}>{limits}</LongitudinalDistanceAction>
+      <LongitudinalDistanceAction entityRef="Other" {attributes}>{limits}</LongitudinalDistanceAction>
       </LongitudinalAction></PrivateAction>"""
 
 
@@ -228,7 +228,7 @@ def test_with_limits_it_is_reached_smoothly_and_within_them(scene: Any) -> None:
 def test_two_arrive_together(scene: Any) -> None:
     """Other needs (400 - 150) / 10 = 25 s; Ego has 500 m for that, and shall arrive with 22 m/s."""
     position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
-    action = f"""<PrivateAction><SynchronizeAction masterEntitiref="Other">
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
       <TargetPositionMaster>{position.format(-1, 400)[10:-11]}</TargetPositionMaster>
       <TargetPosition>{position.format(-1, 600)[10:-11]}</TargetPosition>
       <FinalSpeed><AbsoluteSpeed value="22"/></FinalSpeed></SynchronizeAction></PrivateAction>"""
@@ -242,7 +242,7 @@ def test_two_arrive_together(scene: Any) -> None:
 @pytest.mark.parametrize("dt", [0.01, 0.02, 0.05, 0.1, 0.5])
 def test_at_any_step_the_meeting_ends_when_the_master_arrives(scene: Any, dt: float) -> None:
     """Ego needs (200 - 100) / 20 = 5 s, a whole number of all these steps."""
-    action = """<PrivateAction><SynchronizeAction masterEntitiref="Ego">
+    action = """<PrivateAction><SynchronizeAction masterEntityRef="Ego">
       <TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="200"/></TargetPositionMaster>
       <TargetPosition><LanePosition roadId="1" laneId="-2" s="220"/></TargetPosition>
       </SynchronizeAction></PrivateAction>"""
@@ -256,7 +256,7 @@ def test_who_is_early_by_far_arrives_together_all_the_same(scene: Any) -> None:
     """Other needs (350 - 150) / 10 = 20 s; Ego has 100 m for that: braking evenly from 20 m/s it would be there after
     6.7 s, and would have to come back."""
     position = '<Position><LanePosition roadId="1" laneId="{}" s="{}"/></Position>'
-    action = f"""<PrivateAction><SynchronizeAction masterEntitiref="Other">
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
       <TargetPositionMaster>{position.format(-1, 350)[10:-11]}</TargetPositionMaster>
       <TargetPosition>{position.format(-1, 200)[10:-11]}</TargetPosition></SynchronizeAction></PrivateAction>"""
     played = scene(25, ("Ego", action), dt=0.05)

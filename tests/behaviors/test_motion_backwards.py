@@ -37,12 +37,12 @@ def offset(value: float, acceleration: float = 1.0, continuous: str = "false") -
 
 
 def beside(displacement: str = "any", limits: str = LIMITS) -> str:
-    return lateral(f"""<LateralDistanceAction entitiref="Other" distance="1" freespace="false" continuous="true"
+    return lateral(f"""<LateralDistanceAction entityRef="Other" distance="1" freespace="false" continuous="true"
       coordinateSystem="lane" displacement="{displacement}">{limits}</LateralDistanceAction>""")
 
 
 def keep(displacement: str, limits: str = LIMITS) -> str:
-    return longitudinal(f"""<LongitudinalDistanceAction entitiref="Other" distance="20" freespace="false"
+    return longitudinal(f"""<LongitudinalDistanceAction entityRef="Other" distance="20" freespace="false"
       continuous="true" coordinateSystem="lane" displacement="{displacement}">{limits}</LongitudinalDistanceAction>""")
 
 
@@ -138,7 +138,7 @@ def test_lateral_distance_left_and_right_count_from_the_other_heading(
 @pytest.mark.parametrize(("lane", "other", "y"), [(-1, -1, -1.0), (-1, 1, 1.0), (1, 1, 1.0), (1, -1, -1.0)])
 def test_lane_offset_relative_to_an_entity_counts_to_its_left(scene: Any, lane: int, other: int, y: float) -> None:
     """The center of lane -1 is at y = -2 towards +x, that of lane 1 at y = 2 towards -x; 1 m to the left of Other."""
-    relative = '<RelativeTargetLaneOffset entitiref="Other" value="1"/>'
+    relative = '<RelativeTargetLaneOffset entityRef="Other" value="1"/>'
     action = offset(0.0).replace('<AbsoluteTargetLaneOffset value="0.0"/>', relative)
     played = scene(8, ("Ego", action), ego=(lane, 400.0, 10.0), other=(other, 400.0, 10.0))
     assert played.rows[-1]["Ego"].y == pytest.approx(y)

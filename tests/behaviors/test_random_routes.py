@@ -82,7 +82,7 @@ def test_without_roads_there_is_nothing_to_choose() -> None:
         more="",
         everywhere="",
         start="",
-        private=f'<Private entitiref="Ego">{RANDOM}</Private>',
+        private=f'<Private entityRef="Ego">{RANDOM}</Private>',
         groups=GROUP.format(number=0, actor="Ego", action=RANDOM, trigger=""),
         end=1,
         signals="",

@@ -32,7 +32,7 @@ def assert_everybody_is_somewhere(played: Any) -> None:
 
 @pytest.mark.parametrize("actors", [("Ego", "Ego"), ("Ego", "all"), ("all", "all")])
 def test_who_is_named_twice_acts_once(run: Any, actors: tuple[str, str]) -> None:
-    played = run(3, ('"/><Entitiref entitiref="'.join(actors), PROFILE), driven=False, more=GROUPS)
+    played = run(3, ('"/><EntityRef entityRef="'.join(actors), PROFILE), driven=False, more=GROUPS)
     assert played.of("Ego", "speed")[-1] == 5
     assert played.of("Ego", "speed")[20] == pytest.approx(12.5)
 
@@ -93,7 +93,7 @@ CLOCK = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
 )
 def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timing: str, start: float) -> None:
     """At 20 m/s from x = 100 m; at 1 s on, by the clock, the place of that time: 500 m + 20 m."""
-    traveled = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>
+    traveled = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><TraveledDistanceCondition value="50"/></EntityCondition>
       </ByEntityCondition>"""
     steps = (("Ego", private(FAR.format(timing=timing)), after(0.975)), ("Ego", NOTHING, traveled))
@@ -107,7 +107,7 @@ def test_who_is_put_on_a_trajectory_far_away_has_not_driven_there(run: Any, timi
 def test_who_keeps_a_distance_drives_no_faster_than_it_can(run: Any) -> None:
     """A time gap to oneself is never reached; the Performance of the car ends at 70 m/s."""
     gap = private(
-        '<LongitudinalAction><LongitudinalDistanceAction entitiref="Ego" continuous="true" freespace="false" '
+        '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="true" freespace="false" '
         'timeGap="10"><DynamicConstraints maxAcceleration="100"/></LongitudinalDistanceAction></LongitudinalAction>'
     )
     played = run(4, ("Ego", gap), driven=False)

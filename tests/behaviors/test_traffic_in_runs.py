@@ -281,7 +281,7 @@ def test_traffic_needs_roads(run: Run, tmp_path: Path) -> None:
 def test_a_collision_with_any_vehicle_counts_traffic_too(run: Run) -> None:
     """Ego follows a car that has just come from a source at 5 m/s, and speeds up into it."""
     touch = (
-        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>'
+        '<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>'
         '</TriggeringEntities><EntityCondition><CollisionCondition><ByType type="vehicle"/></CollisionCondition>'
         "</EntityCondition></ByEntityCondition>"
     )

@@ -18,7 +18,7 @@ TRAIN = f"""<ScenarioObject name="Truck"><Vehicle name="truck" vehicleCategory="
     <TrailerHitch dx="-1"/></Vehicle></ScenarioObject>
   <ScenarioObject name="Trailer"><Vehicle name="trailer" vehicleCategory="trailer">{BODY.format(middle=0)}
     <TrailerCoupler dx="3"/></Vehicle></ScenarioObject>"""
-PLACE = """<EntityAction entitiref="{}"><AddEntityAction><Position>
+PLACE = """<EntityAction entityRef="{}"><AddEntityAction><Position>
   <LanePosition roadId="1" laneId="-1" s="{}"/></Position></AddEntityAction></EntityAction>"""
 COUPLE = private('<TrailerAction><ConnectTrailerAction trailerRef="Trailer"/></TrailerAction>')
 UNCOUPLE = private("<TrailerAction><DisconnectTrailerAction/></TrailerAction>")
@@ -74,7 +74,7 @@ def test_the_bar_always_ends_at_the_hitch(run: Any) -> None:
 
 def link(name: str, trailer: str = "") -> str:
     """One of a train that can draw and be drawn."""
-    drawn = f'<Trailer><TrailerRef entitiref="{trailer}"/></Trailer>' if trailer else ""
+    drawn = f'<Trailer><TrailerRef entityRef="{trailer}"/></Trailer>' if trailer else ""
     return f"""<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="trailer">{BODY.format(middle=1.5)}
       <TrailerHitch dx="-1"/><TrailerCoupler dx="3"/>{drawn}</Vehicle></ScenarioObject>"""
 

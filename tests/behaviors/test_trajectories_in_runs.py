@@ -65,7 +65,7 @@ def row(played: Any, time: float, name: str = "Ego", dt: float = 0.05) -> tuple[
 
 def drive(run: Any, *actions: str, end: float = 3.0) -> Any:
     """A run in which Ego does this in Init."""
-    return run(end, driven=False, init=f'<Private entitiref="Ego">{"".join(actions)}</Private>')
+    return run(end, driven=False, init=f'<Private entityRef="Ego">{"".join(actions)}</Private>')
 
 
 AHEAD = curve(world(150.0, -2.0), world(900.0, -2.0))
@@ -100,7 +100,7 @@ def test_reversing_car_without_a_place_looks_along_its_lane(run: Any) -> None:
     back = curve(lane.format(500), lane.format(50))
     walker = WALKER
     for order in ((speed(-5.0), follow(back)), (follow(back), speed(-5.0))):
-        init = f'<Private entitiref="Walker">{"".join(order)}</Private>'
+        init = f'<Private entityRef="Walker">{"".join(order)}</Private>'
         played = run(2.0, driven=False, more=walker, init=init)
         for time in (0.0, 1.0, 2.0):
             assert row(played, time, "Walker") == pytest.approx((500.0 - 5.0 * time, -2.0, 0.0, -5.0), abs=1e-6)
@@ -115,7 +115,7 @@ def test_change_of_direction_on_a_trajectory_drives_the_same_curve_back(run: Any
         ("Ego", speed(-10.0, 2.0), after(0.995)),
         driven=False,
         ego=(-1, 100.0, 10.0),
-        init=f'<Private entitiref="Ego">{follow(way, mode)}</Private>',
+        init=f'<Private entityRef="Ego">{follow(way, mode)}</Private>',
         settings=FINE,
     )
     assert row(played, 1.0, dt=0.01)[0] == pytest.approx(110.0, abs=0.11)
@@ -148,7 +148,7 @@ def test_timed_trajectory_with_headings_against_its_course_has_a_negative_speed(
 
 
 def together(target: str, final: str, master: str = '<LanePosition roadId="1" laneId="-1" s="146"/>') -> str:
-    return f"""<PrivateAction><SynchronizeAction masterEntitiref="Ego"><TargetPositionMaster>{master}
+    return f"""<PrivateAction><SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster>{master}
       </TargetPositionMaster><TargetPosition>{target}</TargetPosition><FinalSpeed>{final}</FinalSpeed>
       </SynchronizeAction></PrivateAction>"""
 
@@ -173,7 +173,7 @@ def test_synchronize_measures_along_the_trajectory_that_the_actor_follows(
         driven=False,
         ego=(-1, 100.0, 8.333),
         more=WALKER,
-        init=f'<Private entitiref="Walker">{follow(CROSSING, mode)}</Private>',
+        init=f'<Private entityRef="Walker">{follow(CROSSING, mode)}</Private>',
         settings=FINE,
     )
     arrived = next(f.view.time for f in played.frames if row(played, f.view.time, "Walker", 0.01)[1] >= -2.39)
@@ -191,8 +191,8 @@ def test_synchronize_with_a_master_that_reverses_along_its_trajectory(run: Any) 
     """The master is at the target after 20 m at -5 m/s, at 4 s; the walker arrives with it, at its own speed 1 m/s."""
     master_way = curve(on_road(500.0, 0.0), on_road(50.0, 0.0))
     at_480 = f'<TrajectoryPosition s="20"><TrajectoryRef>{master_way}</TrajectoryRef></TrajectoryPosition>'
-    init = f'<Private entitiref="Ego">{teleport(world(500.0, 0.0, 0.0))}'
-    init += f'{speed(-5.0)}{follow(master_way)}</Private><Private entitiref="Walker">{follow(CROSSING)}</Private>'
+    init = f'<Private entityRef="Ego">{teleport(world(500.0, 0.0, 0.0))}'
+    init += f'{speed(-5.0)}{follow(master_way)}</Private><Private entityRef="Walker">{follow(CROSSING)}</Private>'
     played = run(
         5.0,
         ("Walker", together(ON_IT, '<AbsoluteSpeed value="1"/>', at_480)),
@@ -209,7 +209,7 @@ def test_distance_on_self_crossing_trajectory_counts_from_the_own_pass(scene: An
     """A loop that comes by (200, -2) after 100 m and, from the side, after 100 + 4 · 60 m less the crossing."""
     corners = [(100.0, -2.0), (260.0, -2.0), (260.0, 58.0), (200.0, 58.0), (200.0, -100.0)]
     way = curve(*(world(x, y) for x, y in corners))
-    far = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="Ego"/>
+    far = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/>
       </TriggeringEntities><EntityCondition><DistanceCondition coordinateSystem="trajectory" freespace="false"
       relativeDistanceType="longitudinal" rule="lessThan" value="0.5"><Position><WorldPosition x="200" y="-2"/>
       </Position></DistanceCondition></EntityCondition></ByEntityCondition>"""
@@ -233,7 +233,7 @@ def test_trajectory_position_counts_from_the_tangent_not_from_headings_of_the_ve
 @pytest.mark.parametrize("trajectory_first", [True, False])
 def test_synchronize_that_starts_beside_the_trajectory_measures_along_it(run: Any, trajectory_first: bool) -> None:
     """Seen along the road the walker is at its target already; along its trajectory it has 3.61 m to go."""
-    start = f'<Private entitiref="Walker">{teleport(world(150.0, -6.0, math.pi / 2))}{speed(0.0)}</Private>'
+    start = f'<Private entityRef="Walker">{teleport(world(150.0, -6.0, math.pi / 2))}{speed(0.0)}</Private>'
     steps = [("Walker", follow(CROSSING)), ("Walker", together(world(150.0, -2.39), STEADY))]
     played = run(
         7.0,
@@ -268,7 +268,7 @@ def test_initial_offset_beyond_a_trajectory_means_its_end(run: Any) -> None:
 @pytest.mark.parametrize("mode", ["position", "follow"])
 @pytest.mark.parametrize("system", ["trajectory", "lane"])
 def test_distance_without_limits_holds_at_once_on_a_trajectory(run: Any, mode: str, system: str) -> None:
-    keep = f"""<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entitiref="Other" distance="20"
+    keep = f"""<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Other" distance="20"
       freespace="false" continuous="true" coordinateSystem="{system}"/></LongitudinalAction></PrivateAction>"""
     way = curve(world(100.0, -2.0), world(900.0, -2.0))
     played = run(
@@ -277,7 +277,7 @@ def test_distance_without_limits_holds_at_once_on_a_trajectory(run: Any, mode: s
         driven=False,
         ego=(-1, 100.0, 5.0),
         others={"Other": (-1, 150.0, 10.0)},
-        init=f'<Private entitiref="Ego">{follow(way, mode)}</Private>',
+        init=f'<Private entityRef="Ego">{follow(way, mode)}</Private>',
     )
     for time in (0.6, 1.0, 2.0):
         gap = row(played, time, "Other")[0] - row(played, time)[0]

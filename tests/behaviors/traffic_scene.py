@@ -52,7 +52,7 @@ def swarm(
     attributes = "".join(f' {name}="{value}"' for name, value in given.items())
     return (
         f'<TrafficSwarmAction innerRadius="{inner}" semiMajorAxis="{reach}" semiMinorAxis="60" offset="0" '
-        f'numberOfVehicles="{count}"{attributes}><CentralObject entitiref="{center}"/>{more}</TrafficSwarmAction>'
+        f'numberOfVehicles="{count}"{attributes}><CentralObject entityRef="{center}"/>{more}</TrafficSwarmAction>'
     )
 
 

@@ -100,7 +100,7 @@ def run(tmp_path: Path) -> Callable[..., Watched]:
             cars="".join(CAR.format(name=n, controller=OURS if driven and n == "Ego" else "") for n in places),
             more=more,
             everywhere=globally,
-            private="".join(f'<Private entitiref="{name}">{at(*place)}</Private>' for name, place in places.items())
+            private="".join(f'<Private entityRef="{name}">{at(*place)}</Private>' for name, place in places.items())
             + init,
             start=start,
             groups=groups or GROUP.format(number=0, actor="Ego", action=NOTHING, trigger=""),

@@ -45,12 +45,12 @@ def test_vehicles_take_the_wheel_in_the_order_of_their_names(tmp_path: Path, mon
     start, end = text.index('<ScenarioObject name="Ego">'), text.index('<ScenarioObject name="Incoming">')
     more = "".join(text[start:end].replace('name="Ego"', f'name="{name}"') for name in names)
     init = "".join(
-        f'<Private entitiref="{name}"><PrivateAction><TeleportAction><Position>'
+        f'<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>'
         f'<WorldPosition x="{20 * number}" y="90"/></Position></TeleportAction></PrivateAction></Private>'
         for number, name in enumerate(names)
     )
     text = (
-        text[:start] + more + text[start:].replace('<Private entitiref="Ego">', init + '<Private entitiref="Ego">', 1)
+        text[:start] + more + text[start:].replace('<Private entityRef="Ego">', init + '<Private entityRef="Ego">', 1)
     )
     path = tmp_path / "many.xosc"
     path.write_text(text)

@@ -112,7 +112,7 @@ def partner(leaf: Element) -> str | None:
     if isinstance(leaf, model.TimeToCollisionCondition):
         leaf = leaf.time_to_collision_condition_target
     other = getattr(leaf, "entity_ref", None)
-    name = other.entity_ref if isinstance(other, model.Entitiref) else other
+    name = other.entity_ref if isinstance(other, model.EntityRef) else other
     return name if isinstance(name, str) else None
 
 

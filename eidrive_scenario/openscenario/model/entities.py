@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entitiref(Element):
+class EntityRef(Element):
     """An entity, by its name."""
 
     entity_ref: EntityName
@@ -45,7 +45,7 @@ class ByObjectType(Element):
 class SelectedEntities(Element, content=Choice(empty_until="1.2")):
     """Entities by name or by type."""
 
-    entity_ref: tuple[Entitiref, ...] = ()
+    entity_ref: tuple[EntityRef, ...] = ()
     by_type: tuple[ByType, ...] = ()
 
 

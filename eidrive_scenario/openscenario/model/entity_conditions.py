@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.entities import ByObjectType, Entitiref
+from eidrive_scenario.openscenario.model.entities import ByObjectType, EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     AngleType,
     CoordinateSystem,
@@ -25,7 +25,7 @@ class TriggeringEntities(Element):
     """Whose state is looked at, and whether any or all of them have to fulfill the condition."""
 
     triggering_entities_rule: TriggeringEntitiesRule
-    entity_ref: tuple[Entitiref, ...]
+    entity_ref: tuple[EntityRef, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class EndOfRoadCondition(Element):
 class CollisionCondition(Element, content=Choice(empty_until="1.2")):
     """Touches an entity, or any entity of a type."""
 
-    entity_ref: Entitiref | None = None
+    entity_ref: EntityRef | None = None
     by_type: ByObjectType | None = None
 
 
@@ -69,7 +69,7 @@ class TimeToCollisionConditionTarget(Element, content=Choice(empty_until="1.2"))
     """What it would collide with."""
 
     position: Position | None = None
-    entity_ref: Entitiref | None = None
+    entity_ref: EntityRef | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +180,7 @@ class RelativeClearanceCondition(Element):
     distance_forward: float | None = None
     distance_backward: float | None = None
     relative_lane_range: tuple[RelativeLaneRange, ...] = ()
-    entity_ref: tuple[Entitiref, ...] = ()
+    entity_ref: tuple[EntityRef, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

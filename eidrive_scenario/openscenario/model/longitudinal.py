@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from eidrive_scenario.openscenario.model.content import ALL, Choice
 from eidrive_scenario.openscenario.model.element import Element, attribute, child
-from eidrive_scenario.openscenario.model.entities import Entitiref
+from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import (
     CoordinateSystem,
     DynamicsDimension,
@@ -87,7 +87,7 @@ class SpeedProfileAction(Element):
     following_mode: FollowingMode
     entity_ref: EntityName | None = attribute(since="1.3")
     dynamic_constraints: DynamicConstraints | None = None
-    entity_ref_element: Entitiref | None = child(until="1.2", name="Entitiref")
+    entity_ref_element: EntityRef | None = child(until="1.2", name="EntityRef")
     speed_profile_entry: tuple[SpeedProfileEntry, ...]
 
 

@@ -8,7 +8,7 @@ from eidrive_scenario.openscenario.model.catalogs import CatalogReference
 from eidrive_scenario.openscenario.model.content import Choice
 from eidrive_scenario.openscenario.model.declarations import ParameterDeclarations
 from eidrive_scenario.openscenario.model.element import Element, child, children
-from eidrive_scenario.openscenario.model.entities import Entitiref
+from eidrive_scenario.openscenario.model.entities import EntityRef
 from eidrive_scenario.openscenario.model.enumerations import Priority
 from eidrive_scenario.openscenario.model.global_actions import GlobalAction, UserDefinedAction
 from eidrive_scenario.openscenario.model.private_actions import PrivateAction
@@ -51,7 +51,7 @@ class Actors(Element):
     """Who acts."""
 
     select_triggering_entities: bool
-    entity_ref: tuple[Entitiref, ...] = ()
+    entity_ref: tuple[EntityRef, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from eidrive_scenario.openscenario.model.properties import Properties
 from eidrive_scenario.openscenario.model.sensors import SensorAttachments
 
 if TYPE_CHECKING:
-    from eidrive_scenario.openscenario.model.entities import Entitiref, ScenarioObject
+    from eidrive_scenario.openscenario.model.entities import EntityRef, ScenarioObject
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ class Trailer(Element, content=CHOICE):
     """What a vehicle draws."""
 
     trailer: ScenarioObject | None = None
-    trailer_ref: Entitiref | None = None
+    trailer_ref: EntityRef | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -147,7 +147,7 @@ def test_a_place_beyond_the_road_is_found_in_events_too(eidrive: Eidrive, tmp_pa
     library = Path(__file__).parents[3] / "xosc"
     text = (library / "coop" / "scenario_1.xosc").read_text(encoding="utf-8").replace("../", f"{library}/")
     event = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
-        <Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors><Maneuver name="m">
+        <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors><Maneuver name="m">
         <Event name="e" priority="parallel"><Action name="jump"><PrivateAction><TeleportAction><Position>
         <LanePosition roadId="nowhere" laneId="-1" s="1"/></Position></TeleportAction></PrivateAction></Action></Event>
         </Maneuver></ManeuverGroup><StartTrigger/></Act></Story>"""
@@ -191,10 +191,10 @@ def test_an_empty_name_is_not_the_folder_one_stands_in(
 
 
 def test_selections_in_a_circle_are_a_problem(eidrive: Eidrive, folder: Callable[..., Path]) -> None:
-    ring = '<EntitySelection name="{}"><Members><Entitiref entitiref="{}"/></Members></EntitySelection>'
+    ring = '<EntitySelection name="{}"><Members><EntityRef entityRef="{}"/></Members></EntitySelection>'
     rings = ring.format("a", "b") + ring.format("b", "c") + ring.format("c", "a")
     broken = folder(ring=("</Entities>", f"{rings}</Entities>")) / "ring.xosc"
-    broken.write_text(broken.read_text().replace('entitiref="Parked"', 'entitiref="a"', 1))
+    broken.write_text(broken.read_text().replace('entityRef="Parked"', 'entityRef="a"', 1))
     result = eidrive("check", broken)
     assert result.exit_code == 2, result.output
     assert "the selection 'a' is a member of itself" in result.stdout

@@ -37,7 +37,7 @@ SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
 TIME = """<ConditionGroup><Condition name="at {0} s" delay="0" conditionEdge="none"><ByValueCondition>
   <SimulationTimeCondition rule="greaterOrEqual" value="{0}"/></ByValueCondition></Condition></ConditionGroup>"""
 
-PLACED = """<Private entitiref="{}"><PrivateAction><TeleportAction><Position>
+PLACED = """<Private entityRef="{}"><PrivateAction><TeleportAction><Position>
   <LanePosition roadId="1" laneId="-1" s="{}"/></Position></TeleportAction></PrivateAction></Private>"""
 
 SCENARIO = f"""<OpenSCENARIO>
@@ -52,7 +52,7 @@ SCENARIO = f"""<OpenSCENARIO>
 <Storyboard><Init><Actions>{PLACED.format("Ego", 10)}{PLACED.format("Other", 50)}</Actions></Init>
 <Story name="Story"><Act name="Act">
   <ManeuverGroup name="Group" maximumExecutionCount="1">
-    <Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors>
+    <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
     <Maneuver name="Maneuver">
       <Event name="First" priority="override"><Action name="Speed">{SPEED}</Action>
         <StartTrigger>{TIME.format(1)}</StartTrigger></Event>

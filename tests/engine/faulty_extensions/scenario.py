@@ -30,12 +30,12 @@ SCENARIO = """<?xml version="1.0"?>
     <Init><Actions>
       <UserDefinedAction>
         <CustomCommandAction type="eidrive.criterion">{criterion}</CustomCommandAction></UserDefinedAction>
-      <Private entitiref="Ego">{start_0}</Private>
-      <Private entitiref="Other">{start_20}</Private>
+      <Private entityRef="Ego">{start_0}</Private>
+      <Private entityRef="Other">{start_20}</Private>
     </Actions></Init>
     <Story name="story"><Act name="act">
       <ManeuverGroup name="group" maximumExecutionCount="1"><Actors selectTriggeringEntities="false">
-        <Entitiref entitiref="Ego"/></Actors>
+        <EntityRef entityRef="Ego"/></Actors>
         <Maneuver name="maneuver"><Event name="event" priority="parallel">
           <Action name="action"><UserDefinedAction>
             <CustomCommandAction type="faulty.action">{action}</CustomCommandAction></UserDefinedAction></Action>

@@ -146,7 +146,7 @@ _CAR = """<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="
 _AGENT = """<ObjectController><Controller name="c"><Properties><Property name="module" value="eidrive"/>
 <Property name="detector" value="lidar"/><Property name="obey_signals" value="true"/></Properties></Controller>
 </ObjectController>"""
-_START = """<Private entitiref="{name}"><PrivateAction><TeleportAction><Position>
+_START = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="{road}" laneId="{lane}" s="{s}"/></Position></TeleportAction></PrivateAction>
 <PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time"
 value="0"/><SpeedActionTarget><AbsoluteTargetSpeed value="10"/></SpeedActionTarget></SpeedAction></LongitudinalAction>

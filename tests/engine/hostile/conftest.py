@@ -21,7 +21,7 @@ _CAR = """<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="
 <FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.8" positionZ="0.3"/>
 <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles><Properties/>
 </Vehicle>{controller}</ScenarioObject>"""
-_TELEPORT = """<Private entitiref="{name}"><PrivateAction><TeleportAction><Position>
+_TELEPORT = """<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="1" laneId="-1" s="{s}" offset="0"/></Position></TeleportAction></PrivateAction></Private>"""
 
 

@@ -172,7 +172,7 @@ def routes_of(tmp_path: Path, declared: str, assigned: str, count: int) -> tuple
     routes += f'<Route name="r24" closed="false">{declared}{places}</Route>'
     (tmp_path / "R.xosc").write_text(f'<OpenSCENARIO>{header}<Catalog name="R">\n{routes}\n</Catalog></OpenSCENARIO>')
     action = (
-        '<Private entitiref="Ego"><PrivateAction><RoutingAction><AssignRouteAction>'
+        '<Private entityRef="Ego"><PrivateAction><RoutingAction><AssignRouteAction>'
         '<CatalogReference catalogName="R" entryName="r0"/>'
         "</AssignRouteAction></RoutingAction></PrivateAction></Private>"
     )

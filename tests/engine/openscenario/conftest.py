@@ -24,7 +24,7 @@ SCENARIO = """<OpenSCENARIO>
 EGO = f'<ScenarioObject name="Ego">{VEHICLE}</ScenarioObject>'
 
 STORY = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
-<Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors>
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
 <Maneuver name="maneuver"><Event name="event" priority="parallel">
 <Action name="action"><PrivateAction>{action}</PrivateAction></Action>
 <StartTrigger><ConditionGroup>{condition}</ConditionGroup></StartTrigger>

@@ -14,7 +14,7 @@ EXPECTED = {
     "bad_expression": [(41, "unknown function 'squareroot'")],
     "constraint": [(5, "'Speed' is '10.0', outside its constraints; it has to be lessThan 8")],
     "dangling_element": [(53, "storyboardElementRef names the event 'Brake', which is not there")],
-    "dangling_entity": [(28, "entitiref of Private names the entity 'Egoo', which is not there; did you mean 'Ego'?")],
+    "dangling_entity": [(28, "entityRef of Private names the entity 'Egoo', which is not there; did you mean 'Ego'?")],
     "duplicate_name": [(24, "two entities are named 'Ego'; the other stands in line 10")],
     "external_entity": [(2, "document type declaration")],
     "missing_attribute": [(32, "WorldPosition lacks the attribute 'y'; it is a number")],

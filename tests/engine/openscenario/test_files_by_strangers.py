@@ -22,12 +22,12 @@ TIMED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory nam
 <TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
 FOG_LIGHTS = """<AppearanceAction><LightStateAction {more}><LightType><VehicleLight vehicleLightType="fogLights"/>
 </LightType><LightState mode="on" {state}/></LightStateAction></AppearanceAction>"""
-TOGETHER = """<SynchronizeAction masterEntitiref="Other" {more}><TargetPositionMaster><WorldPosition x="1" y="0"/>
+TOGETHER = """<SynchronizeAction masterEntityRef="Other" {more}><TargetPositionMaster><WorldPosition x="1" y="0"/>
 </TargetPositionMaster><TargetPosition><WorldPosition x="1" y="0"/></TargetPosition>
 <FinalSpeed><AbsoluteSpeed value="3"><TargetDistanceSteadyState distance="{steady}"/></AbsoluteSpeed></FinalSpeed>
 </SynchronizeAction>"""
 TELEPORT = '<TeleportAction><Position><WorldPosition x="{x}" y="0"/></Position></TeleportAction>'
-LIMITED = """<LongitudinalAction><LongitudinalDistanceAction entitiref="Ego" continuous="false" freespace="false"
+LIMITED = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" continuous="false" freespace="false"
  distance="5"><DynamicConstraints maxAcceleration="{limit}"/></LongitudinalDistanceAction></LongitudinalAction>"""
 SHAPED = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="way" closed="false"><Shape>{shape}
 </Shape></Trajectory></TrajectoryRef><TimeReference><None/></TimeReference>

@@ -27,7 +27,7 @@ SCENE = """<?xml version="1.0"?>
     <ScenarioObject name="Bus"><CatalogReference catalogName="vehicles" entryName="bus"/></ScenarioObject>
   </Entities>
   <Storyboard>
-    <Init><Actions><Private entitiref="Bus"><PrivateAction><TeleportAction><Position>
+    <Init><Actions><Private entityRef="Bus"><PrivateAction><TeleportAction><Position>
       <LanePosition roadId="1" laneId="-1" s="20"/>
       </Position></TeleportAction></PrivateAction></Private></Actions></Init>
     <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none"><ByValueCondition>

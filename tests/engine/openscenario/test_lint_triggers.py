@@ -7,13 +7,13 @@ import pytest
 from eidrive_scenario.checks.scenario_rules import RULES, LintContext
 from eidrive_scenario.openscenario import load_scenario
 
-PLACE = """<Private entitiref="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
+PLACE = """<Private entityRef="Ego"><PrivateAction><TeleportAction><Position><WorldPosition x="0" y="0"/></Position>
 </TeleportAction></PrivateAction></Private>"""
 SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
 <SpeedActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="2"/>
 <SpeedActionTarget>{}</SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction>"""
 ABSOLUTE = '<AbsoluteTargetSpeed value="10"/>'
-FOREVER = '<RelativeTargetSpeed entitiref="Ego" value="0" speedTargetValueType="delta" continuous="true"/>'
+FOREVER = '<RelativeTargetSpeed entityRef="Ego" value="0" speedTargetValueType="delta" continuous="true"/>'
 STOP = '<SimulationTimeCondition rule="greaterThan" value="60"/>'
 
 GREATER, AT_LEAST, LESS, EQUAL = "greaterThan", "greaterOrEqual", "lessThan", "equalTo"
@@ -32,7 +32,7 @@ def state(kind: str, name: str, what: str) -> str:
 
 def entity(condition: str, name: str = "Ego") -> str:
     return (
-        f'<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="{name}"/>'
+        f'<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="{name}"/>'
         f"</TriggeringEntities><EntityCondition>{condition}</EntityCondition></ByEntityCondition>"
     )
 
@@ -56,7 +56,7 @@ def event(name: str, start: str = "", *, priority: str = "parallel", count: int 
 
 def act(events: str, start: str = "", stop: str = "", name: str = "act") -> str:
     return f"""<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="1">
-<Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors>
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
 <Maneuver name="{name} maneuver">{events}</Maneuver></ManeuverGroup>{start}{stop}</Act>"""
 
 
@@ -65,7 +65,7 @@ Check = Callable[..., list[str]]
 
 def selecting(events: str, start: str = "") -> str:
     """An act whose only actors are those who trigger it."""
-    named = '<Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors>'
+    named = '<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>'
     return act(events, start).replace(named, '<Actors selectTriggeringEntities="true"/>')
 
 
@@ -240,7 +240,7 @@ def test_edges_of_parameters_that_nobody_sets(
     ("condition", "expected"),
     [
         (
-            '<RelativeDistanceCondition entitiref="Ego" relativeDistanceType="lateral" freespace="false" '
+            '<RelativeDistanceCondition entityRef="Ego" relativeDistanceType="lateral" freespace="false" '
             'rule="lessThan" value="5"/>',
             ["impossible-condition"],
         ),
@@ -262,7 +262,7 @@ def test_no_way_at_all_is_traveled_at_once(check: Check) -> None:
 def test_conditions_on_who_is_nowhere(check: Check) -> None:
     moving = trigger(when(entity('<SpeedCondition rule="greaterThan" value="5"/>')))
     assert check(act(event("go", moving)), init="") == ["entity-without-position", "impossible-condition"]
-    added = """<Event name="add" priority="parallel"><Action name="add"><GlobalAction><EntityAction entitiref="Ego">
+    added = """<Event name="add" priority="parallel"><Action name="add"><GlobalAction><EntityAction entityRef="Ego">
         <AddEntityAction><Position><WorldPosition x="0" y="0"/></Position></AddEntityAction></EntityAction>
         </GlobalAction></Action></Event>"""
     assert check(act(event("go", moving) + added), init="") == []

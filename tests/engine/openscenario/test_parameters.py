@@ -122,7 +122,7 @@ def test_whole_numbers_stay_whole_in_text(scenario_xml: Build, parameters_xml: T
     teleport = f"<PrivateAction><TeleportAction><Position>{position}</Position></TeleportAction></PrivateAction>"
     xml = scenario_xml(
         declarations=parameters_xml(Lane=("double", "-1"), S=("int", "7")),
-        init=f'<Private entitiref="Ego">{teleport}</Private>',
+        init=f'<Private entityRef="Ego">{teleport}</Private>',
     )
     lane = next(one for one in load_scenario(xml).document.walk() if isinstance(one, model.LanePosition))
     assert (lane.lane_id, lane.s) == ("-2", 14.0)

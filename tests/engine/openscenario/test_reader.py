@@ -25,7 +25,7 @@ def diagnostics_of(xml: bytes) -> list[str]:
 
 
 def private(action: str) -> str:
-    return f'<Private entitiref="Ego">{action}</Private>'
+    return f'<Private entityRef="Ego">{action}</Private>'
 
 
 def test_values_have_the_types_of_the_model(scenario_xml: Build, story_xml: Callable[..., str]) -> None:

@@ -119,7 +119,7 @@ def test_criteria_of_scenario_runner_name_no_parameter(scenario_xml: Build) -> N
 
 
 def test_values_that_exclude_each_other(scenario_xml: Build, story_xml: Text) -> None:
-    keep = """<LongitudinalAction><LongitudinalDistanceAction entitiref="Ego" freespace="true" continuous="true"
+    keep = """<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" freespace="true" continuous="true"
     distance="10" timeGap="2"/></LongitudinalAction>"""
     with pytest.raises(ScenarioError, match="either distance or timeGap"):
         load_scenario(scenario_xml(story=story_xml(action=keep)))

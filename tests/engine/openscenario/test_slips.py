@@ -25,7 +25,7 @@ from eidrive_scenario.openscenario.model import (
 Build = Callable[..., bytes]
 Kind = TypeVar("Kind")
 
-LIGHT = """<Private entitiref="Ego"><PrivateAction><AppearanceAction><LightStateAction transitionTime="0">
+LIGHT = """<Private entityRef="Ego"><PrivateAction><AppearanceAction><LightStateAction transitionTime="0">
 <LightState mode="on"/>
 <LightType><VehicleLight vehicleLightType="brakeLights"/></LightType></LightStateAction></AppearanceAction>
 </PrivateAction></Private>"""
@@ -34,7 +34,7 @@ CONTROLLER = """<TrafficSignals><TrafficSignalController name="C"><Phase name="g
 ENVIRONMENT = """<Environment name="e"><Weather>
 <Sun azimuth="0" elevation="1" {word}="1000"/></Weather></Environment>"""
 SUNNY = f"<GlobalAction><EnvironmentAction>{ENVIRONMENT}</EnvironmentAction></GlobalAction>"
-OFFSET = """<Private entitiref="Ego"><PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
+OFFSET = """<Private entityRef="Ego"><PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
 <LaneOffsetActionDynamics maxLateralAcc="None" dynamicsShape="{shape}"/>
 <LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>
 </PrivateAction></Private>"""
@@ -142,8 +142,8 @@ def test_infinity_as_python_writes_it(scenario_xml: Build) -> None:
 
 def test_an_orientation_that_says_nothing_is_told(scenario_xml: Build) -> None:
     """By the standard the type is absolute and the heading 0; scenariogeneration writes it where none was given."""
-    relative = '<RelativeObjectPosition entitiref="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
-    action = '<Private entitiref="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
+    relative = '<RelativeObjectPosition entityRef="Ego" dx="1" dy="0"><Orientation {}/></RelativeObjectPosition>'
+    action = '<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>{}</Position></TeleportAction>{}'
     end = "</PrivateAction></Private>"
     (warning,) = load_scenario(scenario_xml(init=action.format(relative.format(""), end))).warnings
     assert "the heading 0 of the world" in str(warning)

@@ -282,7 +282,7 @@ SCENARIO = """<OpenSCENARIO>
 <Storyboard><Init><Actions>
 <GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="7" state="red"/>
 </TrafficSignalAction></InfrastructureAction></GlobalAction>
-<Private entitiref="Ego"><PrivateAction><TeleportAction><Position>
+<Private entityRef="Ego"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="1" laneId="-1" s="20"/></Position></TeleportAction></PrivateAction></Private></Actions></Init>
 <Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
 <Actors selectTriggeringEntities="false"/><Maneuver name="maneuver"><Event name="turns" priority="parallel">

@@ -19,13 +19,13 @@ SPEED = """<PrivateAction><LongitudinalAction><SpeedAction>
   <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" value="0"/>
   <SpeedActionTarget><AbsoluteTargetSpeed value="{}"/></SpeedActionTarget>
   </SpeedAction></LongitudinalAction></PrivateAction>"""
-PLACED = """<Private entitiref="{}"><PrivateAction><TeleportAction><Position><WorldPosition x="{}" y="0"/></Position>
+PLACED = """<Private entityRef="{}"><PrivateAction><TeleportAction><Position><WorldPosition x="{}" y="0"/></Position>
   </TeleportAction></PrivateAction>{}</Private>"""
 SCENARIO = """<OpenSCENARIO>
 <FileHeader revMajor="1" revMinor="3" date="2025-01-01T00:00:00" description="a ride" author="test"/>
 <CatalogLocations/><RoadNetwork/><Entities>{cars}</Entities><Storyboard><Init><Actions>{init}</Actions></Init>
 <Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
-<Actors selectTriggeringEntities="false"><Entitiref entitiref="Ego"/></Actors><Maneuver name="maneuver">{events}
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors><Maneuver name="maneuver">{events}
 </Maneuver></ManeuverGroup>{start}{end}</Act></Story>
 <StopTrigger><ConditionGroup>{stop}</ConditionGroup></StopTrigger></Storyboard></OpenSCENARIO>"""
 
@@ -40,7 +40,7 @@ def time(rule: str, value: float) -> str:
 
 def of(name: str, condition: str) -> str:
     return (
-        f'<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><Entitiref entitiref="{name}"/>'
+        f'<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="{name}"/>'
         f"</TriggeringEntities><EntityCondition>{condition}</EntityCondition></ByEntityCondition>"
     )
 
@@ -51,7 +51,7 @@ def event(*groups: str, name: str = "go", priority: str = "parallel", action: st
     return f'<Event name="{name}" priority="{priority}"><Action name="{name} action">{action}</Action>{trigger}</Event>'
 
 
-GAP = """<RelativeDistanceCondition entitiref="Other" relativeDistanceType="cartesianDistance" freespace="false"
+GAP = """<RelativeDistanceCondition entityRef="Other" relativeDistanceType="cartesianDistance" freespace="false"
   rule="{}" value="{}"/>"""
 NEAR = of("Ego", GAP.format("lessThan", 20))
 Explained = Callable[..., list[str]]
@@ -131,7 +131,7 @@ def test_who_is_not_in_the_world(explained: Explained) -> None:
 
 
 def test_a_quantity_that_is_undefined(explained: Explained) -> None:
-    headway = '<TimeHeadwayCondition entitiref="Ego" freespace="false" rule="lessThan" value="1"/>'
+    headway = '<TimeHeadwayCondition entityRef="Ego" freespace="false" rule="lessThan" value="1"/>'
     assert explained(event(when(of("Other", headway))))[-1] == "Other: undefined or infinite at all evaluations"
 
 

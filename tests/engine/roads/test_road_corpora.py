@@ -143,7 +143,7 @@ def test_lane_positions_are_where_esmini_puts_them(corpora: Path, scenario: str,
         first = {row["name"]: row for row in csv.DictReader(file) if float(row["time"]) == 0.0}
     checked = 0
     for private in root.iterfind("Storyboard/Init/Actions/Private"):
-        row = first[value(private, "entitiref")]
+        row = first[value(private, "entityRef")]
         for place in private.iterfind("PrivateAction/TeleportAction/Position/LanePosition"):
             at = network.location(
                 value(place, "roadId"),

@@ -169,7 +169,7 @@ def bend() -> RoadNetwork:
 
 
 ACT = """<Story name="story"><Act name="act"><ManeuverGroup name="group" maximumExecutionCount="1">
-  <Actors selectTriggeringEntities="false"><Entitiref entitiref="A"/></Actors>
+  <Actors selectTriggeringEntities="false"><EntityRef entityRef="A"/></Actors>
   <Maneuver name="maneuver">{events}</Maneuver></ManeuverGroup></Act></Story>"""
 
 
@@ -186,7 +186,7 @@ def build() -> Callable[..., Storyboard]:
         declared: str = "",
     ) -> Storyboard:
         text = SCENARIO.format(cars="".join(CAR.format(name=name) for name in "AB"))
-        actions = f'<Actions>{everywhere}<Private entitiref="A">{init}</Private></Actions>'
+        actions = f'<Actions>{everywhere}<Private entityRef="A">{init}</Private></Actions>'
         stories = ACT.format(events=events) if events else ""
         text = text.replace("<CatalogLocations/>", declared + "<CatalogLocations/>")
         text = text.replace("<Actions/>", actions).replace("<StopTrigger/>", stories + stop)

@@ -99,7 +99,7 @@ def test_a_file_of_1_1_with_radians_loads() -> None:
     frame = '<GeoPosition latitude="0.8" longitude="0.1" height="3"/>'
     text = f"""<OpenSCENARIO>
       <FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="x" author="y"/>
-      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entitiref="A">
+      <CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><GlobalAction><EntityAction entityRef="A">
       <AddEntityAction><Position>{frame}</Position></AddEntityAction></EntityAction></GlobalAction></Actions></Init>
       <StopTrigger/></Storyboard></OpenSCENARIO>"""
     with pytest.raises(ScenarioError, match="entity 'A', which is not there"):

@@ -22,7 +22,7 @@ ACTION = """<Action name="{}"><PrivateAction><LongitudinalAction><SpeedAction>
 <SpeedActionTarget><AbsoluteTargetSpeed value="{}"/></SpeedActionTarget>
 </SpeedAction></LongitudinalAction></PrivateAction></Action>"""
 ACT = """<Act name="{name}"><ManeuverGroup name="{name} group" maximumExecutionCount="{count}">
-<Actors selectTriggeringEntities="false"><Entitiref entitiref="A"/></Actors>
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="A"/></Actors>
 <Maneuver name="{name} maneuver">{events}</Maneuver></ManeuverGroup>{start}{stop}</Act>"""
 RULES = ("greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual", "equalTo", "notEqualTo")
 EDGES = ("none", "rising", "falling", "risingOrFalling")

@@ -71,13 +71,13 @@ def test_init_holds_before_the_first_view_and_only_who_has_a_place_is_there(buil
 
 
 def test_the_order_of_init_does_not_matter_where_one_is_placed_beside_another(build: Any) -> None:
-    beside = TELEPORT.format(position='<RelativeWorldPosition entitiref="B" dx="2" dy="1"/>')
-    storyboard = build(beside + '</Private><Private entitiref="B">' + TELEPORT.format(position=AT.format(x=30)))
+    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
+    storyboard = build(beside + '</Private><Private entityRef="B">' + TELEPORT.format(position=AT.format(x=30)))
     assert storyboard.initial().spawns["A"].x == 32.0
 
 
 def test_who_is_placed_beside_nobody_is_an_error(build: Any) -> None:
-    beside = TELEPORT.format(position='<RelativeWorldPosition entitiref="B" dx="2" dy="1"/>')
+    beside = TELEPORT.format(position='<RelativeWorldPosition entityRef="B" dx="2" dy="1"/>')
     with pytest.raises(ScenarioError, match="nobody places"):
         build(beside).initial()
 
@@ -125,7 +125,7 @@ def test_without_a_stop_trigger_and_without_stories_it_goes_on(build: Any) -> No
 
 @pytest.mark.element("AddEntityAction", "DeleteEntityAction")
 def test_entities_come_and_go_on_a_trigger(build: Any) -> None:
-    entity = '<GlobalAction><EntityAction entitiref="B">{}</EntityAction></GlobalAction>'
+    entity = '<GlobalAction><EntityAction entityRef="B">{}</EntityAction></GlobalAction>'
     come = entity.format(f"<AddEntityAction><Position>{AT.format(x=50)}</Position></AddEntityAction>")
     go = entity.format("<DeleteEntityAction/>")
     events = EVENT.format(name="come", action=come, trigger=AFTER.format(kind="Start", edge="none", value=0.05))

@@ -14,7 +14,7 @@ FILE = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T0
 <CatalogLocations><VehicleCatalog><Directory path="eidrive_library/catalogs"/></VehicleCatalog></CatalogLocations>
 <RoadNetwork><LogicFile filepath="eidrive_library/roads/coop_1.xodr"/></RoadNetwork>
 <Entities><ScenarioObject name="Ego"><CatalogReference catalogName="vehicles" entryName="lincoln_mkz"/></ScenarioObject>
-</Entities><Storyboard><Init><Actions><Private entitiref="Ego"><PrivateAction><RoutingAction><FollowTrajectoryAction>
+</Entities><Storyboard><Init><Actions><Private entityRef="Ego"><PrivateAction><RoutingAction><FollowTrajectoryAction>
 <Trajectory name="far" closed="false"><Shape><Polyline>
 <Vertex><Position><WorldPosition x="0" y="0"/></Position></Vertex>
 <Vertex><Position><WorldPosition x="0" y="{end}"/></Position></Vertex>
