@@ -1,6 +1,7 @@
 """The surface that extensions import: actions, conditions, criteria, detectors, channels. The engine never does."""
 
 from eidrive_scenario import traffic
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.driving.planning.planner import Planner
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
@@ -70,6 +71,7 @@ from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.environments import merge_environment
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
+from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.link_channel import LinkChannel
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
@@ -83,7 +85,9 @@ from eidrive_scenario.world.view import Contact, WorldView
 
 __all__ = [
     "CLASSES",
+    "EPSILON",
     "STEEPEST",
+    "TIME_TOLERANCE",
     "ActionBehaviour",
     "Actor",
     "ActorSpec",
@@ -91,6 +95,7 @@ __all__ = [
     "AgentStep",
     "AnimationState",
     "Appearance",
+    "Array",
     "CameraReading",
     "Channel",
     "ChannelProfile",

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
-
-Array = NDArray[np.float64]
 
 NOT_ESTIMATED: Array = np.empty(0)
 """Existence of objects that no tracker and no fusion has judged."""

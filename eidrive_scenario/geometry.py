@@ -14,7 +14,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
+
 Box = Sequence[float] | Array
 
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])

@@ -9,12 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
-
-Array = NDArray[np.float64]
 
 
 @fast_frozen

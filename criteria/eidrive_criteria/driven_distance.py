@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api import TIME_TOLERANCE, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class DrivenDistanceSettings(CriterionSettings):
@@ -40,7 +40,7 @@ class DrivenDistance(Criterion):
     def observe(self, frame: Frame) -> None:
         view = frame.view
         row, by = view.rows.get(self._settings.of), self._settings.by
-        self._late = by is not None and view.time > by + 1e-9
+        self._late = by is not None and view.time > by + TIME_TOLERANCE
         if row is None:
             self._last = None
         if row is None or self._late:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api import TIME_TOLERANCE, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class ReachPositionSettings(CriterionSettings):
@@ -41,7 +41,7 @@ class ReachPosition(Criterion):
     def observe(self, frame: Frame) -> None:
         view, settings = frame.view, self._settings
         row = view.rows.get(settings.of)
-        self._late = settings.by is not None and view.time > settings.by + 1e-9
+        self._late = settings.by is not None and view.time > settings.by + TIME_TOLERANCE
         if row is None or self._late:
             return
         x, y, _ = view.position[row].tolist()

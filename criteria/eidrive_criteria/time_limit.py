@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict
+from eidrive_scenario.api import TIME_TOLERANCE, Criterion, CriterionSettings, Frame, Verdict
 
 
 class TimeLimitSettings(CriterionSettings):
@@ -31,7 +31,7 @@ class TimeLimit(Criterion):
     def observe(self, frame: Frame) -> None:
         self._time = frame.view.time
         # Time is tick * dt: its rounding must not fail a run that ends exactly on the limit.
-        if self._violated is None and self._time > self._within + 1e-9:
+        if self._violated is None and self._time > self._within + TIME_TOLERANCE:
             self._violated = self._time
 
     def verdict(self) -> Verdict:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.partial_reports import PartialReportAssembler
@@ -26,15 +26,13 @@ from eidrive_scenario.perception.result_checks import check_detections, is_check
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.sensing.readings import EgoState, Readings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
-
-Array = NDArray[np.float64]
 
 EGO_BODY_MARGIN = 0.9
 """A reported box whose center lies this near to the own outline is the own body: half the width of a car, so that the
 center of another car can come as near only after a collision [m]."""
-TIME_TOLERANCE = 1e-9
 
 SENDER_REPORT_SUFFIX = " itself"
 """What a station says of itself counts as the report of one more station: it is not among the objects that it sees."""

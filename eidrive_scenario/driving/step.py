@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.v2x.messages.message import Message, ReceivedMessage
 from eidrive_scenario.world.actor import Control
-
-Array = NDArray[np.float64]
 
 
 @fast_frozen

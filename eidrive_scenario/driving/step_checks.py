@@ -7,9 +7,8 @@ from typing import Any
 
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.profile import ChannelProfile
-
-_TOLERANCE = 1e-9
 
 
 def short_channel_delay(
@@ -23,7 +22,7 @@ def short_channel_delay(
     if profile is None or not hasattr(delay, "quantile"):
         return
     median = float(delay.quantile(0.5))
-    if 0.0 < median < dt - _TOLERANCE:
+    if 0.0 < median < dt - TIME_TOLERANCE:
         what = "the median delay" if delay.random else "the delay"
         yield Diagnostic(
             f"most messages take one step of {dt:g} s: {what} of the channel {profile.name!r} is only {median:.3g} s",
@@ -36,7 +35,7 @@ def short_channel_delay(
 def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -> Iterator[Diagnostic]:
     """Yield a warning for each station whose detector takes less than one step `dt` [s], but more than 0."""
     for name, station in settings.items():
-        if 0.0 < station.detector_latency < dt - _TOLERANCE:
+        if 0.0 < station.detector_latency < dt - TIME_TOLERANCE:
             yield Diagnostic(
                 f"detections of {name!r} are known one step of {dt:g} s later: "
                 f"its detector_latency is only {station.detector_latency:g} s",

@@ -6,16 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.statistics import Proportion, wilson
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.learned.average_precision import Matches, average_precision, match_by_share
 from eidrive_scenario.recording.frame import Frame
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SIGHTED = 2.0
 """A station sees an object where it reports one of its own with its center this near [m]."""

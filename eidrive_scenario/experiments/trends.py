@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.communication.radio_line_of_sight import line_of_sight_states
 from eidrive_scenario.fusion.average import AverageFusion
@@ -30,8 +30,6 @@ from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LineOfSightStates, RadioEnvironment
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
-
-Array = NDArray[np.float64]
 
 CAR = (4.5, 1.8, 1.5)
 """Length, width and height of a car [m]."""

@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 FEW = 64
 """Up to so many pairs, plain numbers are faster than arrays."""

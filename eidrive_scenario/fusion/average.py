@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import NOT_ESTIMATED, Detections
 from eidrive_scenario.fusion.association import FEW as FEW_PAIRS
 from eidrive_scenario.fusion.association import associate, associate_few
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.records import replaced
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 FEW = 16

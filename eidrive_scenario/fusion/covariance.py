@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 TRACE_TOLERANCE = 0.01
 """How much larger than the least trace that of the result may be, so that estimates which are about as good count about

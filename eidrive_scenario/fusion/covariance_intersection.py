@@ -7,9 +7,9 @@ from itertools import islice
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.fusion.covariance import covariances, estimates, intersect_batch, means
 from eidrive_scenario.fusion.grouping import group_tracks
@@ -19,10 +19,7 @@ from eidrive_scenario.fusion.pairs import AssociationGate
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import Table, predict_tracks
 from eidrive_scenario.settings import Settings
-
-Array = NDArray[np.float64]
-
-TIME_TOLERANCE = 1e-9
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class CovarianceIntersectionSettings(Settings):

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionFusion,
     CovarianceIntersectionSettings,
@@ -17,8 +17,6 @@ from eidrive_scenario.fusion.covariance_intersection import (
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud, compressed
-
-Array = NDArray[np.float64]
 
 
 class EarlyFusionSettings(CovarianceIntersectionSettings):

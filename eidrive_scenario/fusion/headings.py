@@ -7,10 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.tracking.motion_models import HEADING_DEVIATION, TURN_DENSITY, UNKNOWN_TURN
-
-Array = NDArray[np.float64]
 
 SIGNIFICANT = 2.0
 """A turn rate counts as known from so many of its standard deviations on; below, the object is taken to go straight."""

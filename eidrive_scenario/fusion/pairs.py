@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.fusion.association import assign
 
-Array = NDArray[np.float64]
 Table = NDArray[np.void]
 Integers = NDArray[np.intp]
 

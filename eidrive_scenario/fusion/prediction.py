@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY
-
-Array = NDArray[np.float64]
 
 _PLACE = np.diag([1.0, 1.0, 0.0, 0.0])
 _SPEED = np.diag([0.0, 0.0, 1.0, 1.0])

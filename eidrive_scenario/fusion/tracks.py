@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, NOT_ESTIMATED
 from eidrive_scenario.fusion.headings import first_heading, known_turn, predicted_heading, updated_heading
 from eidrive_scenario.fusion.method import Report
@@ -18,7 +19,6 @@ from eidrive_scenario.perception.tracking.existence import LIFETIME, detected, l
 from eidrive_scenario.perception.tracking.existence import missed as after_miss
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED, UNKNOWN_SPEED
 
-Array = NDArray[np.float64]
 Table = NDArray[np.void]
 
 TRACK = np.dtype(

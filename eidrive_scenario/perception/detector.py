@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.roads import RoadNetwork
@@ -18,8 +18,6 @@ from eidrive_scenario.sensing.readings import Readings, SignalReading
 from eidrive_scenario.sensing.settings import SensorSettings
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.world.actor import ActorSpec
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import CameraReading, EgoState, GnssReading, ImuReading, LidarReading, Readings
 from eidrive_scenario.sensing.settings import ImuSettings
-
-Array = NDArray[np.float64]
 
 X, Y, YAW, SPEED, TURN_BIAS, ACCELERATION_BIAS = range(6)
 PLANE = np.ix_((X, Y, YAW), (X, Y, YAW))

@@ -6,13 +6,11 @@ from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
-
-Array = NDArray[np.float64]
 
 
 class OracleDetector(Detector):

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
@@ -15,10 +13,7 @@ from eidrive_scenario.perception.localization import PLANE, Localizer
 from eidrive_scenario.perception.result_checks import check_detections, check_in_view, describe, is_checked
 from eidrive_scenario.perception.tracking.tracker import Tracker
 from eidrive_scenario.sensing.readings import Readings, SignalReading
-
-Array = NDArray[np.float64]
-
-TIME_TOLERANCE = 1e-9
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 
 
 class Perception:

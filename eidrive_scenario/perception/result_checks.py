@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import CLASSES, Detections
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.registry import is_built_in
-
-Array = NDArray[np.float64]
 
 _FINITE_BY_CONSTRUCTION = ("perception.oracle", "fusion.average")
 """Modules whose classes copy or average finite numbers; a check of theirs in each tick would cost 1 % of a run."""

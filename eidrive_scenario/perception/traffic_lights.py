@@ -8,15 +8,14 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop
 from eidrive_scenario.sensing.readings import SignalReading
 from eidrive_scenario.sensing.signals import is_stop_sign
 
-Array = NDArray[np.float64]
 Kind = Literal["light", "stop sign"]
 
 ON_PATH = 1.75

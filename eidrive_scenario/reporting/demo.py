@@ -14,10 +14,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.text import Text
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.settings import agent_settings, is_agent_controller
 from eidrive_scenario.errors import EidriveError, InputError
 from eidrive_scenario.experiments.paper import (
@@ -46,7 +46,6 @@ from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation import RunResult, RunSettings, load_for_seed, run_file
 from eidrive_scenario.world.specs import actor_spec
 
-Array = NDArray[np.float64]
 StoryResult = tuple[RunResult, Story | None]
 
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.experiments.paper import (
     ARMS,
     LINKS,
@@ -26,8 +25,6 @@ from eidrive_scenario.reporting.drawing.chart import ChartSeries, line_chart
 from eidrive_scenario.reporting.drawing.key_frames import Moment, Story
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window, legend, roads_symbol, top_view
 from eidrive_scenario.reporting.page import png_address, write_page
-
-Array = NDArray[np.float64]
 
 COLORS = {"none": "#64748b", "cooperation": "#059669", "latency": "#d97706", "error": "#7c3aed"}
 DASHES = {"none": "8 8", "cooperation": "", "latency": "", "error": "8 8"}

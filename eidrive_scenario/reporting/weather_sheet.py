@@ -26,8 +26,6 @@ from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.weather import Weather, load_weather
 
-Array = NDArray[np.float64]
-
 ROAD = "coop_1.xodr"
 CAMERA = CameraSettings(width=640, height=360, fov=80.0, supersampling=2)
 SPEED = (8.0, 0.0, 0.0)

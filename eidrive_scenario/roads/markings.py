@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.roads.model.location import Array
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
 from eidrive_scenario.roads.network import RoadNetwork
 from eidrive_scenario.roads.objects import outlines

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.roads.attributes import RoadAttributes
 from eidrive_scenario.roads.geometry import poses
@@ -19,15 +20,7 @@ from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.georeference.geo_reference import parse_geo_reference
 from eidrive_scenario.roads.georeference.geodesy import GeoReference
 from eidrive_scenario.roads.map_checks import check_road_map
-from eidrive_scenario.roads.model.location import (
-    Array,
-    Integers,
-    LaneLocation,
-    LaneLocations,
-    Pose,
-    Poses,
-    PositionError,
-)
+from eidrive_scenario.roads.model.location import LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.model.map_warnings import group_map_warnings
 from eidrive_scenario.roads.model.road_map import RoadMap
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.roads.model.location import Array, Pose
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.roads.model.location import Pose
 from eidrive_scenario.roads.model.road_map import Corner, RoadObject
 from eidrive_scenario.roads.network import RoadNetwork
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.markings import Strip, lane_strips, object_strips
-from eidrive_scenario.roads.model.location import Array, Integers
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.network import RoadNetwork
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.exposure import develop, metered
 from eidrive_scenario.sensing.mounting import mounting
@@ -17,8 +17,6 @@ from eidrive_scenario.sensing.scene import Scene
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 DROPS_STAY = 2.0
 """How long drops sit on a lens before others have come [s]."""

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
+
 Point = tuple[float, float, float]
 
 BEYOND_OWN_BODY = 1e-3

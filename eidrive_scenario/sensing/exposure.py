@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from eidrive_scenario.arrays import Floats
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
 from eidrive_scenario.world.render.tone_mapping import tone_map, white_level
-
-Floats = NDArray[np.float32]
 
 LENS = 0.65
 """H = 0.65 L t / N²: exposure [lx s] behind a lens of f-number N of a thing of luminance L [cd/m²] (ISO 12232)."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.readings import GnssReading, ImuReading
 from eidrive_scenario.sensing.settings import GnssSettings, ImuSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 EXACT = 1e-3
 """Standard deviation that an oracle's reading states, as filters need one above 0 [m]."""

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.sensing.crossing import crossing, is_occluded_by
 from eidrive_scenario.sensing.lidar_physics import reflectivity, returns
@@ -17,8 +18,6 @@ from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
 
 
 class Lidar:

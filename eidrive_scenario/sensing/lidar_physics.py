@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
 
 WAVELENGTH = 0.905
 """[µm]"""

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.sensing.settings import Mount, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 ABOVE_ROOF = 0.41
 """A roof sensor stands this far above the body: 1.90 m on a car of 1.49 m [m]."""

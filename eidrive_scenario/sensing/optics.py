@@ -8,14 +8,11 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.sensing.settings import CameraSettings
 from eidrive_scenario.world.camera import Pinhole, Radiance
-
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
 
 
 class _Bend(NamedTuple):

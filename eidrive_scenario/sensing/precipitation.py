@@ -7,13 +7,10 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
 
 STREAK_TIME = 1.0 / 90.0
 """How long a drop draws its streak [s]: cameras for traffic expose a part of each pixel at least so long, lest lamps

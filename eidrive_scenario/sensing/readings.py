@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
-
-Array = NDArray[np.float64]
 
 
 @fast_frozen

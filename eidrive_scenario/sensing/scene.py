@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.weather import Weather
 
-Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 NOTHING = -2

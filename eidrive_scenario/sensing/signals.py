@@ -6,8 +6,8 @@ import math
 from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork, Signal
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import SignalReading
@@ -16,8 +16,6 @@ from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 SIGNAL_KINDS = frozenset({"light", "stop sign"})
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.sensing.crossing import is_occluded_by, is_occluded_by_small
 from eidrive_scenario.sensing.mounting import mounting
 from eidrive_scenario.sensing.readings import TruthReading
@@ -15,8 +15,6 @@ from eidrive_scenario.sensing.scene import NOTHING, Point, Scene
 from eidrive_scenario.sensing.settings import TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 INSET = 0.9
 """The sampled corners lie at this share of the way from center to corner, so that a ray to one meets the body."""

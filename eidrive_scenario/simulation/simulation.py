@@ -41,6 +41,7 @@ from eidrive_scenario.simulation.run_outcome import (
 from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
 from eidrive_scenario.world.environment import Environment
@@ -230,7 +231,7 @@ class Simulation:
                 return f"criterion: {criterion.name}"
         if self.storyboard.ended is not None:
             return self.storyboard.ended
-        return TIME_LIMIT if frame.view.time >= self.settings.time_limit - 1e-9 else None
+        return TIME_LIMIT if frame.view.time >= self.settings.time_limit - TIME_TOLERANCE else None
 
     def _apply(self, commands: Commands) -> None:
         """Carry out what the storyboard decided, except the placements, which are the world's step."""

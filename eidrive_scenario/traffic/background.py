@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import FREE
@@ -17,8 +17,6 @@ from eidrive_scenario.traffic.spawning.sites import SpawnAreas, SpawnSites, is_u
 from eidrive_scenario.traffic.stop_lines import MustStop
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 TRIES = 24
 """So many places are looked at before it counts as none free."""

@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver
 from eidrive_scenario.world.actor import ActorSpec
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 PLANNED = 12
 """Most lanes that a car knows beyond its own."""
@@ -61,9 +57,9 @@ class Cars:
     asked: Array = field(default_factory=_floats)
     turns: Integers = field(default_factory=_integers)
     number: Integers = field(default_factory=_integers)
-    walks: Flags = field(default_factory=lambda: np.empty(0, dtype=bool))
+    walks: Bools = field(default_factory=lambda: np.empty(0, dtype=bool))
     plan: Integers = field(default_factory=lambda: np.empty((0, PLANNED + 1), dtype=np.int64))
-    granted: Flags = field(default_factory=lambda: np.empty((0, PLANNED + 1), dtype=bool))
+    granted: Bools = field(default_factory=lambda: np.empty((0, PLANNED + 1), dtype=bool))
     drivers: Drivers = field(default_factory=lambda: Drivers.of([]))
     specs: list[ActorSpec] = field(default_factory=list)
 
@@ -97,6 +93,6 @@ class Cars:
         return self.plan[:, 0]
 
     @property
-    def changing(self) -> Flags:
+    def changing(self) -> Bools:
         """(N,) who is on the way from one lane to another."""
         return np.asarray(self.shift != 0.0)

@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eidrive_scenario.traffic.lanes import Array, TrafficLanes
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.traffic.lanes import TrafficLanes
 
 CLEARANCE = 3.2
 """Two lanes meet where their center lines come closer than this: less than lanes side by side have, more than two cars

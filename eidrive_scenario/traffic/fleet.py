@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.crossings import Crossings
@@ -29,8 +30,6 @@ from eidrive_scenario.traffic.right_of_way import RightOfWay
 from eidrive_scenario.traffic.stop_lines import MustStop, StopLines
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
 
 REACT_EACH = 0.05
 """Drivers look and decide as often; in shorter steps they keep their acceleration in between [s]."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 ABOVE_DESIRED = 2.0
 """A car that is only too fast brakes no harder than so many times its comfortable deceleration, whereas the model's own

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.idm import Drivers, IntelligentDriver
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_followers, find_leaders
 from eidrive_scenario.traffic.mobil import LaneChanger, Prospect, incentive, safe
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 DURATION = 4.0
 """A lane change takes so long at an even speed [s]; Toledo and Zohar, TRR 1999 (2007) 71, found a mean of 4.6 s."""

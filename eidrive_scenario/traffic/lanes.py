@@ -6,13 +6,10 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FREE = 13.9
 """Desired speed where the map gives no limit [m/s]."""

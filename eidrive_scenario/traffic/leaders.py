@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.world.view import WorldView
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 BIG = 1e5
 """Longer than any lane [m]: rows times BIG plus progress puts all lanes on one axis."""

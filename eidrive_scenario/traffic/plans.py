@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.traffic.cars import PLANNED, Cars
 from eidrive_scenario.traffic.crossings import Crossings
 from eidrive_scenario.traffic.lanes import FREE, TrafficLanes
 from eidrive_scenario.traffic.leaders import LOOK_AHEAD
-
-Array = NDArray[np.float64]
 
 
 class Plans:

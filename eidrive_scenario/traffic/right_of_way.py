@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.traffic.cars import Cars
 from eidrive_scenario.traffic.crossings import Crossings
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import LOOK_AHEAD, Leaders
 from eidrive_scenario.traffic.stop_lines import STOP_LINE
-
-Array = NDArray[np.float64]
 
 PATIENCE = 20.0
 """A car that has waited so long before a junction is not overtaken by others any more [s]."""

@@ -9,12 +9,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import LineOfSight
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LOS, NLOSV, NLOS = range(3)
 """Codes of the states of a line of sight in arrays."""

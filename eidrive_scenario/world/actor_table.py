@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.rays import GROUND, NOTHING
 from eidrive_scenario.world.view import FEW, Contact, WorldView
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

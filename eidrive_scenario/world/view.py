@@ -9,11 +9,9 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.records import fast_frozen
-
-Array = NDArray[np.float64]
 
 FEW = 16
 """Up to this many actors, plain numbers are faster than arrays."""

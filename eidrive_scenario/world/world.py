@@ -9,6 +9,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, suggestion
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.roads import RoadNetwork
@@ -30,8 +31,6 @@ from eidrive_scenario.world.scene.roadside import FIRST_LABEL
 from eidrive_scenario.world.scene.visuals import DisplayState, Visuals
 from eidrive_scenario.world.view import Contact, WorldView
 from eidrive_scenario.world.weather import Weather
-
-Array = NDArray[np.float64]
 
 
 class World:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, AnimationState, Domain, LightState, Visibility, model
+from eidrive_scenario.api import EPSILON, ActionBehaviour, AnimationState, Domain, LightState, Visibility, model
 
 NAMED: Mapping[str, tuple[float, float, float]] = {
     "red": (1.0, 0.0, 0.0),
@@ -25,7 +25,6 @@ NAMED: Mapping[str, tuple[float, float, float]] = {
 """Red, green, blue of the standard's ColorType."""
 
 MOTION = "motion"
-TINY = 1e-6
 
 
 class VisibilityAction(ActionBehaviour):
@@ -94,7 +93,7 @@ class LightStateAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Wait for the transition's end."""
-        over = self.context.time > self._until - TINY and self._mode != model.LightMode.FLASHING.value
+        over = self.context.time > self._until - EPSILON and self._mode != model.LightMode.FLASHING.value
         return Status.SUCCESS if over else Status.RUNNING
 
     @property
@@ -150,7 +149,7 @@ class AnimationAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Wait for its end."""
-        return Status.SUCCESS if self.context.time > self._until - TINY else Status.RUNNING
+        return Status.SUCCESS if self.context.time > self._until - EPSILON else Status.RUNNING
 
     def _kind_and_what(self) -> tuple[str, str]:
         kind = self.action.animation_type

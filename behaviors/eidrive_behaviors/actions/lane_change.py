@@ -11,6 +11,7 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.following import RateLimitedValue, follows, largest_curvature
 from eidrive_behaviors.actions.speed import dynamics_in_words
 from eidrive_scenario.api import (
+    EPSILON,
     STEEPEST,
     ActionBehaviour,
     Domain,
@@ -24,7 +25,6 @@ from eidrive_scenario.api import (
     model,
 )
 
-TINY = 1e-6
 STANDING = 1e-6
 """Slower than this an actor does not change lanes [m/s]."""
 SHIFTED = 1e-3
@@ -113,7 +113,7 @@ class LaneChangeAction(ActionBehaviour):
         if abs(wanted - self._offset) > most:
             wanted, rate = self._offset + math.copysign(most, wanted - self._offset), None
         self._offset = wanted
-        arrived = self._transition.done and abs(wanted - self._transition.target) < TINY
+        arrived = self._transition.done and abs(wanted - self._transition.target) < EPSILON
         self.actor.motion.set_lateral_step(LateralStep(wanted, 0.0 if arrived else None, distance=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 
@@ -126,7 +126,7 @@ class LaneChangeAction(ActionBehaviour):
         offset = here.offset * self._roads.driving_direction(here.road, here.lane)
         if abs(offset - self._offset) <= SHIFTED:
             return
-        left = max(transition.extent - transition.progress, TINY)
+        left = max(transition.extent - transition.progress, EPSILON)
         self._transition = TransitionProfile(transition.shape, offset, transition.target, left)
         if self._tracker is not None:
             self._tracker = RateLimitedValue(offset, self._tracker.rate, up=math.inf, down=math.inf)

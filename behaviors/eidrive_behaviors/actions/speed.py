@@ -8,9 +8,8 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, follows, speed_limiter
-from eidrive_scenario.api import ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
+from eidrive_scenario.api import EPSILON, ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
 
-TINY = 1e-6
 REACHED = 0.2
 """A driven vehicle that is this near to the target speed has reached it [m/s]."""
 
@@ -89,7 +88,7 @@ class SpeedAction(ActionBehaviour):
         if self._tracker is not None and self.context.dt > 0.0:
             speed = self._tracker.advance(speed, self.context.dt)
         self.actor.motion.speed = speed
-        reached = transition.done and abs(speed - transition.target) < TINY
+        reached = transition.done and abs(speed - transition.target) < EPSILON
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
     def _aim_anew(self, target: float) -> None:
@@ -161,7 +160,7 @@ def duration_over(start: float, target: float, distance: float) -> float:
 
     Where the direction of travel turns, the distances before and after the turn are as the squares of the speeds.
     """
-    if abs(target - start) < TINY:
+    if abs(target - start) < EPSILON:
         return 0.0
     if start * target < 0.0:
         before = distance * start * start / (start * start + target * target)

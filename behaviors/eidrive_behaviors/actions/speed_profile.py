@@ -10,9 +10,7 @@ from itertools import pairwise
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.speed import slope_limit
-from eidrive_scenario.api import ActionBehaviour, Domain, Goal, model
-
-TINY = 1e-6
+from eidrive_scenario.api import EPSILON, ActionBehaviour, Domain, Goal, model
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class SpeedProfileAction(ActionBehaviour):
     def update(self) -> Status:
         """The speed at the end of the step."""
         self._elapsed += self.context.dt
-        index = max(0, bisect_right([piece.time for piece in self._pieces], self._elapsed + TINY) - 1)
+        index = max(0, bisect_right([piece.time for piece in self._pieces], self._elapsed + EPSILON) - 1)
         done = index == len(self._pieces) - 1
         speed = self._pieces[-1].speed if done else self._pieces[index].at(self._elapsed)
         if self.actor.driven:
@@ -83,7 +81,7 @@ class SpeedProfileAction(ActionBehaviour):
             if span is None:
                 limit = slope_limit(speed, target, self._limit("max_acceleration"), self._limit("max_deceleration"))
                 span = abs(target - speed) / limit if math.isfinite(limit) and limit > 0.0 else 0.0
-            if span > TINY:
+            if span > EPSILON:
                 corners.append((time + span, target))
             elif number > 0 or self.action.following_mode is model.FollowingMode.POSITION:
                 corners[-1] = (time, target)
@@ -125,9 +123,9 @@ def rounded(corners: list[tuple[float, float]], up: float, down: float) -> list[
             start = time
         else:
             gap = line.slope - slope
-            meet = time if abs(gap) < TINY else time + (speed - line.at(time)) / gap
+            meet = time if abs(gap) < EPSILON else time + (speed - line.at(time)) / gap
             start = meet - 0.5 * span
-        if start < time - TINY:
+        if start < time - EPSILON:
             return None
         speed += slope * (start - time)
         pieces.append(SpeedSegment(start, speed, slope, bend))

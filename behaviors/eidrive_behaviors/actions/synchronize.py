@@ -8,6 +8,7 @@ from enum import Enum
 from py_trees.common import Status
 
 from eidrive_scenario.api import (
+    EPSILON,
     ActionBehaviour,
     Domain,
     EntityAbsentError,
@@ -19,7 +20,6 @@ from eidrive_scenario.api import (
     trajectory_of,
 )
 
-TINY = 1e-6
 ON_LINE = 0.1
 """So near to the speed of the straight last phase the first phase is over [m/s]."""
 HARD = 8.0
@@ -84,14 +84,14 @@ class SynchronizeAction(ActionBehaviour):
         passed = not changed and (way > self._last[0] or master_way > self._last[1])
         self._last = (way, master_way)
         speed = abs(master_speed)
-        time = max(master_way - theirs, TINY) / speed if speed > TINY else math.inf
-        if way < mine + TINY or master_way < theirs + TINY or passed or time < dt + TINY:
+        time = max(master_way - theirs, EPSILON) / speed if speed > EPSILON else math.inf
+        if way < mine + EPSILON or master_way < theirs + EPSILON or passed or time < dt + EPSILON:
             if changed:
                 return Status.RUNNING  # an action that starts beside this one may lay a trajectory
             if final is not None:
                 motion.speed = final
             return Status.SUCCESS
-        way, present = max(way - mine, TINY), self._sense * motion.speed
+        way, present = max(way - mine, EPSILON), self._sense * motion.speed
         if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
         final = self._mean if final is None else self._sense * final
@@ -104,8 +104,8 @@ class SynchronizeAction(ActionBehaviour):
     def _next(self, way: float, time: float, final: float, dt: float) -> float:
         speed = self._sense * self.actor.motion.speed
         steady = self._steady_way(final)
-        if steady > 0.0 and final > TINY:
-            if way - steady < TINY or time - steady / final < TINY:
+        if steady > 0.0 and final > EPSILON:
+            if way - steady < EPSILON or time - steady / final < EPSILON:
                 self._phase = SynchronizationPhase.STEADY
             way, time = way - steady, time - steady / final
         if self._phase is SynchronizationPhase.STEADY:
@@ -118,7 +118,7 @@ class SynchronizeAction(ActionBehaviour):
                 self._phase = SynchronizationPhase.SWING
             return after
         if self._phase is SynchronizationPhase.WAIT:
-            if final < TINY or time >= 2.0 * way / final:
+            if final < EPSILON or time >= 2.0 * way / final:
                 return 0.0
             self._phase = SynchronizationPhase.LAST
         on_line = 2.0 * way / time - final
@@ -139,12 +139,12 @@ class SynchronizeAction(ActionBehaviour):
             self._phase = SynchronizationPhase.LAST
             return speed
         if 0.5 * (speed + final + acceleration * time) < 0.0:
-            stop = 2.0 * speed * way / (speed * speed + final * final) if speed > TINY else 0.0
+            stop = 2.0 * speed * way / (speed * speed + final * final) if speed > EPSILON else 0.0
             if stop * speed > way:
                 self._phase = SynchronizationPhase.BRAKE
                 return max(0.0, speed - HARD * dt)
-            acceleration = -speed / stop if stop > TINY else 0.0
-            if speed + acceleration * dt <= TINY:
+            acceleration = -speed / stop if stop > EPSILON else 0.0
+            if speed + acceleration * dt <= EPSILON:
                 self._phase = SynchronizationPhase.WAIT
                 return 0.0
         return speed + acceleration * dt

@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_scenario.api import (
+    EPSILON,
     ActionBehaviour,
     Domain,
     EntityAbsentError,
@@ -27,7 +28,6 @@ from eidrive_scenario.api import (
     wrap_angle,
 )
 
-TINY = 1e-6
 APART = 1.0
 """Who is further from the place on the trajectory at which he begins is put there, as by a teleport [m]."""
 TIMED = {
@@ -193,12 +193,12 @@ class FollowTrajectoryAction(ActionBehaviour):
         way = self._progress.way
         if self._timing is None:
             after = self._s + way * motion.speed * dt
-            done = not layout.closed and after > max(self._s, layout.length - TINY)
+            done = not layout.closed and after > max(self._s, layout.length - EPSILON)
         else:
             clock = self._clock(dt)
             after = layout.at_time(clock, self._speeds)
-            done = clock >= layout.end_time - TINY
-            if dt > 0.0 and not (done and clock > layout.end_time + TINY):
+            done = clock >= layout.end_time - EPSILON
+            if dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
                 motion.speed = self._forwards(after) * (after - self._s) / dt
             if done:
                 after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
@@ -226,7 +226,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         """+1 where the actor looks along the curve, -1 where it goes on it tail first."""
         if not self._layout.given:
             return self._progress.way
-        return -1.0 if math.cos(self._layout.at(s).h - self._layout.tangent(s)) < -TINY else 1.0
+        return -1.0 if math.cos(self._layout.at(s).h - self._layout.tangent(s)) < -EPSILON else 1.0
 
     def _drive(self, pursuit: PathPursuit | None) -> Status:
         """The pose at the end of the step of a vehicle that follows as far as it can."""
@@ -247,7 +247,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
-        done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - TINY)
+        done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - EPSILON)
         motion.move_to(pose, land=done, rail=None if self._run is not None else partial(self._carried, before))
         return Status.SUCCESS if done else Status.RUNNING
 

@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterable
 
 from eidrive_scenario.openscenario.model import Rule
+from eidrive_scenario.tolerances import EPSILON
 
 Intervals = tuple[tuple[float, float], ...]
 
 NEVER: Intervals = ()
 ALWAYS: Intervals = ((0.0, math.inf),)
-TINY = 1e-6
-"""Two numbers nearer than this are equal to a Rule."""
 STEP = 0.25
 """An edge is seen at the first tick after it: no later than one step, which is shorter than this [s]."""
 
@@ -20,12 +19,12 @@ STEP = 0.25
 def compared(rule: Rule, value: float) -> Intervals:
     """The instants at which the time is as the rule says."""
     spans = {
-        Rule.GREATER_THAN: ((value + TINY, math.inf),),
-        Rule.GREATER_OR_EQUAL: ((value - TINY, math.inf),),
-        Rule.LESS_THAN: ((-math.inf, value - TINY),),
-        Rule.LESS_OR_EQUAL: ((-math.inf, value + TINY),),
-        Rule.EQUAL_TO: ((value - TINY, value + TINY),),
-        Rule.NOT_EQUAL_TO: ((-math.inf, value - TINY), (value + TINY, math.inf)),
+        Rule.GREATER_THAN: ((value + EPSILON, math.inf),),
+        Rule.GREATER_OR_EQUAL: ((value - EPSILON, math.inf),),
+        Rule.LESS_THAN: ((-math.inf, value - EPSILON),),
+        Rule.LESS_OR_EQUAL: ((-math.inf, value + EPSILON),),
+        Rule.EQUAL_TO: ((value - EPSILON, value + EPSILON),),
+        Rule.NOT_EQUAL_TO: ((-math.inf, value - EPSILON), (value + EPSILON, math.inf)),
     }[rule]
     return clip_before(spans, 0.0)
 
@@ -74,6 +73,6 @@ def format_intervals(spans: Intervals) -> str:
     low, high = round(spans[0][0], 3), spans[-1][1]
     if high == math.inf:
         return f"from {low:g} s on" if low > 0.0 else "at any time"
-    if high - low <= STEP + 2 * TINY:
+    if high - low <= STEP + 2 * EPSILON:
         return f"at {low:g} s"
     return f"until {round(high, 3):g} s" if low <= 0.0 else f"from {low:g} s to {round(high, 3):g} s"

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.v2x.radio_environment import LOS, NLOS, NLOSV, LineOfSightStates
 from eidrive_scenario.world import World
@@ -14,7 +13,6 @@ from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.physics.rays import NOTHING
 from eidrive_scenario.world.view import WorldView
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 
 _BEYOND = 0.02

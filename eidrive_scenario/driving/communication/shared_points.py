@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.fusion.early import EarlyFusion
 from eidrive_scenario.geometry import points_in_box
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
-
-Array = NDArray[np.float64]
-
-TIME_TOLERANCE = 1e-9
 
 
 class PointCloudSharing:

@@ -13,6 +13,7 @@ from eidrive_scenario.records import replaced
 from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
 
 
@@ -43,7 +44,7 @@ class ConflictAreaPlanner(RoutePlanner):
             self._last_sighting = now
             reason = f"{objects.classes[inside_area[0]]} in the conflict area"
             return replaced(plan, reason=reason, braking=self.settings.conflict_deceleration, objects=inside_area)
-        if now - self._last_sighting < self.settings.conflict_hold_time - 1e-9:
+        if now - self._last_sighting < self.settings.conflict_hold_time - TIME_TOLERANCE:
             return replaced(
                 plan, reason="an object was in the conflict area", braking=self.settings.conflict_deceleration
             )

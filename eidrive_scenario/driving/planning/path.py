@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 SPACING = 1.0
 """Distance between the points of a path [m]."""

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.driving.planning.path import SPACING, PlannedPath
 from eidrive_scenario.driving.planning.planner import Planner
@@ -19,8 +19,6 @@ from eidrive_scenario.requests import Goal
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
-
-Array = NDArray[np.float64]
 
 HORIZON = 60
 """Points of a plan ahead of the vehicle."""

@@ -6,14 +6,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.driving.planning.path import APPROACH_DECELERATION
 from eidrive_scenario.perception.traffic_lights import SignalAhead, SignalsAhead
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.world.actor import ActorSpec
-
-Array = NDArray[np.float64]
 
 BEFORE_LINE = 1.5
 """Where the front comes to a stand before the line [m]."""
@@ -109,7 +108,7 @@ class SignalStops:
             return False
         if speed < STANDING and left < AT_LINE:
             since = self._standing_since.setdefault(name, now)
-            if now - since >= WAIT - 1e-9:
+            if now - since >= WAIT - TIME_TOLERANCE:
                 del self._standing_since[name]
                 self._served.add(name)
                 return False

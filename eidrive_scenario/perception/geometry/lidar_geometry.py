@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
-
-Array = NDArray[np.float64]
 
 LEAST_STEP = math.radians(0.02)
 """Rays nearer to each other than this count as one column or ring [rad]."""

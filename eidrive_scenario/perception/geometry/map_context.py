@@ -7,12 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world.physics.ground import is_level
-
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
 
 CELL = 0.5
 """The mask of what is near a road has cells of this size [m], larger ones where a map is so large that it would have
@@ -47,7 +45,7 @@ class MapContext:
         """Whether there are roads to ask."""
         return self._roads is not None
 
-    def near_road(self, plan: Array) -> Booleans:
+    def near_road(self, plan: Array) -> Bools:
         """(N,) whether points (N, 2) lie at most `margin` beside a road, to within a cell; True without a map."""
         if self._mask is None or self._roads is None or not len(plan):
             return np.ones(len(plan), dtype=bool)

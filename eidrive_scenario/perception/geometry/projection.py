@@ -7,12 +7,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.sensing.readings import CameraReading
-
-Array = NDArray[np.float64]
 
 NEAREST = 0.1
 """What is nearer along the optical axis is not in the picture [m]."""

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.geometry import box_corners
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
-
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
 
 POINTS = 0.8 * np.array(
     [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)] + [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]
@@ -69,7 +66,7 @@ def _points(boxes: Array) -> Array:
     return np.asarray(turned + boxes[:, None, :3])
 
 
-def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Booleans:
+def _hidden(origin: Array, points: Array, boxes: Array, others: Array) -> Bools:
     """(N, P) whether one of `others` (M, 7) is between `origin` (3,) and points (N, P, 3) of boxes (N, 7)."""
     hidden = np.zeros(points.shape[:2], dtype=bool)
     for x, y, z, length, width, height, yaw in others.tolist():

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.perception.learned.networks.suppression import covered, overlap
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 LEAST_OVERLAP = 0.5
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted
 from eidrive_scenario.geometry import iou_bev
@@ -37,8 +37,6 @@ from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.sensing.readings import LidarReading, Readings, SignalReading
 from eidrive_scenario.sensing.settings import CameraSettings, LidarSettings, SensorSettings
 from eidrive_scenario.settings import Settings
-
-Array = NDArray[np.float64]
 
 SHIPPED = Path(__file__).parents[1] / "weights"
 OWN_SUFFIX, FOREIGN_SUFFIXES = ".npz", (".onnx", TORCHSCRIPT_SUFFIX)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Floats
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.weight_files import TORCHSCRIPT_SUFFIX, read_weights, refused_torchscript
@@ -24,7 +25,6 @@ _ROUNDING = 1e-5
 _LAYER = re.compile(r"Node \[([\w.]{1,60})@")
 _LOG = logging.getLogger(__name__)
 
-Floats = NDArray[np.float32]
 Layout = Literal["yolov5", "yolov8", "boxes_scores", "detections"]
 
 LAYOUTS = (

@@ -10,12 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import suppression_groups
 from eidrive_scenario.perception.learned.networks.suppression import suppress
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LARGEST_OVERLAP = 0.5
 """Of two boxes of like class that overlap by more, the better one counts."""

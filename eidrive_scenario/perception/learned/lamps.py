@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
+from eidrive_scenario.arrays import Array, Floats
 
 WEIGHTS = Path(__file__).parents[1] / "weights" / "lamps.npz"
 NONE = "none"

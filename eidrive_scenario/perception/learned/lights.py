@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Bools
 from eidrive_scenario.perception.geometry.projection import pixels
 from eidrive_scenario.perception.image_detections import ImageDetections
 from eidrive_scenario.perception.learned.classes import STOP_SIGN, light_state
@@ -18,9 +18,6 @@ from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_
 from eidrive_scenario.sensing.readings import CameraReading, SignalReading
 from eidrive_scenario.sensing.signals import RANGE, SIGNAL_KINDS, signal_kind
 from eidrive_scenario.world.road_objects import signal_heads
-
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
 
 NEAR_BOX = 0.75
 """A signal of the map is one that was found if it lies within this many sizes of the box from the box's middle."""
@@ -57,12 +54,12 @@ class LightsOnMap:
         heads = [] if roads is None else signal_heads(roads)
         heads = [head for head in heads if signal_kind(head.signal) in SIGNAL_KINDS]
         self._ids = [head.signal.id for head in heads]
-        self._dynamic: Booleans = np.array([head.signal.dynamic for head in heads], dtype=bool)
+        self._dynamic: Bools = np.array([head.signal.dynamic for head in heads], dtype=bool)
         self._feet = np.array([head.pose[:3] for head in heads], dtype=float).reshape(-1, 3)
         self._heights = np.array([head.height for head in heads], dtype=float)
         self._facing = np.array([(math.cos(head.pose.h), math.sin(head.pose.h)) for head in heads]).reshape(-1, 2)
         colors = [set(lamp_colors(head.signal)) for head in heads]
-        self._possible: Booleans = np.array(
+        self._possible: Bools = np.array(
             [[_NEEDS.get(state, set()) <= own for state in SHOWN] for own in colors], dtype=bool
         ).reshape(-1, len(SHOWN))
 

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern
 from eidrive_scenario.perception.geometry.size_priors import SizePrior, prior_of
 from eidrive_scenario.perception.lidar.l_shape import Rectangle, bounds, rectangles
-
-Array = NDArray[np.float64]
 
 RANGE_NOISE = 0.03
 """Of the points on a surface, standard deviation [m]."""

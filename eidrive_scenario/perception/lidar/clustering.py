@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from eidrive_scenario.arrays import Array, Integers
 
 CELL = 0.1
 """Points of one cell of this size seen from above are joined beforehand [m]."""

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import iou_bev
 from eidrive_scenario.perception.detector import Detector, DetectorContext
@@ -27,8 +27,6 @@ from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings
 from eidrive_scenario.settings import Settings
-
-Array = NDArray[np.float64]
 
 HALF_SURE = 5.0
 """Points at which the score reaches half of what it can be."""

@@ -7,10 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.randomness import generator
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 SECTORS = 24
 BIN = 2.0

@@ -6,9 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 HEADINGS = np.radians(np.arange(0.0, 90.0, 1.0))
 CLOSEST = 0.03

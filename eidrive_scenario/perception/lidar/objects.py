@@ -8,16 +8,14 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Integers
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
 from eidrive_scenario.perception.lidar.box_fit import Fit
 from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
-
-Integers = NDArray[np.int64]
 
 UNLIKELY = 16.0
 """Sum of squared deviations from the sizes of its class beyond which a cluster is no road user: with three sizes, one

@@ -8,15 +8,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, Pattern
 from eidrive_scenario.perception.geometry.size_priors import LARGEST
 from eidrive_scenario.perception.lidar.box_fit import Fit, fit_box
 from eidrive_scenario.perception.lidar.ground import CLEARANCE, ground_height
 from eidrive_scenario.sensing.readings import LidarReading
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 NEARER = 0.5
 """What ends this much before an object, beside it as the sensor sees it, hides a part of it [m]."""

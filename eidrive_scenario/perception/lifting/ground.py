@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.projection import NEAREST, level_frame, straight_boxes
 from eidrive_scenario.perception.geometry.size_priors import prior_of
 from eidrive_scenario.sensing.readings import CameraReading
-
-Array = NDArray[np.float64]
 
 HEADINGS = 12
 """Headings that are tried, over half a turn."""

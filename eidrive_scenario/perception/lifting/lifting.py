@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_corners, overlap
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_points
@@ -21,9 +22,6 @@ from eidrive_scenario.perception.lidar.clustering import clusters
 from eidrive_scenario.perception.lidar.scan import Scan
 from eidrive_scenario.perception.lifting.ground import AT_BORDER, ByGround, lift_by_ground
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LEAST_POINTS = 2
 """Of a cluster that can be the object in a box."""

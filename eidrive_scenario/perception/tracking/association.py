@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.perception.tracking.motion_models import Estimates
-
-Array = NDArray[np.float64]
-Booleans = NDArray[np.bool_]
 
 UNKNOWN_DEVIATION = 0.5
 """Of positions for which the detector gives no covariance [m]."""
@@ -20,7 +17,7 @@ OUTSIDE = 1e6
 
 
 def associate(
-    tracks: Estimates, confirmed: Booleans, boxes: Array, noise: Array, gate: float
+    tracks: Estimates, confirmed: Bools, boxes: Array, noise: Array, gate: float
 ) -> tuple[list[int], list[int]]:
     """Rows of tracks and of boxes that belong together; confirmed tracks choose before others.
 

@@ -19,9 +19,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 DETECTION_PROBABILITY = 0.9
 """Default probability that an object in full view is detected. The networks find 89 % of the vehicles that are neither

@@ -7,9 +7,8 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 ACCELERATION_DENSITY = 6.0
 """Of white acceleration [m²/s³]: within a second, a speed changes by 2.4 m/s (standard deviation)."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.perception.tracking.association import associate, position_noise
 from eidrive_scenario.perception.tracking.existence import (
@@ -21,8 +22,6 @@ from eidrive_scenario.perception.tracking.existence import (
 from eidrive_scenario.perception.tracking.history import TrackHistory
 from eidrive_scenario.perception.tracking.motion_models import ConstantVelocity, Estimates, MotionModel, TurnRate
 from eidrive_scenario.perception.tracking.settings import TrackerSettings
-
-Array = NDArray[np.float64]
 
 MODELS: Mapping[str, type[MotionModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
 

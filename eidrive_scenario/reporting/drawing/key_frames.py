@@ -8,15 +8,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import box_distance, points_in_polygon
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.reporting.snapshot import SnapshotBuilder, StationSnapshot
-
-Array = NDArray[np.float64]
 
 NEAR = 3.0
 """A box whose center is this near to where the car was then is taken for it [m]."""

@@ -6,16 +6,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import Diagnostic, InputError
 from eidrive_scenario.recording.recording import Recording
 from eidrive_scenario.reporting.drawing.top_view import RoadDrawing, Window
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
 from eidrive_scenario.roads.reading.document import parse_road_map
-
-Array = NDArray[np.float64]
 
 SPACING = 1.0
 """Distance of the points at which edges are computed [m]; those that lie on a straight line are dropped again."""

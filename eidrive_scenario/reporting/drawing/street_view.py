@@ -7,15 +7,14 @@ from collections.abc import Mapping
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
-Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 WIDTH, HEIGHT = 960, 540

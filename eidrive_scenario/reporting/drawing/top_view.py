@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.geometry import footprint
 from eidrive_scenario.reporting.snapshot import StationSnapshot
-
-Array = NDArray[np.float64]
 
 OWN, RECEIVED, LINK, LOST, AREA = "#2563eb", "#ea580c", "#0f9d58", "#dc2626", "#eab308"
 TRUTH, STATION = "#334155", "#0f172a"

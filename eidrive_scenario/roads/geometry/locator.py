@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.geometry.overlaps import Overlaps
 from eidrive_scenario.roads.geometry.tables import RoadTables
-from eidrive_scenario.roads.model.location import Array, Integers, LaneLocations
+from eidrive_scenario.roads.model.location import LaneLocations
 
 SPACING = 4.0
 """Distance between samples along a lane [m]."""

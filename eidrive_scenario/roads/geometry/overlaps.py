@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.geometry.tables import RoadTables
-from eidrive_scenario.roads.model.location import Array, Integers
 
 
 class Overlaps:

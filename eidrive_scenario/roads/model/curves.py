@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import fresnel
 
-from eidrive_scenario.roads.model.location import Array, Integers
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.roads.model.polynomials import spread
 
 FLAT_PHASE = 1e7

@@ -10,10 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.errors import InputError
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class PositionError(InputError):

@@ -12,9 +12,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.roads.geometry.poses import lane_pose_at, lane_t
 from eidrive_scenario.roads.geometry.tables import RoadTables
-from eidrive_scenario.roads.model.location import Array, LaneKey, LaneLocation, Pose
+from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, Pose
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.routing.movement import Branch, driving_direction
 

@@ -12,9 +12,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-
-TOLERANCE = 1e-6
-"""Two numbers nearer than this are equal to a Rule."""
+from eidrive_scenario.tolerances import EPSILON
 
 WORDS = {
     "greaterThan": ">",
@@ -35,17 +33,17 @@ def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
         return False
     match rule.value:
         case "greaterThan":
-            return value > limit + TOLERANCE
+            return value > limit + EPSILON
         case "greaterOrEqual":
-            return value >= limit - TOLERANCE
+            return value >= limit - EPSILON
         case "lessThan":
-            return value < limit - TOLERANCE
+            return value < limit - EPSILON
         case "lessOrEqual":
-            return value <= limit + TOLERANCE
+            return value <= limit + EPSILON
         case "equalTo":
-            return value == limit or abs(value - limit) <= TOLERANCE
+            return value == limit or abs(value - limit) <= EPSILON
         case "notEqualTo":
-            return not (value == limit or abs(value - limit) <= TOLERANCE)
+            return not (value == limit or abs(value - limit) <= EPSILON)
     raise ValueError(f"unknown rule {rule!r}")
 
 

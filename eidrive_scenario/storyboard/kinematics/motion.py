@@ -12,9 +12,9 @@ from typing import NamedTuple
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.kinematics.route_lanes import RouteLanes
+from eidrive_scenario.tolerances import EPSILON
 from eidrive_scenario.world.actor import Placement
 
-TINY = 1e-6
 ACROSS = math.cos(math.radians(50.0))
 """An actor that is placed pointing further away from its lane than 50° crosses the road instead of following it."""
 
@@ -315,4 +315,4 @@ class Motion:
         turn = wrap_angle(
             yaw - lane if self.roads.driving_direction(location.road, location.lane) > 0 else yaw - lane - math.pi
         )
-        return 0.0 if abs(turn) < TINY else turn
+        return 0.0 if abs(turn) < EPSILON else turn

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_scenario.openscenario.model import DynamicsShape
-
-TINY = 1e-6
-
+from eidrive_scenario.tolerances import EPSILON
 
 PEAK = {
     DynamicsShape.STEP: 0.0,
@@ -39,19 +37,19 @@ class TransitionProfile:
     @classmethod
     def from_rate(cls, shape: DynamicsShape, start: float, target: float, rate: float) -> TransitionProfile:
         """The transition whose steepest slope is `rate` (its sign does not matter)."""
-        return cls(shape, start, target, PEAK[shape] * abs(target - start) / max(abs(rate), TINY))
+        return cls(shape, start, target, PEAK[shape] * abs(target - start) / max(abs(rate), EPSILON))
 
     @classmethod
     def from_second_derivative(
         cls, shape: DynamicsShape, start: float, target: float, limit: float
     ) -> TransitionProfile:
         """The transition whose second derivative stays within `limit`."""
-        return cls(shape, start, target, math.sqrt(BEND[shape] * abs(target - start) / max(limit, TINY)))
+        return cls(shape, start, target, math.sqrt(BEND[shape] * abs(target - start) / max(limit, EPSILON)))
 
     def limit_rate(self, limit: float) -> None:
         """Stretch the transition so that its steepest slope stays within `limit`; a step stays a step."""
         if self.shape is not DynamicsShape.STEP and self.extent > 0.0:
-            self.extent = max(self.extent, PEAK[self.shape] * abs(self.target - self.start) / max(limit, TINY))
+            self.extent = max(self.extent, PEAK[self.shape] * abs(self.target - self.start) / max(limit, EPSILON))
 
     def advance(self, step: float) -> float:
         """Let the parameter run by `step`; the value there."""
@@ -61,7 +59,7 @@ class TransitionProfile:
     @property
     def done(self) -> bool:
         """True where the parameter has come to its end."""
-        return self.progress >= self.extent - TINY
+        return self.progress >= self.extent - EPSILON
 
     @property
     def value(self) -> float:

@@ -12,8 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import RoadNetwork
-
-TINY = 1e-6
+from eidrive_scenario.tolerances import EPSILON
 
 
 class SignalCycle:
@@ -46,13 +45,13 @@ class SignalCycle:
         elapsed = time - begun
         if math.isfinite(self.total):
             elapsed = elapsed % self.total if self.total > 0.0 else 0.0
-            if self.total - elapsed < TINY:
+            if self.total - elapsed < EPSILON:
                 elapsed = 0.0
-        elif elapsed < -TINY:
+        elif elapsed < -EPSILON:
             return None
         for _ in self.phases:
             duration = self.phases[number].duration
-            if elapsed < duration - TINY:
+            if elapsed < duration - EPSILON:
                 return number
             elapsed -= duration
             number = (number + 1) % len(self.phases)

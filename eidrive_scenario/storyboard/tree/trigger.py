@@ -13,8 +13,7 @@ from py_trees.common import Status
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.storyboard.context.condition import Condition, truth
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-
-TINY = 1e-6
+from eidrive_scenario.tolerances import EPSILON
 
 
 class ConditionEvaluator:
@@ -74,7 +73,7 @@ class ConditionEvaluator:
         if result or self._recorded:
             self._recorded = result
             self._history.append((context.time, result, self._words(context) if result else "", who))
-        while self._history and self._history[0][0] <= context.time - self.delay + TINY:
+        while self._history and self._history[0][0] <= context.time - self.delay + EPSILON:
             _, value, text, self.triggering = self._history.popleft()
             self._delayed = (value, text)
         return self._delayed[0]

@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.arrays import Bools
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.geometry import points_in_polygon
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import PositionError
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.spawning.sites import Covers, Flags, SpawnSites
+from eidrive_scenario.traffic.spawning.sites import Covers, SpawnSites
 
 START, END = "start", "end"
 
@@ -55,7 +56,7 @@ def polygon(corners: Sequence[tuple[float, float]]) -> Covers:
 def stretches_cover(lanes: TrafficLanes, stretches: Sequence[Stretch]) -> Covers:
     """Which places lie on one of several stretches of road."""
 
-    def covers(sites: SpawnSites) -> Flags:
+    def covers(sites: SpawnSites) -> Bools:
         found = np.zeros(len(sites), dtype=bool)
         s, road, number = lanes.s(sites.row, sites.progress), lanes.road[sites.row], lanes.tables.lane_id[sites.row]
         for stretch in stretches:

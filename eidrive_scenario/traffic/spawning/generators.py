@@ -9,15 +9,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.randomness import generator
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix
 from eidrive_scenario.traffic.spawning.sites import Covers, SpawnAreas, SpawnSites
 from eidrive_scenario.world.actor import ActorSpec
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 RETRY = 0.5
 """Where no place was free, the next attempt is made so much later [s]."""
@@ -141,7 +139,7 @@ class Swarm(TrafficGenerator):
 
     def is_due(self, traffic: GeneratorContext) -> bool:
         """While cars are missing."""
-        return len(self.members) < self.count and traffic.time >= self._again - 1e-9
+        return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
         """Take out who has left, fill up."""
@@ -193,14 +191,14 @@ class Swarm(TrafficGenerator):
             if choice.any()
         )
 
-    def _direction(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Flags:
+    def _direction(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Bools:
         if self.directions is None:
             return np.ones(len(sites), dtype=bool)
         same, opposite = self.directions
-        with_it: Flags = np.cos(sites.heading - center.heading) >= 0.0
+        with_it: Bools = np.cos(sites.heading - center.heading) >= 0.0
         return with_it if rng.uniform(0.0, same + opposite) < same else ~with_it
 
-    def _sector(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Flags:
+    def _sector(self, rng: np.random.Generator, center: CentralObject, sites: SpawnSites) -> Bools:
         """Quarters of the plane around the entity, 90° each."""
         if self.sectors is None:
             return np.ones(len(sites), dtype=bool)
@@ -229,7 +227,7 @@ class Source(TrafficGenerator):
 
     def is_due(self, traffic: GeneratorContext) -> bool:
         """When the next one is due."""
-        return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - 1e-9
+        return self.rate > 0.0 and traffic.time - self.started >= self._made / self.rate - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
         """Bring in who is due; the same one tries again as long as there is no place."""
@@ -274,7 +272,7 @@ class Sink(TrafficGenerator):
         x, y = traffic.positions(names)
         distance = np.hypot(x - self.place[0], y - self.place[1])
         for n in np.argsort(distance, kind="stable").tolist():
-            if distance[n] > self.radius or self._next > traffic.time + 1e-9:
+            if distance[n] > self.radius or self._next > traffic.time + TIME_TOLERANCE:
                 return
             traffic.despawn(names[n])
             # What was not used while nobody came is not saved up.
@@ -299,7 +297,7 @@ class Area(TrafficGenerator):
 
     def is_due(self, traffic: GeneratorContext) -> bool:
         """While participants are missing."""
-        return len(self.members) < self.count and traffic.time >= self._again - 1e-9
+        return len(self.members) < self.count and traffic.time >= self._again - TIME_TOLERANCE
 
     def step(self, traffic: GeneratorContext) -> None:
         """Take out who has left, fill up; done with it where it is not continuous."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools, Integers
 from eidrive_scenario.geometry import overlap
 from eidrive_scenario.roads import LaneLocation
 from eidrive_scenario.traffic.cars import PLANNED
@@ -17,10 +17,6 @@ from eidrive_scenario.traffic.idm import Drivers
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, find_followers, find_leaders
 from eidrive_scenario.traffic.spawning.bodies import Participant
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 SPACING = 5.0
 """Distance between the places along a lane [m]."""
@@ -61,7 +57,7 @@ class SpawnSites:
     def __len__(self) -> int:
         return len(self.row)
 
-    def subset(self, which: Integers | Flags) -> SpawnSites:
+    def subset(self, which: Integers | Bools) -> SpawnSites:
         """A part of them."""
         return SpawnSites(
             self.row[which],
@@ -84,7 +80,7 @@ class SpawnSites:
         )
 
 
-Covers = Callable[[SpawnSites], Flags]
+Covers = Callable[[SpawnSites], Bools]
 """Which of some places belong to an area."""
 
 
@@ -130,7 +126,7 @@ def sites_within_radius(
     return found
 
 
-def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Flags:
+def is_unoccupied(fleet: Fleet, sites: SpawnSites, participant: Participant, speed: Array, foreign: Array) -> Bools:
     """(K,) where a participant can appear with a speed (K,) [m/s].
 
     It touches nobody, has a gap ahead in which it need not brake harder than is comfortable, and leaves its follower as

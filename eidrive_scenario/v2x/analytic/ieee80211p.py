@@ -8,8 +8,8 @@ Numbers in brackets are those of its equations.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.analytic.levels import (
     RATIOS,
     autocorrelation,
@@ -21,8 +21,6 @@ from eidrive_scenario.v2x.analytic.levels import (
 )
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.propagation.gains import winner_b1
-
-Array = NDArray[np.float64]
 
 FREQUENCY = 5.89
 """[GHz]"""

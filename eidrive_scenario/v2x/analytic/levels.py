@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 from scipy.special import erf
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
 
 STEP = 0.1
 """Width of a class of power [dB]."""

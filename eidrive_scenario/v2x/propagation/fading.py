@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 from scipy.special import gammaincinv
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
-
-Array = NDArray[np.float64]
 
 Shape = Annotated[float, Field(ge=0.5, le=1000.0)]
 

@@ -6,10 +6,10 @@ from abc import abstractmethod
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import ndtri
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.propagation.gains import (
     blockage_moments,
@@ -20,9 +20,7 @@ from eidrive_scenario.v2x.propagation.gains import (
     urban_los,
     winner_b1,
 )
-from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, Integers
-
-Array = NDArray[np.float64]
+from eidrive_scenario.v2x.radio_environment import LOS, NLOSV
 
 
 class LinkGeometry:

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.messages.message import Message
 from eidrive_scenario.v2x.propagation.fading import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
-
-Array = NDArray[np.float64]
 
 EARLY = 1e-9
 """Instants nearer than this are one [s]."""

@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from eidrive_scenario.v2x.counter_random import Integers, Keys, combine_keys, key, uniform, uniforms
+from eidrive_scenario.arrays import Array, Integers
+from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.propagation.gains import probability_of_los
 from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathLoss
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
-
-Array = NDArray[np.float64]
 
 OUT_OF_REACH = 170.0
 """Where even an open path loses so much, nobody looks what stands on it [dB]."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.channel import OutgoingMessage
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
 from eidrive_scenario.v2x.link_channel import LinkChannel
@@ -35,7 +36,6 @@ from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.statistics.links import LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import Entry
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 ABSENT = "absent"

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
-
-Array = NDArray[np.float64]
 
 LONGEST_INTERVAL = 10.0
 """Largest time between two messages that a profile can ask for [s]; the standard has 1 s."""

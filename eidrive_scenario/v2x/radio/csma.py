@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.congestion import DccGate
-
-Array = NDArray[np.float64]
 
 SLOT = 13e-6
 """aSlotTime in 10 MHz [s]."""

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
@@ -14,7 +15,6 @@ from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE, Recep
 from eidrive_scenario.v2x.radio_environment import STATES
 from eidrive_scenario.v2x.statistics.link_events import OutcomeBlock, OutcomeColumns
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 OUTCOMES = tuple(("delivered", "") if code == DELIVERED else ("lost", cause) for code, cause in enumerate(CAUSES))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.radio.reception import CAUSES, DELIVERED, QUEUE
 from eidrive_scenario.v2x.statistics.link_statistics import DISTANCE_BIN
 from eidrive_scenario.v2x.statistics.links import Links
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 _CLASSES = 41

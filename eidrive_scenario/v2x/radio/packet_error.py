@@ -8,11 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.analytic import cv2x_mode4, ieee80211p
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.settings import Settings
 from eidrive_scenario.v2x.analytic.settings import FARTHEST, STEP, Cv2xMode4Loss, Ieee80211pLoss
@@ -21,8 +21,6 @@ from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import LOS
-
-Array = NDArray[np.float64]
 
 Technology = Literal["80211p", "cv2x_mode4"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]

@@ -10,15 +10,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import EARLY, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolated
 
-Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
-Bools = NDArray[np.bool_]
 Rows = NDArray[np.int64]
 
 CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")

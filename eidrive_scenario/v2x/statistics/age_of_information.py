@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array
+
 Codes = NDArray[np.int64]
 
 MOST_STEPS = 1 << 20

@@ -9,9 +9,9 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 

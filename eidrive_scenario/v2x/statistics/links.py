@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message, ReceivedMessage
 from eidrive_scenario.v2x.statistics.link_statistics import LinkCounters, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import Entry, ReceptionLog
-
-TIME_TOLERANCE = 1e-9
-"""Two instants nearer than this are one: sums of time steps do not meet exactly in floating point [s]."""
 
 __all__ = ["TIME_TOLERANCE", "LinkStatistics", "Links"]
 

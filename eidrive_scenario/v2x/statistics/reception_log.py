@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.messages.message import ReceivedMessage
 from eidrive_scenario.v2x.statistics.age_of_information import AgeOfInformation
 
-Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
 Entry = tuple[float, str, int, float, ReceivedMessage]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions
 from eidrive_scenario.world.meshes.cars import car
@@ -13,7 +14,7 @@ from eidrive_scenario.world.meshes.cycles import bicycle, motorbike
 from eidrive_scenario.world.meshes.figures import crate, roadside_unit
 from eidrive_scenario.world.meshes.heavy import bus, firetruck, trailer, truck
 from eidrive_scenario.world.meshes.people import in_motion, pedestrian
-from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
+from eidrive_scenario.world.meshes.solids import Mesh, polygon
 from eidrive_scenario.world.meshes.vans import ambulance, van
 
 BUILDERS: Mapping[str, Callable[[BodyDimensions], Mesh]] = {

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.actor import Vector3
-from eidrive_scenario.world.meshes.solids import Array, Mesh, box, polygon
+from eidrive_scenario.world.meshes.solids import Mesh, box, polygon
 
 STOREY = 3.2
 WINDOW = (1.3, 1.5)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_wheels
-from eidrive_scenario.world.meshes.solids import Array, Mesh, box, loft, polygon
+from eidrive_scenario.world.meshes.solids import Mesh, box, loft, polygon
 
 _TALL = 0.37
 """Height over length above which a car is built as an off-roader or hatchback, without a boot."""

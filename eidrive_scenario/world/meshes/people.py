@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions
-from eidrive_scenario.world.meshes.solids import Array, Mesh, ball, bevelled_box, cylinder, moved, tapered_box
+from eidrive_scenario.world.meshes.solids import Mesh, ball, bevelled_box, cylinder, moved, tapered_box
 
 
 class Posture(NamedTuple):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from eidrive_scenario.world.meshes.solids import Array, Mesh, ball, box, cylinder, tapered_box
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.world.meshes.solids import Mesh, ball, box, cylinder, tapered_box
 
 CONIFERS = ("fir", "pine", "spruce", "conifer", "tanne", "fichte")
 

@@ -10,8 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.meshes.sign_faces import NO_ENTRY, SignFace
-from eidrive_scenario.world.meshes.solids import Array, Mesh, polygon
+from eidrive_scenario.world.meshes.solids import Mesh, polygon
 
 LAYER = 0.004
 """Each layer of paint lies so far before the one below [m]; far more than in truth, for the eyes of a far camera."""

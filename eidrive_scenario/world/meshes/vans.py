@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.meshes.body_dimensions import BodyDimensions, add_wheels
-from eidrive_scenario.world.meshes.solids import Array, Mesh, bevelled_box, box, loft, polygon
+from eidrive_scenario.world.meshes.solids import Mesh, bevelled_box, box, loft, polygon
 
 
 def van(frame: BodyDimensions) -> Mesh:

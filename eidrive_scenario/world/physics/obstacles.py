@@ -10,15 +10,13 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.physics.bodies import BODY_FRICTION, DRIVEN, RAYS, RESTITUTION, STATIC, TERRAIN
 from eidrive_scenario.world.physics.bullet import bullet
 from eidrive_scenario.world.physics.spatial_grid import SQUARE, SpatialGrid
 from eidrive_scenario.world.physics.triangle_shape import create_triangle_shape
 from eidrive_scenario.world.road_objects import RoadObjectBody
-
-Array = NDArray[np.float64]
 
 MOST_FACES = 20_000
 """In one collision shape; pybullet refuses much more."""

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.world.physics.bullet import bullet
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Point = tuple[float, float, float]
 
 GROUND, NOTHING = -1, -2

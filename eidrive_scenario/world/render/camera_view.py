@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.model import Array, Floats
 
 Pixels = NDArray[np.intp] | slice
 """Numbers of pixels, line by line."""

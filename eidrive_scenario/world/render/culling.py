@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
-from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.model import MeshInstance
 
 _COARSE_PIXELS = 14.0
 """A model whose diameter covers fewer pixels is drawn coarsely."""

@@ -10,12 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats, Integers
 from eidrive_scenario.world.meshes.palette import MATERIALS, Color
 from eidrive_scenario.world.render.materials import finish_of
 
-Floats = NDArray[np.float32]
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Light = tuple[float, float, float]
 """Red, green, blue of linear sRGB."""
 

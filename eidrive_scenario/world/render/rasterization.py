@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from eidrive_scenario.arrays import Array, Floats, Integers
 
 _SHIFT = np.uint64(32)
 _LOW = np.uint64(0xFFFFFFFF)

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.render import wet_road
 from eidrive_scenario.world.render.camera_view import CameraView, runs
@@ -20,7 +21,7 @@ from eidrive_scenario.world.render.illumination.lamps import Beam
 from eidrive_scenario.world.render.illumination.shadows import ShadowGrid, ShadowMap, shadow_grid
 from eidrive_scenario.world.render.illumination.sky import dome, horizon
 from eidrive_scenario.world.render.materials import SOAKS
-from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.model import MeshInstance
 from eidrive_scenario.world.render.rasterization import Cover, rasterize, rasterize_reference
 from eidrive_scenario.world.render.shading import Lit, lit_surfaces, points_at, sampled, shade, together
 from eidrive_scenario.world.weather import Weather

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.render import wet_road
 from eidrive_scenario.world.render.camera_view import CameraView, Pixels
 from eidrive_scenario.world.render.culling import Surfaces
@@ -17,7 +18,6 @@ from eidrive_scenario.world.render.illumination.lamplight import Lamplight
 from eidrive_scenario.world.render.illumination.shadows import ShadowMap
 from eidrive_scenario.world.render.illumination.sky import sample
 from eidrive_scenario.world.render.materials import GRAIN, MIRROR, RETURNS, SOAKS
-from eidrive_scenario.world.render.model import Array, Floats
 from eidrive_scenario.world.render.rasterization import Cover
 from eidrive_scenario.world.render.surfaces import variation
 from eidrive_scenario.world.weather import Weather

@@ -6,11 +6,9 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Floats
 from eidrive_scenario.randomness import generator
-
-Floats = NDArray[np.float32]
 
 SIZE = 512
 

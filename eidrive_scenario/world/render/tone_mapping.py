@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
+from eidrive_scenario.arrays import Floats
 
 LUMA: Floats = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 """Luminance of linear sRGB (IEC 61966-2-1)."""

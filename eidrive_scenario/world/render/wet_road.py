@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.render.camera_view import CameraView
 from eidrive_scenario.world.render.illumination.sky import sample
-from eidrive_scenario.world.render.model import Array, Floats
 from eidrive_scenario.world.render.rasterization import Cover
 from eidrive_scenario.world.render.surfaces import hollows
 

@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
 from eidrive_scenario.world.meshes.road_objects import road_object_mesh, traffic_light
 from eidrive_scenario.world.meshes.sign_faces import sign_face
 from eidrive_scenario.world.meshes.signs import sign
-from eidrive_scenario.world.render.model import Array, Light, MeshInstance, Model, gridded, model
+from eidrive_scenario.world.render.model import Light, MeshInstance, Model, gridded, model
 from eidrive_scenario.world.road_objects import RoadObjectBody, SignalHead
 
 FIRST_LABEL = -10

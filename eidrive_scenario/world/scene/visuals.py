@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.geometry import rotation_matrix
 from eidrive_scenario.roads import surface_meshes
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle
@@ -23,7 +24,7 @@ from eidrive_scenario.world.physics.bodies import Body
 from eidrive_scenario.world.physics.ground import GroundUnder
 from eidrive_scenario.world.physics.scenery import Building, Scenery
 from eidrive_scenario.world.render.illumination.lamps import Beam
-from eidrive_scenario.world.render.model import Array, Light, MeshInstance, Model, gridded, merged, model, placed
+from eidrive_scenario.world.render.model import Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.world.render.renderer import Renderer, Subjects
 from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.scene.roadside import Roadside

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from eidrive_scenario.arrays import Array, Integers
 
 
 def overlap(first: Array, second: Array) -> Array:

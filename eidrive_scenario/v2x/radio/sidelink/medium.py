@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
@@ -19,8 +19,6 @@ from eidrive_scenario.v2x.radio.sidelink.pscch import ControlChannel, Pdu
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
 from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
-
-Array = NDArray[np.float64]
 
 SUBCARRIERS = 12
 """Of one resource block."""

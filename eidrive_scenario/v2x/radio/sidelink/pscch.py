@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, uniforms
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 BOOST = 2.0

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from eidrive_scenario.arrays import Array, Bools
+
 Rows = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 SHARE = 0.2
 """Least share of the candidate resources that remain after exclusion, and share that is reported (steps 7 and 9)."""

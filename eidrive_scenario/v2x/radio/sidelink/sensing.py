@@ -9,11 +9,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Codes
 from eidrive_scenario.v2x.radio.sidelink.pscch import Pdu
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Scalar = TypeVar("Scalar", bound=np.generic)
 

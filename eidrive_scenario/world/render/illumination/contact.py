@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.render.camera_view import CameraView
-from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.model import MeshInstance
 from eidrive_scenario.world.render.rasterization import Cover
 
 _LEAST = 0.12

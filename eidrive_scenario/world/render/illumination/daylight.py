@@ -7,11 +7,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array
 from eidrive_scenario.world.weather import EXTINCTION_AT_RANGE, Weather
-
-Array = NDArray[np.float64]
 
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 """Luminance of linear sRGB (IEC 61966-2-1)."""

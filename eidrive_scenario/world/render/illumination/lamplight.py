@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Floats
 from eidrive_scenario.world.render.camera_view import CameraView
 from eidrive_scenario.world.render.culling import Surfaces
 from eidrive_scenario.world.render.illumination import lamps
-from eidrive_scenario.world.render.model import Floats
 from eidrive_scenario.world.render.rasterization import Cover
 
 _BESIDE_THE_CAMERA = 4.0

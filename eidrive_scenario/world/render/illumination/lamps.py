@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.world.render.model import Array, Floats
+from eidrive_scenario.arrays import Array, Floats
 
 REACH = 70.0
 """Where the light of a lamp is forgotten [m]."""

@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.world.render.camera_view import CameraView
-from eidrive_scenario.world.render.model import Array, Floats, MeshInstance
+from eidrive_scenario.world.render.model import MeshInstance
 from eidrive_scenario.world.render.rasterization import greatest
 
 REACH = 80.0

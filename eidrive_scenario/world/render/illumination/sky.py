@@ -7,14 +7,11 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from eidrive_scenario.arrays import Array, Floats
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.world.render.illumination.daylight import CLEAR_AIR, FOG_HEIGHT, LUMA, daylight
 from eidrive_scenario.world.weather import Weather
-
-Floats = NDArray[np.float32]
-Array = NDArray[np.float64]
 
 SIZE = 512
 """Pixels of the dome's picture along each side."""
