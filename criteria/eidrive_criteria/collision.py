@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class CollisionSettings(CriterionSettings):

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import TIME_TOLERANCE, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
+from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class DrivenDistanceSettings(CriterionSettings):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from eidrive_criteria.pair import PairCriterion, PairSettings
-from eidrive_scenario.api import WorldView, box_distance
+from eidrive_scenario.api.common import WorldView, box_distance
 
 
 class MinDistanceSettings(PairSettings):

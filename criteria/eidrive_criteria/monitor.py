@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict
 
 
 class MonitorSettings(CriterionSettings):

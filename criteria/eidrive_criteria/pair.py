@@ -8,7 +8,8 @@ from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api import Criterion, CriterionSettings, Frame, Verdict, WorldView, actor_never_present
+from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 
 class PairSettings(CriterionSettings):

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_scenario.api import TIME_TOLERANCE, Criterion, CriterionSettings, Frame, Verdict
+from eidrive_scenario.api.common import TIME_TOLERANCE
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, Verdict
 
 
 class TimeLimitSettings(CriterionSettings):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from eidrive_criteria.pair import PairCriterion, PairSettings
-from eidrive_scenario.api import WorldView
+from eidrive_scenario.api.common import WorldView
 
 
 class TimeToCollisionSettings(PairSettings):

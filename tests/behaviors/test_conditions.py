@@ -8,7 +8,7 @@ import pytest
 from eidrive_behaviors.conditions.values import agrees
 from street_scene import after
 
-from eidrive_scenario.api import model, satisfies_rule
+from eidrive_scenario.api.actions import model, satisfies_rule
 
 NOTHING = '<PrivateAction><VisibilityAction graphics="true" sensors="true" traffic="true"/></PrivateAction>'
 

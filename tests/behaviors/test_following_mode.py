@@ -13,7 +13,8 @@ import pytest
 from eidrive_behaviors.actions.following import RateLimitedValue, speed_limiter
 from street_scene import private
 
-from eidrive_scenario.api import Placement, model
+from eidrive_scenario.api.actions import model
+from eidrive_scenario.api.common import Placement
 
 LARGEST_CURVATURE = math.tan(0.5) / 3.0
 

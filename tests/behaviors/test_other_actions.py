@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eidrive_scenario.api import CustomCommand, LightState, Override, Visibility
+from eidrive_scenario.api.actions import CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.errors import ScenarioError
 
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from eidrive_scenario.api import Contact, Frame, WorldView
+from eidrive_scenario.api.common import Contact, WorldView
+from eidrive_scenario.api.criteria import Frame
 
 
 class Car(NamedTuple):

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 from eidrive_criteria.collision import Collision, CollisionSettings
 
-from eidrive_scenario.api import Contact, evaluate_criteria
+from eidrive_scenario.api.common import Contact
+from eidrive_scenario.api.criteria import evaluate_criteria
 
 
 def criterion(**settings: Any) -> Collision:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
 
-from eidrive_scenario.api import Verdict, evaluate_criteria
+from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 
 
 def criterion(**settings: Any) -> MinDistance:

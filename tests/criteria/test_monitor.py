@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.monitor import Monitor, MonitorSettings
 
-from eidrive_scenario.api import Verdict, evaluate_criteria
+from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 
 
 def verdict(frame: Any, values: list[bool | None], **settings: Any) -> Verdict:

@@ -7,7 +7,7 @@ from eidrive_criteria.driven_distance import DrivenDistance, DrivenDistanceSetti
 from eidrive_criteria.max_speed import MaxSpeed, MaxSpeedSettings
 from eidrive_criteria.reach_position import ReachPosition, ReachPositionSettings
 
-from eidrive_scenario.api import Criterion, evaluate_criteria
+from eidrive_scenario.api.criteria import Criterion, evaluate_criteria
 
 
 def reach(**settings: Any) -> ReachPosition:

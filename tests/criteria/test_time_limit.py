@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.time_limit import TimeLimit, TimeLimitSettings
 
-from eidrive_scenario.api import evaluate_criteria
+from eidrive_scenario.api.criteria import evaluate_criteria
 
 
 @pytest.mark.parametrize(("end", "passed"), [(1.0, True), (400 * 0.05, True), (20.05, False)])

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings, time_to_contact
 
-from eidrive_scenario.api import evaluate_criteria
+from eidrive_scenario.api.criteria import evaluate_criteria
 
 
 def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[float]:

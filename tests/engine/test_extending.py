@@ -108,7 +108,7 @@ def test_examples_are_short_and_use_the_api_alone(name: str) -> None:
     code = [line for line in lines[1:] if line.strip()]
     assert len(code) <= LONGEST
     ours = [line for line in lines if "eidrive" in line and "import" in line]
-    assert all(line.startswith("from eidrive_scenario.api import ") for line in ours)
+    assert all(line.startswith("from eidrive_scenario.api.") for line in ours)
 
 
 @pytest.mark.parametrize(("command", "expected"), commands(), ids=[command for command, _ in commands()])

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import EPSILON, ActionBehaviour, AnimationState, Domain, LightState, Visibility, model
+from eidrive_scenario.api.actions import ActionBehaviour, AnimationState, Domain, LightState, Visibility, model
+from eidrive_scenario.api.common import EPSILON
 
 NAMED: Mapping[str, tuple[float, float, float]] = {
     "red": (1.0, 0.0, 0.0),

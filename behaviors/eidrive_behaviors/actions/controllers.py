@@ -7,17 +7,16 @@ import math
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     ActionBehaviour,
     Actor,
     Goal,
     Override,
-    Pose,
-    Route,
     RuntimeContext,
     is_agent_controller,
     model,
 )
+from eidrive_scenario.api.common import Pose, Route
 
 POINTS_APART = 2.0
 """Of a route that a controller takes over [m]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.teleport import position_in_words
-from eidrive_scenario.api import ActionBehaviour, model, resolve_position
+from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_position
 
 
 class AddEntityAction(ActionBehaviour):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, merge_environment, model
+from eidrive_scenario.api.actions import ActionBehaviour, merge_environment, model
 
 
 class EnvironmentAction(ActionBehaviour):

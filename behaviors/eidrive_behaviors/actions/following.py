@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import Pose, TrajectoryCurve, model, turning_wheelbase, wrap_angle
+from eidrive_scenario.api.actions import TrajectoryCurve, model, turning_wheelbase
+from eidrive_scenario.api.common import Pose, wrap_angle
 
 TINY = 1e-9
 ON_PATH = 1e-3

@@ -10,13 +10,11 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, follows, largest_curvature
 from eidrive_behaviors.actions.speed import dynamics_in_words
-from eidrive_scenario.api import (
-    EPSILON,
+from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
     Domain,
     Goal,
-    LaneLocation,
     LateralStep,
     RuntimeContext,
     TransitionProfile,
@@ -24,6 +22,7 @@ from eidrive_scenario.api import (
     facing,
     model,
 )
+from eidrive_scenario.api.common import EPSILON, LaneLocation
 
 STANDING = 1e-6
 """Slower than this an actor does not change lanes [m/s]."""

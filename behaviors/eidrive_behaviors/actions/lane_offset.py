@@ -6,17 +6,17 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
     Domain,
-    LaneLocation,
     LateralStep,
     TransitionProfile,
     facing,
     model,
     same_way,
 )
+from eidrive_scenario.api.common import LaneLocation
 
 STANDING = 1e-6
 SHIFTED = 1e-3

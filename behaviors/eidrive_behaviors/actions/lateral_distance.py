@@ -7,7 +7,7 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
     Domain,

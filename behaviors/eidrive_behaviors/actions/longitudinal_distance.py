@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
+from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
 """Of the spring between actual and wanted distance, per m/s² of the largest acceleration [1/m]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, model
+from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
 class SetMonitorAction(ActionBehaviour):

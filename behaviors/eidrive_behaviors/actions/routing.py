@@ -8,20 +8,17 @@ import numpy as np
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.teleport import position_in_words
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     ActionBehaviour,
-    EidriveError,
     Goal,
-    Route,
-    RouteError,
     RuntimeContext,
     build_route,
-    generator,
     model,
     random_route,
     resolve_position,
     uniform_branch_selector,
 )
+from eidrive_scenario.api.common import EidriveError, Route, RouteError, generator
 
 RANDOM_WAY = 5000.0
 """Length of the way that a vehicle which drives itself gets for a random route [m]."""

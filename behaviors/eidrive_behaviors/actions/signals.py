@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, RuntimeContext, model, suggestion
+from eidrive_scenario.api.actions import ActionBehaviour, RuntimeContext, model
+from eidrive_scenario.api.common import suggestion
 
 
 class TrafficSignalStateAction(ActionBehaviour):

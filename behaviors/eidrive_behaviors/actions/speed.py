@@ -8,7 +8,8 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, follows, speed_limiter
-from eidrive_scenario.api import EPSILON, ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
+from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
+from eidrive_scenario.api.common import EPSILON
 
 REACHED = 0.2
 """A driven vehicle that is this near to the target speed has reached it [m/s]."""

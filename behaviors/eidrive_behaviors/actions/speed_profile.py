@@ -10,7 +10,8 @@ from itertools import pairwise
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.speed import slope_limit
-from eidrive_scenario.api import EPSILON, ActionBehaviour, Domain, Goal, model
+from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
+from eidrive_scenario.api.common import EPSILON
 
 
 @dataclass(frozen=True)

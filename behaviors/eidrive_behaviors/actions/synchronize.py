@@ -7,8 +7,7 @@ from enum import Enum
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import (
-    EPSILON,
+from eidrive_scenario.api.actions import (
     ActionBehaviour,
     Domain,
     EntityAbsentError,
@@ -19,6 +18,7 @@ from eidrive_scenario.api import (
     resolve_position,
     trajectory_of,
 )
+from eidrive_scenario.api.common import EPSILON
 
 ON_LINE = 0.1
 """So near to the speed of the straight last phase the first phase is over [m/s]."""

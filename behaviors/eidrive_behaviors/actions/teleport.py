@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import ActionBehaviour, model, resolve_position
+from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_position
 
 
 class TeleportAction(ActionBehaviour):

@@ -6,17 +6,15 @@ from abc import abstractmethod
 
 from py_trees.common import Status
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     ActionBehaviour,
-    Diagnostic,
-    InputError,
     ResolvedPosition,
     RuntimeContext,
-    ScenarioError,
     model,
     resolve_position,
     traffic,
 )
+from eidrive_scenario.api.common import Diagnostic, InputError, ScenarioError
 
 
 class TrafficInstanceAction(ActionBehaviour):

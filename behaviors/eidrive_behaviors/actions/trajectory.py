@@ -10,13 +10,11 @@ import numpy as np
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
-from eidrive_scenario.api import (
-    EPSILON,
+from eidrive_scenario.api.actions import (
     ActionBehaviour,
     Domain,
     EntityAbsentError,
     Goal,
-    Pose,
     ResolvedPosition,
     RuntimeContext,
     TrajectoryCurve,
@@ -25,8 +23,8 @@ from eidrive_scenario.api import (
     model,
     resolve_position,
     sample_trajectory,
-    wrap_angle,
 )
+from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
 
 APART = 1.0
 """Who is further from the place on the trajectory at which he begins is put there, as by a teleport [m]."""

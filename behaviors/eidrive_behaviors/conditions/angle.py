@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from eidrive_scenario.api import Pose, QuantityCondition, RuntimeContext, model, wrap_angle
+from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.common import Pose, wrap_angle
 
 
 def angle_of(context: RuntimeContext, entity: str, kind: model.AngleType) -> float:

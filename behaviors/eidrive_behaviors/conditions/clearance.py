@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.api import EntityCondition, LaneLocation, RuntimeContext, entity_box, facing, footprint, model
+from eidrive_scenario.api.actions import EntityCondition, RuntimeContext, entity_box, facing, model
+from eidrive_scenario.api.common import LaneLocation, footprint
 
 
 class RelativeClearanceCondition(EntityCondition):

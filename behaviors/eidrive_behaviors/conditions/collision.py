@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.api import EntityCondition, RuntimeContext, entity_box, model, overlap
+from eidrive_scenario.api.actions import EntityCondition, RuntimeContext, entity_box, model
+from eidrive_scenario.api.common import overlap
 
 TYPES: dict[str, type[model.Element]] = {
     "vehicle": model.Vehicle,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     EntityAbsentError,
     QuantityCondition,
     ResolvedPosition,

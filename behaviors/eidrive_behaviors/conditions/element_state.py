@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     Condition,
-    Diagnostic,
     ElementState,
     ElementStateObserver,
     ElementTransition,
     RuntimeContext,
-    ScenarioError,
     model,
-    suggestion,
 )
+from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 STATES = {state.value: state for state in ElementState}
 TRANSITIONS = {transition.value: transition for transition in ElementTransition}

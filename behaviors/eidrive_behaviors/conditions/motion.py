@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api import QuantityCondition, RuntimeContext, model
-from eidrive_scenario.api import WorldView as View
+from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.common import WorldView as View
 
 
 def along(vector: list[float], yaw: float, direction: model.DirectionalDimension | None) -> float:

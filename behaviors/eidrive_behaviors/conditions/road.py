@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_behaviors.conditions.motion import since, span
-from eidrive_scenario.api import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
 
 
 class EndOfRoadCondition(QuantityCondition):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import Condition, Diagnostic, RuntimeContext, ScenarioError, model, suggestion
+from eidrive_scenario.api.actions import Condition, RuntimeContext, model
+from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 
 class TrafficSignalCondition(Condition):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from eidrive_scenario.api import (
+from eidrive_scenario.api.actions import (
     Condition,
-    Diagnostic,
     Measure,
     RuntimeContext,
     describe_rule,
@@ -14,6 +13,7 @@ from eidrive_scenario.api import (
     relation,
     satisfies_rule,
 )
+from eidrive_scenario.api.common import Diagnostic
 
 
 class SimulationTimeCondition(Condition):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.conditions.distance import GapCondition, place_of
-from eidrive_scenario.api import ResolvedPosition, RuntimeContext, closing_speed, model
+from eidrive_scenario.api.actions import ResolvedPosition, RuntimeContext, closing_speed, model
 
 STANDING = 1e-6
 

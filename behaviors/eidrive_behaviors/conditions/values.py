@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import re
 
-from eidrive_scenario.api import Condition, Measure, RuntimeContext, describe_rule, model, relation, satisfies_rule
+from eidrive_scenario.api.actions import (
+    Condition,
+    Measure,
+    RuntimeContext,
+    describe_rule,
+    model,
+    relation,
+    satisfies_rule,
+)
 
 WORDS = {"true": 1.0, "false": 0.0}
 """What a boolean counts as."""

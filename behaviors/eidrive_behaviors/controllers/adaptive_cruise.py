@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.controllers.properties import number
-from eidrive_scenario.api import Actor, ControllerModel, RuntimeContext, distance, entity_box, model
+from eidrive_scenario.api.actions import Actor, ControllerModel, RuntimeContext, distance, entity_box, model
 
 CLOSEST = 3.0
 """Gap to a standing vehicle [m]."""

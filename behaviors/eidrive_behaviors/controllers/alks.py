@@ -8,7 +8,8 @@ from eidrive_behaviors.controllers.properties import number
 from eidrive_behaviors.controllers.reference_driver import ReferenceDriver, ReferenceDriverSettings
 from eidrive_behaviors.controllers.road_ahead import LeadObject, RoadAhead
 from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss, SafetyModel
-from eidrive_scenario.api import Actor, ControllerModel, Diagnostic, RuntimeContext, ScenarioError, model, suggestion
+from eidrive_scenario.api.actions import Actor, ControllerModel, RuntimeContext, model
+from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 COMFORT = 2.0
 """Back to the set speed on a free road [m/s²]."""

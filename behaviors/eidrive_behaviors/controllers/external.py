@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api import ControllerModel
+from eidrive_scenario.api.actions import ControllerModel
 
 
 class ExternalDriver(ControllerModel):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TypeVar
 
-from eidrive_scenario.api import Diagnostic, ScenarioError, model
+from eidrive_scenario.api.actions import model
+from eidrive_scenario.api.common import Diagnostic, ScenarioError
 
 Usual = TypeVar("Usual", float, float | None)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eidrive_scenario.api import Actor, LaneLocation, RuntimeContext, model
+from eidrive_scenario.api.actions import Actor, RuntimeContext, model
+from eidrive_scenario.api.common import LaneLocation
 
 Span = tuple[float, float]
 """From, to [m]"""

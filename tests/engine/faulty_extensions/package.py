@@ -18,10 +18,13 @@ import time
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_scenario.api import (
-    ActionBehaviour, Condition, Criterion, CriterionSettings, Detections, Detector, FusionMethod, LinkChannel,
-    ChannelProfile, Plan, Diagnostic, RoutePlanner, SettingError, Verdict,
-)
+from eidrive_scenario.api.actions import ActionBehaviour, Condition
+from eidrive_scenario.api.common import Diagnostic, SettingError
+from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Verdict
+from eidrive_scenario.api.driving import Plan, RoutePlanner
+from eidrive_scenario.api.fusion import FusionMethod
+from eidrive_scenario.api.perception import Detections, Detector
+from eidrive_scenario.api.v2x import LinkChannel, ChannelProfile
 
 AFTER = 0.5  # [s]: the faults begin later than the run
 """

@@ -105,7 +105,7 @@ def test_aborted_run_of_run_scenario_fails_with_the_line_of_the_test_and_of_the_
     project.makepyfile(
         """
         import pytest
-        from eidrive_scenario.api import ExtensionError
+        from eidrive_scenario.api.common import ExtensionError
 
         @pytest.mark.scenario("xosc/exits")
         def test_exits(run_scenario):
@@ -133,7 +133,7 @@ def test_wall_limit_of_run_scenario_fixture(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
         import pytest
-        from eidrive_scenario.api import WallLimitError
+        from eidrive_scenario.api.common import WallLimitError
 
         def test_hangs(run_scenario):
             with pytest.raises(WallLimitError, match="the wall limit"):

@@ -1,0 +1,13 @@
+"""Public interface, grouped by audience.
+
+actions     actions, conditions and controller models
+criteria    criteria over frames
+perception  sensors, detectors, trackers
+fusion      fusion methods
+v2x         channels
+driving     planners
+run         runs from Python
+common      names that several groups need: errors, settings, geometry, roads
+
+Extensions import these modules only; the engine itself never does. Each module states which of its names are stable.
+"""

@@ -1,0 +1,60 @@
+"""Names that every kind of extension may need: errors, settings, geometry, roads, actors and the world view.
+
+Stable: all names.
+"""
+
+from eidrive_scenario.arrays import Array
+from eidrive_scenario.errors import (
+    Diagnostic,
+    EidriveError,
+    ExtensionError,
+    InputError,
+    ScenarioError,
+    SettingError,
+    SimulationError,
+    WallLimitError,
+    suggestion,
+)
+from eidrive_scenario.geometry import box_distance, footprint, footprint_distance, overlap, wrap_angle
+from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.randomness import generator
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route, RouteError
+from eidrive_scenario.settings import Settings, load_yaml, parse_settings
+from eidrive_scenario.tolerances import EPSILON, TIME_TOLERANCE
+from eidrive_scenario.world.actor import ActorSpec, Control, Placement
+from eidrive_scenario.world.view import Contact, WorldView
+
+__all__ = [
+    "EPSILON",
+    "TIME_TOLERANCE",
+    "ActorSpec",
+    "Array",
+    "Contact",
+    "Control",
+    "Diagnostic",
+    "EidriveError",
+    "ExtensionError",
+    "InputError",
+    "LaneLocation",
+    "Placement",
+    "Pose",
+    "RoadNetwork",
+    "Route",
+    "RouteError",
+    "Scenario",
+    "ScenarioError",
+    "SettingError",
+    "Settings",
+    "SimulationError",
+    "WallLimitError",
+    "WorldView",
+    "box_distance",
+    "footprint",
+    "footprint_distance",
+    "generator",
+    "load_yaml",
+    "overlap",
+    "parse_settings",
+    "suggestion",
+    "wrap_angle",
+]

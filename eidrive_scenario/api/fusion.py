@@ -1,0 +1,13 @@
+"""Fusion methods: own detections and received reports to one object list.
+
+Stable: all names.
+"""
+
+from eidrive_scenario.detections import Detections
+from eidrive_scenario.fusion.method import FusionMethod, Report
+
+__all__ = [
+    "Detections",
+    "FusionMethod",
+    "Report",
+]
