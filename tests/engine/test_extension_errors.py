@@ -33,7 +33,7 @@ def test_run_of_sound_extensions_passes(package: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("extensions", "place", "time", "line", "problem"),
+    ("extensions", "place", "time", "line", "diagnostic"),
     [
         ({"detector": "raises"}, "detector 'raises' (faulty:Raises) of station 'Ego'", 0.0,
          'raise KeyError("no such camera")', "KeyError: 'no such camera'"),
@@ -131,7 +131,7 @@ def test_keyboard_interrupt_of_extension_interrupts_the_run(
 
 
 @pytest.mark.parametrize(
-    ("extensions", "problem"),
+    ("extensions", "diagnostic"),
     [
         ({"detector": "returns_nan"}, "detect returned boxes with the value nan (expected finite numbers)"),
         ({"detector": "negative_size"}, "detect returned a length, width or height with the value -4.5 (expected 0"),
@@ -179,7 +179,7 @@ def test_action_that_leaves_its_actor_with_nan_is_named(package: Path, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("detector", "problem"),
+    ("detector", "diagnostic"),
     [
         ("yields", "detect is a generator or coroutine (expected a method that returns its result)"),
         ("few_arguments", "detect(self) cannot be called as Detector.detect(self, readings: 'Readings')"),

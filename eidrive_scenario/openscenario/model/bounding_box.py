@@ -10,7 +10,7 @@ from eidrive_scenario.openscenario.model.element import Element
 
 @dataclass(frozen=True, kw_only=True)
 class Center(Element):
-    """Center of the box in the object's frame [m]."""
+    """Position of the middle of the box in the frame of the object [m]."""
 
     x: float
     y: float

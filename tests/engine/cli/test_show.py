@@ -43,7 +43,7 @@ def test_version(eidrive: Eidrive) -> None:
         ("controllers", "alks"),
         ("actions", "SpeedAction"),
         ("conditions", "SimulationTimeCondition"),
-        ("checks", "unobserved-edge"),
+        ("rules", "unobserved-edge"),
     ],
 )
 def test_list(eidrive: Eidrive, what: str, expected: str) -> None:

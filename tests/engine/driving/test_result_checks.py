@@ -47,7 +47,7 @@ def test_check_plan_numbers_in_range_accepts(made: Plan) -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "problem"),
+    ("made", "diagnostic"),
     [
         (None, "returned None (expected Plan)"),
         (plan(points=POINTS * math.nan), "returned points with the value nan (expected finite numbers)"),

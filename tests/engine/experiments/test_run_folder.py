@@ -202,7 +202,10 @@ def test_concurrent_runs_leave_results_that_belong_to_their_recordings(tmp_path:
     text = html.fromstring(Path(report.stdout.strip()).read_text(encoding="utf-8")).text_content()
     for late in (0.1, 0.2):
         assert f"delay: {{kind: constant, seconds: {late}}}" in text
-    assert f"{len(folders)} runs" in text
+    different = {json.dumps(result["settings"], sort_keys=True) for result in results(tmp_path)}
+    assert len(different) < len(folders)
+    assert f"{len(different)} runs" in text
+    assert "a copy of another" in text or "copies of another" in text
 
 
 @pytest.mark.parametrize(

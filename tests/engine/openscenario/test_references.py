@@ -76,7 +76,7 @@ def test_value_of_a_parameter_is_not_resolved_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "problem"),
+    ("text", "diagnostic"),
     [
         ("{a: 1,\n b: {c: $Latncy}}", "a.xosc:2: setting 'b.c': unknown parameter $Latncy; did you mean 'Latency'?"),
         ("[1,\n $Sid]", "a.xosc:2: setting '1': unknown parameter $Sid; did you mean 'Side'?"),

@@ -225,7 +225,7 @@ def test_without_torch_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize(
-    ("changes", "problem"),
+    ("changes", "diagnostic"),
     [
         ({"confidence": 0.0}, "its confidence is 0 (expected a number between 0 and 1)"),
         ({"confidence": 1.0}, "its confidence is 1 (expected a number between 0 and 1)"),

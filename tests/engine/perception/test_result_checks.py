@@ -56,7 +56,7 @@ def test_detections_of_finite_numbers_are_accepted(found: Detections) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "problem"),
+    ("make", "diagnostic"),
     [
         (lambda: detections(boxes=BOX * math.nan), "returned boxes with the value nan"),
         (lambda: detections(boxes=np.full((1, 7), -math.inf, np.float32)), "returned boxes with the value -inf"),
@@ -101,7 +101,7 @@ def test_results_of_derived_classes_of_others_are_checked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "problem"),
+    ("name", "value", "diagnostic"),
     [
         ("needs", "camera", "needs is 'camera'"),
         ("needs", frozenset({"sonar"}), r"needs is frozenset\({'sonar'}\)"),
