@@ -8,7 +8,7 @@ from eidrive_scenario.driving.motionless import MotionlessStations
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.simulation.run import ABORTED, FAILED, PASSED
-from eidrive_scenario.storyboard.state.user_values import user_value_warnings
+from eidrive_scenario.storyboard.state.external_inputs import user_value_warnings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.storyboard.tree.unstarted import unstarted
 

@@ -41,6 +41,7 @@ from eidrive_scenario.simulation.run_outcome import (
 from eidrive_scenario.simulation.run_setup import set_up_run
 from eidrive_scenario.simulation.settings_resolution import resolve_settings
 from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.storyboard.state.external_inputs import ExternalPose
 from eidrive_scenario.tolerances import TIME_TOLERANCE
 from eidrive_scenario.wall_limit import limit_wall_time
 from eidrive_scenario.world import World
@@ -88,7 +89,7 @@ class Simulation:
         self._motionless = MotionlessStations(possible_drivers(self.scenario, self.stations.settings))
         self._commands = CustomCommands(self.scenario, self.stations, self.settings, self.criteria, self._warnings)
         self._user_values = dict(self.settings.user_values)
-        self.storyboard.context.user_values = self._user_values.get
+        self._external_poses: dict[str, ExternalPose] = {}
         self._environment: Environment | None = None
         try:
             self._apply(self.storyboard.initial())
@@ -142,7 +143,8 @@ class Simulation:
         It counts for entities whose controller the stand-in `external` plays, while that controller is active.
         Raises SettingError if no `external` plays a controller of that entity.
         """
-        self.storyboard.give_pose(name, pose, speed)
+        self.storyboard.check_accepts_external_poses(name)
+        self._external_poses[name] = ExternalPose(pose, speed)
 
     @attributed
     def run(self, *, wall_limit: float | None = None) -> RunResult:
@@ -192,7 +194,8 @@ class Simulation:
     def _tick(self) -> tuple[Frame, str | None]:
         view = self.world.view()
         steps = self.stations.step(self.world, view)
-        commands = self.storyboard.tick(view)
+        commands = self.storyboard.tick(view, user_values=self._user_values, external_poses=self._external_poses)
+        self._external_poses = {}
         self._environment = commands.environment or self._environment
         frame = Frame(
             view,

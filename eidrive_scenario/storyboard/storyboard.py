@@ -11,14 +11,15 @@ import numpy as np
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.registry import Registry, registry
-from eidrive_scenario.roads import Pose, RoadNetwork
+from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.storyboard.context.controller_model import build_controller_models, unassigned_controller_warnings
-from eidrive_scenario.storyboard.context.runtime_context import ExternalPose, RuntimeContext
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trailers import check_acyclic, declared_trailer, pairs, pose_behind
 from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.builder import Builder
 from eidrive_scenario.world.actor import Placement
@@ -72,17 +73,12 @@ class Storyboard:
         """What changed its state in the last tick."""
         return tuple(self.context.progress.changes)
 
-    def give_pose(self, name: str, pose: Pose, speed: float) -> None:
-        """Where an entity is after the next step, and its speed [m/s]. Raises SettingError if none waits for it."""
-        waiting = [
-            controller_model.actor.name
-            for controller_model in self._controller_models
-            if controller_model.accepts_external_poses
-        ]
-        if name not in waiting:
-            what = f"nobody waits for poses of {name!r}"
-            raise SettingError(Diagnostic(what, "let the stand-in `external` play its controller", "set_pose"))
-        self.context.external_poses[name] = ExternalPose(pose, speed)
+    def check_accepts_external_poses(self, name: str) -> None:
+        """Raise SettingError if no controller model of the entity accepts poses from outside."""
+        if not any(model.accepts_external_poses and model.actor.name == name for model in self._controller_models):
+            message = f"entity {name!r} has no controller model that accepts poses"
+            hint = "assign the model `external` to its controller (--controller NAME=external)"
+            raise SettingError(Diagnostic(message, hint, "set_pose"))
 
     def initial(self) -> Commands:
         """What holds before the first view: who is where, what was commanded in Init. To be asked once."""
@@ -97,9 +93,19 @@ class Storyboard:
         self._refresh(self.context.commands)
         return self._finished(self.context.commands)
 
-    def tick(self, view: WorldView) -> Commands:
-        """Judge the triggers by this view, let the actions decide, and move what is scripted over to the next one."""
-        self.context.begin_tick(view, self.dt)
+    def tick(
+        self,
+        view: WorldView,
+        *,
+        user_values: Mapping[str, str] = NONE,
+        external_poses: Mapping[str, ExternalPose] = NONE,
+    ) -> Commands:
+        """Evaluate the triggers on this view, update the actions, and move scripted actors to their next poses.
+
+        user_values     values of UserDefinedValueConditions, by name
+        external_poses  poses that were set since the last tick, by entity; each is kept until its entity moves there
+        """
+        self.context.begin_tick(view, self.dt, user_values, external_poses)
         self.context.signals.advance(view.time)
         self.root.tick_tree(self.init)
         if self.root.state is ElementState.COMPLETE and self.ended is None:

@@ -70,7 +70,7 @@ def test_while_its_controller_is_off_it_keeps_lane_and_speed(simulation: Simulat
 
 
 def test_poses_for_somebody_else_are_an_error(simulation: Simulation) -> None:
-    with simulation, pytest.raises(SettingError, match="nobody waits for poses of 'Other'"):
+    with simulation, pytest.raises(SettingError, match="entity 'Other' has no controller model that accepts poses"):
         simulation.set_pose("Other", Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 

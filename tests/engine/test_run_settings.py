@@ -107,6 +107,7 @@ def test_values_of_python_are_the_texts_of_the_command_line(tmp_path: Path, valu
 def test_user_value_set_during_a_run_is_a_text() -> None:
     with Simulation(ONE) as simulation:
         simulation.set_user_value("flag", True)  # type: ignore[arg-type]
-        assert simulation.storyboard.context.user_values("flag") == "true"
+        simulation.tick()
+        assert simulation.storyboard.context.user_values["flag"] == "true"
         with pytest.raises(SettingError, match="the user-defined value 'flag' is None"):
             simulation.set_user_value("flag", None)  # type: ignore[arg-type]

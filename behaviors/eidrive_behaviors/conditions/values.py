@@ -113,11 +113,11 @@ class UserDefinedValueCondition(Condition):
 
     def holds(self, context: RuntimeContext) -> bool:
         """Compare it."""
-        return agrees(context.user_values(self.element.name), self.element.rule, self.element.value)
+        return agrees(context.user_values.get(self.element.name), self.element.rule, self.element.value)
 
     def explain(self, context: RuntimeContext) -> str:
         """Its value."""
-        value = context.user_values(self.element.name)
+        value = context.user_values.get(self.element.name)
         sign = relation(self.element.rule, self.holds(context))
         return f"{self.element.name} = {value} {sign} {self.element.value}"
 
@@ -127,4 +127,4 @@ class UserDefinedValueCondition(Condition):
 
     def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
         """The value."""
-        return measured(context.user_values(self.element.name), self.element.rule, self.element.value)
+        return measured(context.user_values.get(self.element.name), self.element.rule, self.element.value)

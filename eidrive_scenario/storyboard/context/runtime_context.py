@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Protocol, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
@@ -15,6 +15,7 @@ from eidrive_scenario.storyboard.state.background import BackgroundTrafficPort
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.domains import Domain
 from eidrive_scenario.storyboard.state.element_states import ElementStates
+from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.signals import Signals
 from eidrive_scenario.traffic.spawning.generators import CentralObject
 from eidrive_scenario.world.appearance import Appearance
@@ -22,13 +23,6 @@ from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
 
 E = TypeVar("E", bound=model.Element)
-
-
-class ExternalPose(NamedTuple):
-    """A pose from outside, and the speed along its heading [m/s]."""
-
-    pose: Pose
-    speed: float
 
 
 class EntityAbsentError(LookupError):
@@ -103,10 +97,10 @@ class RuntimeContext:
         self.appearances: Mapping[str, Appearance] = {}
         self.overrides: dict[str, dict[str, Override]] = {}
         self.environment = Environment()
-        self.user_values: Callable[[str], str | None] = lambda _: None
-        """Answers UserDefinedValueConditions: the value of a name, None where nobody gives it."""
+        self.user_values: Mapping[str, str] = {}
+        """Values of UserDefinedValueConditions, by name."""
         self.external_poses: dict[str, ExternalPose] = {}
-        """Where somebody outside puts entities at the end of the step, by name."""
+        """Poses that were set from outside and not applied so far, by entity."""
         self.requested_user_values: dict[str, model.Element] = {}
         """The names of such values, and the first condition that asks for each."""
         self.commands = Commands()
@@ -138,10 +132,18 @@ class RuntimeContext:
         """Simulated time [s]."""
         return self.view.time
 
-    def begin_tick(self, view: WorldView, dt: float) -> None:
-        """A new tick: the view changes, the commands start empty, histories go on."""
+    def begin_tick(
+        self,
+        view: WorldView,
+        dt: float,
+        user_values: Mapping[str, str] = NONE,
+        external_poses: Mapping[str, ExternalPose] = NONE,
+    ) -> None:
+        """Start a tick with a new view and empty commands; histories are continued."""
         self.view = view
         self.dt = dt
+        self.user_values = user_values
+        self.external_poses.update(external_poses)
         self.commands = Commands()
         self.progress.begin(view.tick, view.time)
         rows: Mapping[str, int] = view.rows

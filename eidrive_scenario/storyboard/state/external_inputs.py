@@ -1,11 +1,24 @@
-"""Warnings of user-defined values that are missing, or that no condition reads."""
+"""Inputs of a run from outside the scenario: poses of entities, and user-defined values."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple, Never
 
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.openscenario.model import Element
+from eidrive_scenario.roads import Pose
+
+NONE: Mapping[str, Never] = MappingProxyType({})
+"""No inputs from outside."""
+
+
+class ExternalPose(NamedTuple):
+    """Pose of an entity at the end of the step, and its speed along its heading [m/s]."""
+
+    pose: Pose
+    speed: float
 
 
 def user_value_warnings(
