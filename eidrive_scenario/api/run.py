@@ -3,7 +3,11 @@
 Stable: all names.
 """
 
+from eidrive_scenario.checks.scenario_checks import CheckReport, check_scenario
+from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.simulation import (
     ABORTED,
     FAILED,
@@ -22,11 +26,18 @@ __all__ = [
     "FAILED",
     "INVALID_INPUT",
     "PASSED",
+    "CheckReport",
     "Frame",
     "Observer",
+    "Recording",
     "RunResult",
     "RunSettings",
     "Simulation",
+    "check_scenario",
+    "load_distribution",
     "load_for_seed",
+    "load_scenario",
+    "read_recording",
+    "run_and_save",
     "run_file",
 ]
