@@ -17,8 +17,7 @@ from eidrive_scenario.roads.attributes import RoadAttributes
 from eidrive_scenario.roads.geometry import poses
 from eidrive_scenario.roads.geometry.locator import REACH, Locator
 from eidrive_scenario.roads.geometry.tables import RoadTables
-from eidrive_scenario.roads.georeference.geo_reference import parse_geo_reference
-from eidrive_scenario.roads.georeference.geodesy import GeoReference
+from eidrive_scenario.roads.georeference import GeoReference, parse_geo_reference
 from eidrive_scenario.roads.map_checks import check_road_map
 from eidrive_scenario.roads.model.location import LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.model.map_warnings import group_map_warnings
@@ -80,7 +79,7 @@ class RoadNetwork(RoadAttributes):
 
     @cached_property
     def geo_reference(self) -> GeoReference:
-        """Where the map lies on the globe. Raises PositionError if the file does not say it, or in unknown words."""
+        """Geodetic reference of the map. Raise PositionError if the file omits it or if it is invalid."""
         text = self.header.geo_reference
         if not text:
             raise PositionError(
@@ -89,18 +88,25 @@ class RoadNetwork(RoadAttributes):
         try:
             return parse_geo_reference(text)
         except ValueError as error:
-            hint = "write <geoReference> as a PROJ text, such as +proj=utm +zone=32 +datum=WGS84"
-            raise PositionError(Diagnostic(str(error), hint, self.source)) from error
+            raise self._geo_reference_error(error) from error
 
     @cached_property
     def _locator(self) -> Locator:
         return Locator(self.tables)
 
+    def _geo_reference_error(self, error: ValueError) -> PositionError:
+        hint = "write <geoReference> as a PROJ string, such as +proj=utm +zone=32 +datum=WGS84"
+        return PositionError(Diagnostic(str(error), hint, self.source, self.header.geo_reference_line))
+
     # Road and lane coordinates to the world
 
     def geographic(self, latitude: float, longitude: float) -> tuple[float, float]:
-        """x and y [m] of a point on the globe in WGS 84 [rad]. Raises PositionError, as `geo_reference` does."""
-        x, y = self.geo_reference.plane(latitude, longitude)
+        """Return x and y [m] of a point in WGS 84 [rad]. Raise PositionError if the map has no position for it."""
+        reference = self.geo_reference
+        try:
+            x, y = reference.plane(latitude, longitude)
+        except ValueError as error:
+            raise self._geo_reference_error(error) from error
         dx, dy, _, turn = self.header.offset
         x, y, cos, sin = x - dx, y - dy, math.cos(turn), math.sin(turn)
         return x * cos + y * sin, y * cos - x * sin

@@ -28,9 +28,11 @@ DRIVABLE = frozenset(
 
 @dataclass(frozen=True)
 class Header:
-    """The file's header; `geo_reference` is its projection text (PROJ), empty where there is none.
+    """Header of an OpenDRIVE file.
 
-    offset  where the file's origin lies in the projection's plane: x, y, z [m], and its turn [rad]
+    geo_reference       PROJ string or EPSG number; empty if the file omits it
+    geo_reference_line  line of <geoReference> in the file
+    offset              origin of the file in the plane of the projection: x, y, z [m] and rotation [rad]
     """
 
     name: str = ""
@@ -38,6 +40,7 @@ class Header:
     vendor: str = ""
     date: str = ""
     geo_reference: str = ""
+    geo_reference_line: int | None = None
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 

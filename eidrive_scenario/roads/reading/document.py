@@ -93,12 +93,14 @@ def _read_header(root: etree._Element, collector: AttributeReader) -> Header:
     revision = tuple(
         int(text[:9]) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
     )
+    reference = header.find("geoReference")
     return Header(
         name=header.get("name", ""),
         revision=cast(tuple[int, int], revision),
         vendor=header.get("vendor", ""),
         date=header.get("date", ""),
-        geo_reference=(header.findtext("geoReference") or "").strip(),
+        geo_reference=((reference.text if reference is not None else None) or "").strip(),
+        geo_reference_line=line_of(reference) if reference is not None else None,
         offset=_read_offset(header.find("offset"), collector),
     )
 

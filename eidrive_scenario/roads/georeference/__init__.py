@@ -1,1 +1,0 @@
-"""Geodetic reference of a road map."""
