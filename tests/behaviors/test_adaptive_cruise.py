@@ -57,7 +57,8 @@ def test_without_being_activated_it_leaves_the_speed(scene: Any) -> None:
 def test_a_property_that_is_no_number_is_told_with_its_line(scene: Any, name: str, value: str) -> None:
     mode = f'<Property name="mode" value="override"/><Property name="{name}" value="{value}"/>'
     with pytest.raises(
-        ScenarioError, match=rf"scene\.xosc:\d+: the controller 'cruise' has the property {name} = '{value}'"
+        ScenarioError,
+        match=rf"scene\.xosc:\d+: controller 'cruise': invalid property {name} \(got '{value}'; expected a",
     ):
         scene(1, ("Ego", ON), cruise=mode)
 

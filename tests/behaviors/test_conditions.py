@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from eidrive_behaviors.conditions.values import agrees
+from eidrive_behaviors.conditions.values import satisfies
 from street_scene import after
 
 from eidrive_scenario.api.actions import model, satisfies_rule
@@ -348,7 +348,7 @@ def test_a_parameter_and_a_value_from_outside(scene: Any) -> None:
     ],
 )
 def test_texts_compare_as_numbers_where_both_are(text: str | None, rule: str, limit: str, expected: bool) -> None:
-    assert agrees(text, model.Rule(rule), limit) is expected
+    assert satisfies(text, model.Rule(rule), limit) is expected
 
 
 @pytest.mark.parametrize(

@@ -111,13 +111,15 @@ def test_who_stands_waits_and_who_crawls_goes_sideways_no_faster_than_forwards(s
 
 
 def test_a_lane_that_is_not_there_is_an_error(scene: Any) -> None:
-    with pytest.raises(ScenarioError, match=r"aims at lane -4 .* its lanes there: 1, -1, -2"):
+    with pytest.raises(
+        ScenarioError, match=r"LaneChangeAction: the target lane does not exist .*got -4; expected one of 1, -1, -2"
+    ):
         scene(1, ("Ego", change(lane(-4))))
 
 
 @pytest.mark.parametrize("number", ["--1", "left", "²", "-"])
 def test_a_lane_whose_name_is_no_number_is_an_error(scene: Any, number: Any) -> None:
-    with pytest.raises(ScenarioError, match=f"aims at lane '{number}'; give the lane's number"):
+    with pytest.raises(ScenarioError, match=rf"the target lane is not a number \(got '{number}'"):
         scene(1, ("Ego", change(lane(number))))
 
 
@@ -245,9 +247,9 @@ def test_timing_over_trajectory_without_times_keeps_the_speed_and_warns(run: Any
     for frame, x in zip(played.frames, played.x("Ego"), strict=True):
         if frame.view.time > start + 0.1:
             assert x == pytest.approx(110.0 + 20.0 * (frame.view.time - start), abs=1e-6)
-    (warning,) = [text for text in warnings if "nothing to scale" in text]
+    (warning,) = [text for text in warnings if "no times for Timing to scale" in text]
     assert "scene.xosc:" in warning
-    assert warning.endswith("give each vertex a time, or write <None/> for the TimeReference")
+    assert warning.endswith("specify a time for each vertex, or <None/> as the TimeReference")
 
 
 def test_a_trajectory_takes_the_lateral_domain_and_leaves_the_speed_to_others(scene: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from eidrive_behaviors.actions.speed import duration_over
-from eidrive_behaviors.actions.speed_profile import rounded
+from eidrive_behaviors.actions.speed_profile import smoothed_segments
 
 
 def speed(target: str, shape: str = "linear", dimension: str = "time", value: float = 0.0) -> str:
@@ -154,23 +154,23 @@ def test_followed_profiles_round_their_corners() -> None:
     The first slope is there after 0.625 s with 0.78125 m/s; from then on v = 2.5 t - 0.78125, which meets the second
     line 16 - 1.5 t at 4.1953 s; the turn takes 4/3 s about that; the last slope ends 0.25 s after the end.
     """
-    pieces = rounded([(0.0, 0.0), (4.0, 10.0), (8.0, 4.0)], up=4.0, down=3.0)
-    assert pieces is not None
-    times = [piece.time for piece in pieces]
+    segments = smoothed_segments([(0.0, 0.0), (4.0, 10.0), (8.0, 4.0)], up=4.0, down=3.0)
+    assert segments is not None
+    times = [segment.time for segment in segments]
     assert times == pytest.approx([0, 0.625, 4.1953 - 2 / 3, 4.1953 + 2 / 3, 8 - 1.5 / 8, 8 + 1.5 / 8], abs=1e-4)
-    assert pieces[1].at(2.0) == pytest.approx(2.5 * 2.0 - 0.78125)
-    assert pieces[3].at(6.0) == pytest.approx(16.0 - 9.0)
-    assert pieces[-1].speed == pytest.approx(4.0)
+    assert segments[1].at(2.0) == pytest.approx(2.5 * 2.0 - 0.78125)
+    assert segments[3].at(6.0) == pytest.approx(16.0 - 9.0)
+    assert segments[-1].speed == pytest.approx(4.0)
 
 
 def test_one_change_of_speed_within_a_time_begins_and_ends_without_acceleration() -> None:
     """8 m/s in 5 s at 4 m/s³: a (5 - a/4) = 8 gives a = 1.754 m/s²."""
-    pieces = rounded([(0.0, 0.0), (5.0, 8.0)], up=4.0, down=4.0)
-    assert pieces is not None
+    segments = smoothed_segments([(0.0, 0.0), (5.0, 8.0)], up=4.0, down=4.0)
+    assert segments is not None
     slope = 10.0 - math.sqrt(100.0 - 32.0)
-    assert pieces[1].slope == pytest.approx(slope)
-    assert pieces[2].at(pieces[3].time) == pytest.approx(8.0)
-    assert pieces[3].time == 5.0
+    assert segments[1].slope == pytest.approx(slope)
+    assert segments[2].at(segments[3].time) == pytest.approx(8.0)
+    assert segments[3].time == 5.0
 
 
 @pytest.mark.element("SpeedProfileAction")

@@ -87,5 +87,5 @@ def test_without_roads_there_is_nothing_to_choose() -> None:
         end=1,
         signals="",
     ).replace('<LogicFile filepath="street.xodr"/>', "")
-    with pytest.raises(ScenarioError, match="RandomRouteAction needs a road network"):
+    with pytest.raises(ScenarioError, match="RandomRouteAction: the scenario has no road network"):
         Storyboard(load_scenario(text.encode()), None, dt=0.1)

@@ -238,10 +238,10 @@ def test_a_controller_of_ours_says_how_its_drivers_drive(run: Run) -> None:
     [
         (
             swarm(semiMinorAxis="60").replace('semiMinorAxis="60" offset', "offset").replace("30", "-3", 1),
-            "innerRadius=-3",
+            r"innerRadius is out of range \(got -3; expected at least 0\)",
         ),
-        (swarm(more='<DirectionOfTravelDistribution same="0" opposite="0"/>'), "shares 0, 0"),
-        (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), "speeds from 9 to 3"),
+        (swarm(more='<DirectionOfTravelDistribution same="0" opposite="0"/>'), r"shares are invalid \(got 0, 0;"),
+        (swarm(more='<InitialSpeedRange lowerLimit="9" upperLimit="3"/>'), r"speed range is invalid \(got 9 to 3 m/s;"),
         (swarm(center="Egon"), "Egon"),
         (swarm(more=distribution((0.0, PEDESTRIAN))), "are no shares"),
         (area(2, "true", road_range(0.0, 10.0).replace('roadId="1"', 'roadId="9"', 1)), "no road '9'"),
@@ -267,14 +267,14 @@ def test_what_makes_no_sense_is_told_before_the_run(run: Run, inside: str, messa
 def test_a_source_far_from_all_lanes_is_told(run: Run) -> None:
     away = '<Position><WorldPosition x="300" y="200"/></Position>'
     inside = source(1.0, 100.0).replace(position(100.0), away)
-    with pytest.raises(InputError, match="where no lane is near"):
+    with pytest.raises(InputError, match=r"no lane is near x = 300\.0 m, y = 200\.0 m"):
         run(1.0, globally=traffic(inside))
 
 
 def test_traffic_needs_roads(run: Run, tmp_path: Path) -> None:
     run(0.1, globally=traffic(swarm(2)))
     text = (tmp_path / "scene.xosc").read_text().replace('<LogicFile filepath="street.xodr"/>', "")
-    with pytest.raises(InputError, match="needs lanes to drive on"):
+    with pytest.raises(InputError, match="the scenario has no lanes"):
         Simulation(load_scenario(text.encode()))
 
 

@@ -171,4 +171,4 @@ def test_a_time_of_day_that_nobody_states_is_told(run: Any) -> None:
     noon = '<TimeOfDayCondition rule="greaterThan" dateTime="2024-06-01T12:00:00"/>'
     played = run(0.5, ("Ego", NOTHING, f"<ByValueCondition>{noon}</ByValueCondition>"))
     assert played.begun("event 0") == []
-    assert "TimeOfDayCondition never holds" in played.result.warnings[0]
+    assert "TimeOfDayCondition is never fulfilled" in played.result.warnings[0]

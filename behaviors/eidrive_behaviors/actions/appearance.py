@@ -1,4 +1,4 @@
-"""Actions on how an entity looks: who sees it, its lights, and what moves on it."""
+"""Actions on the appearance of an entity: visibility, lights and animations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from py_trees.common import Status
 from eidrive_scenario.api.actions import ActionBehaviour, AnimationState, Domain, LightState, Visibility, model
 from eidrive_scenario.api.common import EPSILON
 
-NAMED: Mapping[str, tuple[float, float, float]] = {
+COLORS: Mapping[str, tuple[float, float, float]] = {
     "red": (1.0, 0.0, 0.0),
     "yellow": (1.0, 1.0, 0.0),
     "green": (0.0, 1.0, 0.0),
@@ -23,47 +23,46 @@ NAMED: Mapping[str, tuple[float, float, float]] = {
     "grey": (0.5, 0.5, 0.5),
     "white": (1.0, 1.0, 1.0),
 }
-"""Red, green, blue of the standard's ColorType."""
+"""RGB values of the standard's ColorType, each in [0, 1]."""
 
 MOTION = "motion"
 
 
 class VisibilityAction(ActionBehaviour):
-    """Says who sees the entity: pictures, traffic, sensors.
+    """Set the visibility of an entity in images, in traffic and to sensors.
 
-    With a SensorReferenceSet what it says of sensors is for those of these names alone, whosever they are.
+    A SensorReferenceSet limits the value for sensors to sensors of the listed names, whichever entity carries them.
     """
 
     immediate = True
     action: model.VisibilityAction
 
     def update(self) -> Status:
-        """Say it."""
+        """Set the visibility."""
         action, context, name = self.action, self.context, self.actor.name
-        before, chosen = context.appearance(name), action.sensor_reference_set
-        if chosen is None:
-            seen = Visibility(action.graphics, action.traffic, action.sensors)
+        before, references = context.appearance(name), action.sensor_reference_set
+        if references is None:
+            visibility = Visibility(action.graphics, action.traffic, action.sensors)
         else:
-            named = {one.name: action.sensors for one in chosen.sensor_reference}
+            named = {reference.name: action.sensors for reference in references.sensor_reference}
             others = before.visibility
-            seen = Visibility(action.graphics, action.traffic, others.sensors, {**others.named, **named})
-        context.set_appearance(name, replace(before, visibility=seen))
+            visibility = Visibility(action.graphics, action.traffic, others.sensors, {**others.named, **named})
+        context.set_appearance(name, replace(before, visibility=visibility))
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Who sees it."""
-        chosen = self.action.sensor_reference_set
-        sensors = (
-            "sensors" if chosen is None else "the sensors " + ", ".join(one.name for one in chosen.sensor_reference)
-        )
-        who = (("images", self.action.graphics), ("traffic", self.action.traffic), (sensors, self.action.sensors))
-        return f"seen by {', '.join(name for name, seen in who if seen) or 'nobody'}"
+        """Describe in which of the three the entity is visible."""
+        references = self.action.sensor_reference_set
+        names = [] if references is None else [reference.name for reference in references.sensor_reference]
+        sensors = "sensors" if references is None else "the sensors " + ", ".join(names)
+        observers = (("images", self.action.graphics), ("traffic", self.action.traffic), (sensors, self.action.sensors))
+        return f"seen by {', '.join(name for name, visible in observers if visible) or 'nothing'}"
 
 
 class LightStateAction(ActionBehaviour):
-    """Switches a light of the vehicle; done when the transition time is over.
+    """Switch of a vehicle light. It is complete at the end of the transition time.
 
-    A flashing light never comes to rest: the action goes on until a younger one switches the same light.
+    A flashing light has no final state: the action lasts until a later one switches the same light.
     """
 
     domains = Domain.LIGHTING
@@ -72,28 +71,28 @@ class LightStateAction(ActionBehaviour):
 
     @property
     def resource(self) -> str:
-        """Its light."""
+        """Name of the light."""
         return self._light
 
     def initialise(self) -> None:
-        """Switch it."""
+        """Switch the light."""
         state, context, name = self.action.light_state, self.context, self.actor.name
-        usual = LightState(self._light, self._mode)
+        default = LightState(self._light, self._mode)
         light = replace(
-            usual,
+            default,
             intensity=state.luminous_intensity if state.luminous_intensity is not None else state.intensity,
             color=rgb(state.color) if state.color is not None else None,
             since=max(context.time, 0.0),
             fade=self.action.transition_time or 0.0,
-            on_for=usual.on_for if state.flashing_on_duration is None else state.flashing_on_duration,
-            off_for=usual.off_for if state.flashing_off_duration is None else state.flashing_off_duration,
+            on_for=default.on_for if state.flashing_on_duration is None else state.flashing_on_duration,
+            off_for=default.off_for if state.flashing_off_duration is None else state.flashing_off_duration,
         )
         before = context.appearance(name)
         context.set_appearance(name, replace(before, lights={**before.lights, self._light: light}))
         self._until = light.since + light.fade
 
     def update(self) -> Status:
-        """Wait for the transition's end."""
+        """Wait for the end of the transition."""
         over = self.context.time > self._until - EPSILON and self._mode != model.LightMode.FLASHING.value
         return Status.SUCCESS if over else Status.RUNNING
 
@@ -110,15 +109,15 @@ class LightStateAction(ActionBehaviour):
         return str(mode.value) if mode is not None else "on"
 
     def describe(self) -> str:
-        """Which light."""
+        """Describe the light and its mode."""
         return f"{self._light} {self._mode}"
 
 
 class AnimationAction(ActionBehaviour):
-    """Plays an animation: of a part of a vehicle, of a pedestrian, out of a file, or one that a tool knows.
+    """Animation of a vehicle component or a pedestrian, from a file, or of a user-defined type.
 
-    Done when its duration is over, at once where it has none; one that loops goes on until another animation of the
-    same part takes its place.
+    It is complete at the end of its duration, and at once without a duration. A looped animation lasts until another
+    animation of the same component starts.
     """
 
     domains = Domain.ANIMATION
@@ -127,17 +126,17 @@ class AnimationAction(ActionBehaviour):
 
     @property
     def resource(self) -> str:
-        """What moves."""
-        return self._kind_and_what()[1] if self._kind_and_what()[0] != MOTION else MOTION
+        """Animated component, or `motion` for a pedestrian."""
+        return self._kind_and_target()[1] if self._kind_and_target()[0] != MOTION else MOTION
 
     def initialise(self) -> None:
-        """Begin it."""
-        kind, what = self._kind_and_what()
+        """Start the animation."""
+        kind, target = self._kind_and_target()
         context, name = self.context, self.actor.name
         pedestrian = self.action.animation_type.pedestrian_animation
         animation = AnimationState(
             kind,
-            what,
+            target,
             state=self.action.animation_state.state if self.action.animation_state is not None else None,
             since=max(context.time, 0.0),
             duration=self.action.animation_duration,
@@ -149,34 +148,34 @@ class AnimationAction(ActionBehaviour):
         self._until = math.inf if animation.loop else animation.since + (animation.duration or 0.0)
 
     def update(self) -> Status:
-        """Wait for its end."""
+        """Wait for the end of the animation."""
         return Status.SUCCESS if self.context.time > self._until - EPSILON else Status.RUNNING
 
-    def _kind_and_what(self) -> tuple[str, str]:
+    def _kind_and_target(self) -> tuple[str, str]:
         kind = self.action.animation_type
         component, pedestrian = kind.component_animation, kind.pedestrian_animation
         if component is not None:
             if component.vehicle_component is not None:
                 return "component", str(component.vehicle_component.vehicle_component_type.value)
-            own = component.user_defined_component
-            return "user component", own.user_defined_component_type if own is not None else ""
+            custom = component.user_defined_component
+            return "user component", custom.user_defined_component_type if custom is not None else ""
         if pedestrian is not None:
             named = str(pedestrian.motion.value) if pedestrian.motion is not None else ""
             return MOTION, named or pedestrian.user_defined_pedestrian_animation or ""
         if kind.animation_file is not None:
             return "file", kind.animation_file.file.filepath
-        own_kind = kind.user_defined_animation
-        return "user animation", own_kind.user_defined_animation_type if own_kind is not None else ""
+        custom_kind = kind.user_defined_animation
+        return "user animation", custom_kind.user_defined_animation_type if custom_kind is not None else ""
 
     def describe(self) -> str:
-        """Which one."""
-        kind, what = self._kind_and_what()
+        """Describe the animation and its target state."""
+        kind, target = self._kind_and_target()
         state = self.action.animation_state
-        return f"{kind} {what}{f' to {state.state:g}' if state is not None else ''}"
+        return f"{kind} {target}{f' to {state.state:g}' if state is not None else ''}"
 
 
 def rgb(color: model.Color) -> tuple[float, float, float] | None:
-    """Red, green, blue in [0, 1] of a color; None where it says no numbers and has no name of the standard."""
+    """Return red, green and blue of a color, each in [0, 1]; None without values and without a standard name."""
     if color.color_rgb is not None:
         return color.color_rgb.red, color.color_rgb.green, color.color_rgb.blue
     if color.color_cmyk is not None:
@@ -185,4 +184,4 @@ def rgb(color: model.Color) -> tuple[float, float, float] | None:
     if color.red is not None and color.green is not None and color.blue is not None:
         return color.red, color.green, color.blue
     name = color.color_type.value if color.color_type is not None else (color.name or "").lower()
-    return NAMED.get(name)
+    return COLORS.get(name)

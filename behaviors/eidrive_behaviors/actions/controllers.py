@@ -1,4 +1,4 @@
-"""Actions on controllers: assign, activate, and hold pedals and wheel against their will."""
+"""Actions on controllers: assignment, activation, and override of pedals, steering wheel and gear."""
 
 from __future__ import annotations
 
@@ -19,30 +19,33 @@ from eidrive_scenario.api.actions import (
 from eidrive_scenario.api.common import Pose, Route
 
 POINTS_APART = 2.0
-"""Of a route that a controller takes over [m]."""
+"""Spacing of the points of a route that is handed to a controller [m]."""
 GEARS = {"n": 0.0, "p": 0.0, "r": -1.0, "d": 1.0}
 
 
 class ActivateControllerAction(ActionBehaviour):
-    """Turns the actor's controller on or off per domain; a domain that is left out stays as it is.
+    """Activation of the actor's controller per domain. A domain that is omitted keeps its state.
 
-    An eidrive controller drives where both domains are on. Where it lets go, the actor keeps lane and speed; where it
-    takes over, it goes on from there. Controllers of other tools leave the actor to the scripted motion: to activate
-    one by its name takes the domain from ours, to deactivate it changes nothing.
+    An eidrive controller drives while both domains are active. On deactivation the actor keeps lane and speed. On
+    activation the controller continues from the current state. A controller of another tool leaves the actor to the
+    scripted motion: its activation by name deactivates the domain of the eidrive controller, its deactivation has no
+    effect.
     """
 
     action: model.ActivateControllerAction
 
     def update(self) -> Status:
-        """Switch."""
+        """Switch the domains."""
         lateral, longitudinal = self.action.lateral, self.action.longitudinal
-        if self._means_another() and any(is_agent_controller(controller) for controller in self.actor.controllers):
-            lateral, longitudinal = _left_to_ours(lateral, longitudinal)
+        if self._names_other_controller() and any(
+            is_agent_controller(controller) for controller in self.actor.controllers
+        ):
+            lateral, longitudinal = _yielded_domains(lateral, longitudinal)
         switch(self, lateral, longitudinal)
         return Status.SUCCESS
 
-    def _means_another(self) -> bool:
-        """Whether the action names a controller of the actor that is none of ours."""
+    def _names_other_controller(self) -> bool:
+        """True if the action names a controller of the actor that belongs to another tool."""
         name = self.action.object_controller_ref or self.action.controller_ref
         if name is None:
             return False
@@ -54,7 +57,7 @@ class ActivateControllerAction(ActionBehaviour):
         return name in named and not is_agent_controller(named[name])
 
     def describe(self) -> str:
-        """Which domains."""
+        """Describe the domains and their states."""
         words = {True: "on", False: "off"}
         domains = (("lateral", self.action.lateral), ("longitudinal", self.action.longitudinal))
         named = [f"{name} {words[value]}" for name, value in domains if value is not None]
@@ -62,9 +65,10 @@ class ActivateControllerAction(ActionBehaviour):
 
 
 class AssignControllerAction(ActionBehaviour):
-    """Gives the actor a controller of another tool, which here means the scripted motion.
+    """Assignment of a controller of another tool, which has the effect of the scripted motion.
 
-    Raises ScenarioError for one of our own: a station is built before the run, from the entity's ObjectController.
+    Raise ScenarioError for an eidrive controller: a station is built before the run, from the ObjectController of the
+    entity.
     """
 
     action: model.AssignControllerAction
@@ -78,21 +82,21 @@ class AssignControllerAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
-        self._controller = self._found()
+        self._controller = self._resolve_controller()
         if self._controller is not None and is_agent_controller(self._controller):
             raise self.error(
-                "assigns an eidrive controller during the run",
-                "give it to the entity in ObjectController, and switch it by ActivateControllerAction",
+                "an eidrive controller cannot be assigned during the run",
+                "assign it in the entity's ObjectController and switch it by ActivateControllerAction",
             )
 
     def update(self) -> Status:
-        """Assign it; domains in which it is activated are no longer those of a controller of ours."""
+        """Assign the controller. Its activation in a domain deactivates the eidrive controller there."""
         if self._controller is not None and self._controller not in self.actor.controllers:
             self.actor.assign(self._controller)
-        switch(self, *_left_to_ours(self.action.activate_lateral, self.action.activate_longitudinal))
+        switch(self, *_yielded_domains(self.action.activate_lateral, self.action.activate_longitudinal))
         return Status.SUCCESS
 
-    def _found(self) -> model.Controller | None:
+    def _resolve_controller(self) -> model.Controller | None:
         holder = self.action if self.action.object_controller is None else self.action.object_controller
         if holder.controller is not None:
             return holder.controller
@@ -101,17 +105,19 @@ class AssignControllerAction(ActionBehaviour):
         return None
 
     def describe(self) -> str:
-        """Which one."""
+        """Describe the controller."""
         return f"assign controller {self._controller.name if self._controller is not None else 'none'}"
 
 
 class OverrideControllerValueAction(ActionBehaviour):
-    """Holds pedals, steering wheel or gear at a value, or gives them back. It counts for who drives itself."""
+    """Override of pedals, steering wheel or gear at a value, and its end. It applies to vehicles with an active
+    controller.
+    """
 
     action: model.OverrideControllerValueAction
 
     def update(self) -> Status:
-        """Hold or give back."""
+        """Set or release the overrides."""
         held = self.context.overrides.setdefault(self.actor.name, {})
         for override in self._overrides():
             if override.active:
@@ -121,15 +127,15 @@ class OverrideControllerValueAction(ActionBehaviour):
         return Status.SUCCESS
 
     def _overrides(self) -> list[Override]:
-        action, found = self.action, []
+        action, overrides = self.action, []
         simple = (("throttle", action.throttle), ("clutch", action.clutch), ("steeringWheel", action.steering_wheel))
         for control, entry in simple:
             if entry is not None:
-                found.append(Override(control, entry.value, entry.active, max_rate=entry.max_rate))
+                overrides.append(Override(control, entry.value, entry.active, max_rate=entry.max_rate))
         for control, brake in (("brake", action.brake), ("parkingBrake", action.parking_brake)):
             if brake is not None:
                 share = brake.brake_percent or brake.brake_force
-                found.append(
+                overrides.append(
                     Override(
                         control,
                         share.value if share is not None else brake.value or 0.0,
@@ -139,8 +145,8 @@ class OverrideControllerValueAction(ActionBehaviour):
                     )
                 )
         if action.gear is not None:
-            found.append(self._gear(action.gear))
-        return found
+            overrides.append(self._gear(action.gear))
+        return overrides
 
     @staticmethod
     def _gear(gear: model.OverrideGearAction) -> Override:
@@ -152,13 +158,13 @@ class OverrideControllerValueAction(ActionBehaviour):
         return Override("gear", gear.number or 0.0, gear.active)
 
     def describe(self) -> str:
-        """Which controls."""
+        """Describe the controls and their values."""
         words = [f"{o.control} {o.value:g}" if o.active else f"{o.control} free" for o in self._overrides()]
         return f"override {', '.join(words)}"
 
 
 def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool | None) -> None:
-    """Turn the domains of an actor's own controller on or off; None leaves one as it is."""
+    """Switch the domains of an actor's eidrive controller on or off; None keeps the state of a domain."""
     actor = behaviour.actor
     before = actor.driven
     if lateral is not None:
@@ -176,13 +182,16 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         actor.goal = Goal(speed=actor.motion.speed, path=lap if rest is None else rest, lap=lap)
 
 
-def _left_to_ours(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:
-    """What the switching of another tool's controller means for ours: what that one takes, ours lose."""
+def _yielded_domains(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:
+    """Return the new domain states of the eidrive controller after another tool's controller was switched.
+
+    Domains that the other controller acquires are deactivated; all others keep their state.
+    """
     return False if lateral else None, False if longitudinal else None
 
 
 def _join_lap(actor: Actor) -> None:
-    """Who changes hands on the lap of its route has left the way there behind."""
+    """Drop the approach to a closed route if the actor is already on its lap as the control changes."""
     route, pose = actor.motion.route, actor.motion.pose
     if route is not None and route.lap is not None and _gap(route.lap, pose) <= _gap(route, pose):
         actor.motion.route = route.lap
@@ -195,7 +204,7 @@ def _gap(route: Route, pose: Pose) -> float:
 
 
 def _rest_of_route(actor: Actor) -> np.ndarray[tuple[int, int], np.dtype[np.float64]] | None:
-    """The points (M, 3) of the actor's route from where it is [m]; None without one, or at its end."""
+    """Return the points (M, 3) of the remaining route [m]; None without a route, or at its end."""
     route, pose = actor.motion.route, actor.motion.pose
     if route is None:
         return None

@@ -1,4 +1,4 @@
-"""CustomCommandAction: what the standard has no word for, handed on to whoever understands its type."""
+"""CustomCommandAction: a command outside the standard, passed to the receiver that supports its type."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from eidrive_scenario.api.actions import ActionBehaviour, CustomCommand, model
 
 
 class CustomCommandAction(ActionBehaviour):
-    """Hands its type and text on, once. It never starts a program."""
+    """Pass type and content of the command on, once. It never starts a program."""
 
     immediate = True
     action: model.CustomCommandAction
 
     def update(self) -> Status:
-        """Hand it on."""
+        """Append the command to the commands of the step."""
         action = self.action
         self.context.commands.custom.append(
             CustomCommand(action.type, action.content, action.line, action.source, action.scope)
@@ -22,5 +22,5 @@ class CustomCommandAction(ActionBehaviour):
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Type and text."""
+        """Describe type and content."""
         return f"command {self.action.type}: {' '.join(self.action.content.split())}"

@@ -8,13 +8,13 @@ from eidrive_scenario.api.actions import ActionBehaviour, merge_environment, mod
 
 
 class EnvironmentAction(ActionBehaviour):
-    """Sets the environment at once; what it leaves out stays as it is. A time of day starts the clock anew."""
+    """Immediate change of the environment. Omitted parts keep their values; a time of day restarts the clock."""
 
     immediate = True
     action: model.EnvironmentAction
 
     def update(self) -> Status:
-        """Set it."""
+        """Set the environment."""
         context = self.context
         context.environment = merge_environment(context.environment, self._environment(), max(context.time, 0.0))
         context.commands.environment = context.environment
@@ -26,5 +26,5 @@ class EnvironmentAction(ActionBehaviour):
         return self.context.catalog_entry(self.action.catalog_reference, model.Environment, self.action)
 
     def describe(self) -> str:
-        """Which one."""
+        """Describe the environment by its name."""
         return f"environment {self._environment().name}"

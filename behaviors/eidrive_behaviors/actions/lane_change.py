@@ -1,4 +1,4 @@
-"""LaneChangeAction: move an actor over to another lane."""
+"""LaneChangeAction: move an actor to another lane."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import RateLimitedValue, follows, largest_curvature
-from eidrive_behaviors.actions.speed import dynamics_in_words
+from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, largest_curvature
+from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -25,21 +25,22 @@ from eidrive_scenario.api.actions import (
 from eidrive_scenario.api.common import EPSILON, LaneLocation
 
 STANDING = 1e-6
-"""Slower than this an actor does not change lanes [m/s]."""
+"""Minimum speed of a lane change [m/s]. A slower actor waits."""
 SHIFTED = 1e-3
-"""An offset that differs by more from the one before, in a lane that goes on there, counts from a lane beside [m]."""
+"""Offset change above which the offset refers to a neighboring lane after the target lane has ended [m]."""
 NEAR = 0.2
-"""A driven vehicle that is this near to its place in the new lane has arrived [m]."""
+"""Maximum distance to the target in the new lane at which a driven vehicle has arrived [m]."""
 LOOKOUT = 100.0
-"""How far ahead a driven vehicle is given points of the new lane [m]."""
+"""Length of the path on the new lane that is handed to a driven vehicle [m]."""
 
 
 class LaneChangeAction(ActionBehaviour):
-    """Takes the offset from the target lane's center over to `targetLaneOffset` by the given dynamics.
+    """Transition of the lateral offset to `targetLaneOffset` of the target lane by the given dynamics.
 
-    A distance is measured along the lane. The actor covers its speed's distance on the slanted way; a demand to go
-    sideways faster than forwards is cut to that. A standing actor waits. In the following mode `follow` a vehicle
-    accelerates sideways no more than its front wheels and its tires allow, which brake as hard as its Performance says.
+    A distance is measured along the lane. The actor covers the distance of its speed on the oblique path. A lateral
+    speed above the forward speed is reduced to the forward speed. A standing actor waits. In the following mode
+    `follow` the lateral acceleration of a vehicle is limited by its front wheels and by its tires. The limit of the
+    tires is the maximum deceleration of the Performance.
     """
 
     domains = Domain.LATERAL
@@ -58,23 +59,26 @@ class LaneChangeAction(ActionBehaviour):
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = action.lane_change_target.absolute_target_lane
         if target is not None and not target.value.removeprefix("-").isdecimal():
-            raise self.error(f"aims at lane {target.value!r}", "give the lane's number")
+            raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
         if context.roads is None:
-            raise self.error("needs a road network", "name one in RoadNetwork/LogicFile")
+            raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
         self._roads = context.roads
         self._lane = 0
-        self._tracker: RateLimitedValue | None = None
+        self._limited_offset: RateLimitedValue | None = None
 
     def initialise(self) -> None:
-        """Find the target lane, and see the actor's place as an offset from its center."""
+        """Find the target lane and express the actor's position as an offset from its center."""
         here = self.context.location(self.actor.name)
         if here is None:
-            raise self.error(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+            raise self.error(
+                f"actor {self.actor.name!r} is off the road at the start", "place the actor on a lane first"
+            )
         self._lane = self._target_lane(here)
         if self._lane not in self._roads.lane_ids(here.road, here.s):
+            lanes = ", ".join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))
             raise self.error(
-                f"aims at lane {self._lane} of road {here.road!r}, which it does not have at s = {here.s:.1f}",
-                f"its lanes there: {', '.join(str(lane) for lane in self._roads.lane_ids(here.road, here.s))}",
+                f"the target lane does not exist on road {here.road!r} at s = {here.s:.1f} m "
+                f"(got {self._lane}; expected one of {lanes})"
             )
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
@@ -88,25 +92,25 @@ class LaneChangeAction(ActionBehaviour):
             self._transition = TransitionProfile(shape, start, target, value)
         self._offset = start
         self._followed_lane = moved.road, self._lane
-        if follows(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
+        if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
             sideways = self.actor.motion.speed * math.sin(self.actor.motion.heading)
-            self._tracker = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
+            self._limited_offset = RateLimitedValue(start, sideways, up=math.inf, down=math.inf)
 
     def update(self) -> Status:
-        """The offset at the end of the step."""
+        """Set the offset at the end of the step."""
         if self.actor.driven:
-            return self._ask_driver()
+            return self._set_driver_goal()
         way = abs(self.actor.motion.speed) * self.context.dt
-        if self._transition.extent <= 0.0 and self._tracker is None:
+        if self._transition.extent <= 0.0 and self._limited_offset is None:
             self.actor.motion.set_lateral_step(LateralStep(self._transition.target, 0.0, shortens_distance=False))
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
             return Status.RUNNING
-        self._relate()
-        wanted = self._next(way)
+        self._switch_reference_lane()
+        wanted = self._next_offset(way)
         rate: float | None = self._rate(way)
-        if self._tracker is not None:
-            followed = self._followed(self._tracker, wanted)
+        if self._limited_offset is not None:
+            followed = self._limit_to_vehicle(self._limited_offset, wanted)
             wanted, rate = followed, rate if followed == wanted else None
         most = STEEPEST * way
         if abs(wanted - self._offset) > most:
@@ -116,8 +120,8 @@ class LaneChangeAction(ActionBehaviour):
         self.actor.motion.set_lateral_step(LateralStep(wanted, 0.0 if arrived else None, distance=way, rate=rate))
         return Status.SUCCESS if arrived else Status.RUNNING
 
-    def _relate(self) -> None:
-        """Continue from the new offset after the target lane has ended and the lane beside it has become the target."""
+    def _switch_reference_lane(self) -> None:
+        """Continue from the new offset after the target lane has ended and its neighbor has become the target."""
         here, transition = self.actor.motion.location, self._transition
         if here is None or (here.road, here.lane) == self._followed_lane:
             return
@@ -127,11 +131,11 @@ class LaneChangeAction(ActionBehaviour):
             return
         left = max(transition.extent - transition.progress, EPSILON)
         self._transition = TransitionProfile(transition.shape, offset, transition.target, left)
-        if self._tracker is not None:
-            self._tracker = RateLimitedValue(offset, self._tracker.rate, up=math.inf, down=math.inf)
+        if self._limited_offset is not None:
+            self._limited_offset = RateLimitedValue(offset, self._limited_offset.rate, up=math.inf, down=math.inf)
         self._offset = offset
 
-    def _next(self, way: float) -> float:
+    def _next_offset(self, way: float) -> float:
         transition = self._transition
         if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
             return transition.advance(self.context.dt)
@@ -142,20 +146,20 @@ class LaneChangeAction(ActionBehaviour):
         return transition.advance(along)
 
     def _rate(self, way: float) -> float:
-        """How fast the offset grows at the end of a step of this way [m/s]."""
+        """Return the rate of the offset at the end of a step of this distance [m/s]."""
         slope = self._transition.slope
         if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
             return slope
         return way / self.context.dt * slope / math.hypot(1.0, slope)
 
-    def _followed(self, tracker: RateLimitedValue, wanted: float) -> float:
+    def _limit_to_vehicle(self, limited: RateLimitedValue, wanted: float) -> float:
         vehicle, speed = self.actor.entity, self.actor.motion.speed
         assert isinstance(vehicle, model.Vehicle)
-        tracker.up = tracker.down = min(
+        limited.up = limited.down = min(
             largest_curvature(vehicle) * speed * speed, vehicle.performance.max_deceleration
         )
-        tracker.lowest, tracker.highest = -abs(speed), abs(speed)
-        return tracker.advance(wanted, self.context.dt)
+        limited.lowest, limited.highest = -abs(speed), abs(speed)
+        return limited.advance(wanted, self.context.dt)
 
     def _target_lane(self, here: LaneLocation) -> int:
         target = self.action.lane_change_target
@@ -165,11 +169,11 @@ class LaneChangeAction(ActionBehaviour):
         name = target.relative_target_lane.entity_ref
         reference = self.context.location(name)
         if reference is None:
-            raise self.error(f"counts lanes from {name}, which is on no road")
+            raise self.error(f"the reference entity {name!r} is off the road")
         left = facing(self.context, name, reference) * self._roads.driving_direction(reference.road, reference.lane)
         return count_lanes(reference.lane, target.relative_target_lane.value * left)
 
-    def _ask_driver(self) -> Status:
+    def _set_driver_goal(self) -> Status:
         here = self.context.location(self.actor.name)
         if here is None:
             return Status.RUNNING
@@ -188,7 +192,7 @@ class LaneChangeAction(ActionBehaviour):
         return Status.RUNNING
 
     def describe(self) -> str:
-        """Target and dynamics."""
+        """Describe target and dynamics."""
         target = self.action.lane_change_target
         if target.absolute_target_lane is not None:
             where = f"lane {target.absolute_target_lane.value}"
@@ -198,4 +202,4 @@ class LaneChangeAction(ActionBehaviour):
             where = f"the lane of {name}" if count == 0 else f"{count:+d} lanes from {name}"
         offset = self.action.target_lane_offset
         aside = f", {offset:g} m off its center" if offset else ""
-        return f"change to {where}{aside}, {dynamics_in_words(self._dynamics, 'm/s')}"
+        return f"change to {where}{aside}, {describe_dynamics(self._dynamics, 'm/s')}"

@@ -1,4 +1,4 @@
-"""LaneOffsetAction: move an actor sideways within its lane."""
+"""LaneOffsetAction: change the lateral offset of an actor within its lane."""
 
 from __future__ import annotations
 
@@ -20,33 +20,35 @@ from eidrive_scenario.api.common import LaneLocation
 
 STANDING = 1e-6
 SHIFTED = 1e-3
-"""An offset that differs by more from the one before, in a lane that goes on there, counts from a lane beside [m]."""
+"""Offset change above which the offset refers to a neighboring lane after the lane has ended [m]."""
 
 
 class LaneOffsetAction(ActionBehaviour):
-    """Takes the offset from the lane's center over to its target, as fast as `maxLateralAcc` lets it.
+    """Transition of the offset from the lane center to its target, limited by `maxLateralAcc`.
 
-    The shape runs over time; without `maxLateralAcc` the target holds at once. With it an actor goes sideways no faster
-    than forwards, so that one that stands waits. An offset relative to an entity counts
-    from that entity's lateral place, left of its heading positive. A continuous action holds the offset, and follows
-    the entity, until a younger action ends it.
+    The shape is a function of time. Without `maxLateralAcc` the target applies at once. With it the lateral speed is at
+    most the forward speed, so that a standing actor waits. A relative offset refers to the lateral position of the
+    entity and is positive to the left of its heading. A continuous action holds the offset and follows the entity until
+    a later action ends it.
     """
 
     domains = Domain.LATERAL
     action: model.LaneOffsetAction
 
     def initialise(self) -> None:
-        """Lay the transition from the present offset."""
+        """Start the transition from the current offset."""
         motion = self.actor.motion
         if motion.location is None:
             motion.snap_to_lane()
         if motion.location is None:
-            raise self.error(f"starts while {self.actor.name} is on no road", "place the actor on a lane first")
+            raise self.error(
+                f"actor {self.actor.name!r} is off the road at the start", "place the actor on a lane first"
+            )
         self._lane = motion.location.road, motion.location.lane
-        self._lay(motion.location)
+        self._start_transition(motion.location)
 
-    def _lay(self, here: LaneLocation) -> None:
-        """Lay the transition from a place, whose offset counts from its lane's center."""
+    def _start_transition(self, here: LaneLocation) -> None:
+        """Start the transition from the offset of a location."""
         way = self._way(here)
         start, target = here.offset * way, self._target(here) * way
         limit, shape = self.action.lane_offset_action_dynamics.max_lateral_acc, self._shape()
@@ -57,14 +59,14 @@ class LaneOffsetAction(ActionBehaviour):
         self._offset = start
 
     def update(self) -> Status:
-        """The offset at the end of the step."""
+        """Set the offset at the end of the step."""
         here = self.actor.motion.location
         if self.actor.driven or here is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         if (here.road, here.lane) != self._lane:
             self._lane = here.road, here.lane
             if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
-                self._lay(here)
+                self._start_transition(here)
         transition, speed, dt = self._transition, self.actor.motion.speed, self.context.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING
@@ -88,7 +90,7 @@ class LaneOffsetAction(ActionBehaviour):
         return 1 if self.context.roads is None else self.context.roads.driving_direction(here.road, here.lane)
 
     def _target(self, here: LaneLocation) -> float:
-        """The offset to reach, in the direction of t [m]."""
+        """Return the target offset, in the direction of t [m]."""
         target = self.action.lane_offset_target
         if target.absolute_target_lane_offset is not None:
             return target.absolute_target_lane_offset.value
@@ -96,16 +98,16 @@ class LaneOffsetAction(ActionBehaviour):
         name, roads = target.relative_target_lane_offset.entity_ref, self.context.roads
         other = self.context.location(name)
         if other is None or roads is None:
-            raise self.error(f"counts from {name}, which is on no road")
+            raise self.error(f"the reference entity {name!r} is off the road")
         found = roads.distance(here, other)
         if found is None:
-            raise self.error(f"counts from {name}, to which no road leads")
+            raise self.error(f"the reference entity {name!r} is not reachable along the roads")
         along = facing(self.context, self.actor.name, here) * same_way(self.context, self.actor.name, name, "lane")
         left = target.relative_target_lane_offset.value * along
         return here.offset + (found[1] + left) * self._way(here)
 
     def describe(self) -> str:
-        """Target and shape."""
+        """Describe target and shape."""
         target = self.action.lane_offset_target
         if target.absolute_target_lane_offset is not None:
             where = f"{target.absolute_target_lane_offset.value:g} m"

@@ -19,27 +19,28 @@ from eidrive_scenario.api.actions import (
 )
 
 REACHED = 0.01
-"""So near to the wanted distance an action that is not continuous ends [m]."""
+"""Maximum distance error at which an action that is not continuous ends [m]."""
 
 
 class LateralDistanceAction(ActionBehaviour):
-    """Keeps `distance` meters beside an entity, on the side that `displacement` names (any: where the actor is).
+    """Lateral distance of `distance` meters to an entity, on the side of `displacement` (any: the current side).
 
-    Left and right are those of the other as it faces. Within limits an actor goes sideways no faster than forwards.
+    Left and right refer to the heading of the reference entity. With limits the lateral speed is at most the forward
+    speed. Without an acceleration limit the actor moves sideways at `maxSpeed`; without any limit it moves at once.
+    With an acceleration limit it follows like a critically damped spring with the stiffness of
+    LongitudinalDistanceAction, 0.4 times the limit. Free space is measured between the sides of both boxes, as if both
+    were parallel to the lane.
 
-    Without a limit of acceleration the actor goes sideways as fast as `maxSpeed` lets it, without any at once. With
-    one it follows like a critically damped spring with the stiffness of LongitudinalDistanceAction, 0.4 times the
-    limit. Free space is that between the flanks of both, as if they stood along the lane. In the entity's frame the
-    distance is across the lane too, at the place of the actor: its own axis turns with the very motion that the
-    distance commands, and would make it swing. The standard leaves the course of the distance open; esmini's actions on
-    distances have such a spring.
+    In the entity frame the distance is also measured across the lane at the position of the actor. The axis of the
+    actor turns with the motion that the distance commands, which would cause oscillation. The standard does not specify
+    the course of the distance; the distance actions of esmini have such a spring.
     """
 
     domains = Domain.LATERAL
     action: model.LateralDistanceAction
 
     def initialise(self) -> None:
-        """Decide on the side."""
+        """Select the side."""
         self._rate = 0.0
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
@@ -51,18 +52,18 @@ class LateralDistanceAction(ActionBehaviour):
         elif displacement is model.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY:
             self._side = -left
         else:
-            self._side = -1.0 if self._beside() > 0.0 else 1.0
+            self._side = -1.0 if self._lateral_gap() > 0.0 else 1.0
 
     def update(self) -> Status:
-        """The offset at the end of the step."""
+        """Set the offset at the end of the step."""
         motion, dt = self.actor.motion, self.context.dt
         here, roads = motion.location, self.context.roads
         if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
-        error = self._side * self._wanted() + self._beside()
+        error = self._side * self._wanted_gap() + self._lateral_gap()
         if math.isnan(error):
             return Status.RUNNING
-        sideways = self._sideways(error, dt)
+        sideways = self._lateral_displacement(error, dt)
         if self.action.dynamic_constraints is not None:
             most = STEEPEST * abs(motion.speed) * dt
             if abs(sideways) > most:
@@ -73,8 +74,8 @@ class LateralDistanceAction(ActionBehaviour):
         arrived = abs(error - sideways) < REACHED
         return Status.SUCCESS if arrived and not self.action.continuous else Status.RUNNING
 
-    def _sideways(self, error: float, dt: float) -> float:
-        """Meters to the left in this step, by the rate of its start (forward Euler)."""
+    def _lateral_displacement(self, error: float, dt: float) -> float:
+        """Return the displacement to the left in this step [m], at the rate of its start (forward Euler)."""
         limits = self.action.dynamic_constraints
         if limits is None or dt == 0.0:
             return error if limits is None else 0.0
@@ -92,8 +93,8 @@ class LateralDistanceAction(ActionBehaviour):
         self._rate = min(max(rate, -top), top)
         return way
 
-    def _beside(self) -> float:
-        """How far the other's middle is to the left of the own one [m]."""
+    def _lateral_gap(self) -> float:
+        """Return the lateral distance from the own center to that of the other entity, positive to the left [m]."""
         frame = resolve_coordinate_system(self.action.coordinate_system)
         me, other = self.actor.name, self.action.entity_ref
         here, roads = self.actor.motion.location, self.context.roads
@@ -106,8 +107,8 @@ class LateralDistanceAction(ActionBehaviour):
         my_box, their_box = self._boxes()
         return beside + their_box.center.y - my_box.center.y
 
-    def _wanted(self) -> float:
-        """How far apart the middles of the two shall be [m]."""
+    def _wanted_gap(self) -> float:
+        """Return the wanted distance between both centers [m]."""
         apart = self.action.distance or 0.0
         if self.action.freespace:
             apart += 0.5 * sum(box.dimensions.width for box in self._boxes())
@@ -118,6 +119,6 @@ class LateralDistanceAction(ActionBehaviour):
         return self.actor.entity.bounding_box, actors[self.action.entity_ref].entity.bounding_box
 
     def describe(self) -> str:
-        """Distance, and to whom."""
+        """Describe distance and entity."""
         held = "keep" if self.action.continuous else "reach"
         return f"{held} {self.action.distance or 0.0:g} m beside {self.action.entity_ref}"

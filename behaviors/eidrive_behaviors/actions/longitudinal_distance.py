@@ -9,27 +9,28 @@ from py_trees.common import Status
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, distance, model, resolve_coordinate_system, same_way
 
 STIFFNESS = 0.4
-"""Of the spring between actual and wanted distance, per m/s² of the largest acceleration [1/m]."""
+"""Stiffness of the spring between actual and wanted distance, per m/s² of the maximum acceleration [1/m]."""
 REACHED = 0.1
-"""So near to the wanted distance an action that is not continuous ends [m]."""
+"""Maximum distance error at which an action that is not continuous ends [m]."""
 
 
 class LongitudinalDistanceAction(ActionBehaviour):
-    """Keeps `distance` meters, or `timeGap` seconds of the other's speed, behind or ahead of an entity.
+    """Distance of `distance` meters, or of `timeGap` seconds of the other's speed, behind or ahead of an entity.
 
-    Trailing is behind the other as it faces, leading ahead of it, also where the two face each other.
+    Trailing is behind the other entity with respect to its heading, leading is ahead of it, also if both face each
+    other.
 
-    Without limits of acceleration the actor is moved to the wanted distance at once and takes the other's speed. With
-    limits it follows like a critically damped spring whose stiffness goes with the limit, within the limits of
-    speed, acceleration and its rate. Deceleration is a change of speed towards 0, also backwards. The standard leaves
-    the course of the distance open.
+    Without acceleration limits the actor moves to the wanted distance at once and assumes the speed of the other
+    entity. With limits it follows like a critically damped spring, whose stiffness is proportional to the limit, within
+    the limits of speed, acceleration and its rate. Deceleration is a speed change toward 0, also backwards. The
+    standard does not specify the course of the distance.
     """
 
     domains = Domain.LONGITUDINAL
     action: model.LongitudinalDistanceAction
 
     def initialise(self) -> None:
-        """Begin without acceleration; decide on which side of the other to be."""
+        """Reset the acceleration and select the side of the other entity."""
         self._acceleration = 0.0
         displacement = self.action.displacement
         self._side = -1.0 if displacement is model.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY else 1.0
@@ -38,7 +39,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
             self._side = -1.0 if self._gap() < 0.0 else 1.0
 
     def update(self) -> Status:
-        """The speed for the step."""
+        """Set the speed for the step."""
         if not self.context.actors[self.action.entity_ref].present or self.actor.driven:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._gap() - self._wanted()
@@ -49,10 +50,10 @@ class LongitudinalDistanceAction(ActionBehaviour):
         return Status.SUCCESS if reached and not self.action.continuous else Status.RUNNING
 
     def _move(self, error: float) -> float:
-        """Set the speed; what of the error is left at the end of the step [m]."""
+        """Set the speed. Return the remaining error at the end of the step [m]."""
         limits, motion = self.action.dynamic_constraints, self.actor.motion
-        faster = _or_infinite(limits.max_acceleration if limits is not None else None)
-        slower = _or_infinite(limits.max_deceleration if limits is not None else None)
+        faster = _infinite_if_none(limits.max_acceleration if limits is not None else None)
+        slower = _infinite_if_none(limits.max_deceleration if limits is not None else None)
         other = self._same_way() * self.context.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
             motion.move_along_lane(error + other * self.context.dt)
@@ -61,7 +62,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         assert limits is not None
         dt = self.context.dt
         up, down = faster, slower
-        more, less = _change(limits.max_acceleration_rate, dt), _change(limits.max_deceleration_rate, dt)
+        more, less = _max_change(limits.max_acceleration_rate, dt), _max_change(limits.max_deceleration_rate, dt)
         if motion.speed < 0.0 or (motion.speed == 0.0 and error < 0.0):
             up, down, more, less = down, up, less, more
         wanted = self._spring(error, motion.speed - other, up if error < 0.0 else down)
@@ -71,7 +72,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         elif wanted > max(self._acceleration, 0.0):
             wanted = min(wanted, self._acceleration + more)
         self._acceleration = wanted
-        top = min(_or_infinite(limits.max_speed), self.actor.limits()[0])
+        top = min(_infinite_if_none(limits.max_speed), self.actor.limits()[0])
         motion.speed = min(max(motion.speed + wanted * dt, -top), top)
         return error + (other - motion.speed) * dt
 
@@ -100,7 +101,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         return self._side * (self.action.distance or 0.0)
 
     def describe(self) -> str:
-        """Distance, and to whom."""
+        """Describe distance and entity."""
         gap = (
             f"{self.action.time_gap:g} s" if self.action.time_gap is not None else f"{self.action.distance or 0.0:g} m"
         )
@@ -108,10 +109,10 @@ class LongitudinalDistanceAction(ActionBehaviour):
         return f"{held} {gap} to {self.action.entity_ref}"
 
 
-def _change(rate: float | None, dt: float) -> float:
-    """By how much an acceleration may change in a step [m/s²]."""
+def _max_change(rate: float | None, dt: float) -> float:
+    """Return the maximum change of an acceleration in a step [m/s²]."""
     return math.inf if rate is None else rate * dt
 
 
-def _or_infinite(value: float | None) -> float:
+def _infinite_if_none(value: float | None) -> float:
     return math.inf if value is None else value

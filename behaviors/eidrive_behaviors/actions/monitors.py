@@ -1,4 +1,4 @@
-"""SetMonitorAction: tell an observer of the run."""
+"""SetMonitorAction: set a monitor of the run."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
 class SetMonitorAction(ActionBehaviour):
-    """Sets a monitor that the scenario declares; frames, metrics and the criterion `monitor` show its value."""
+    """Assignment of a declared monitor. Its value is in frames, in metrics and in the criterion `monitor`."""
 
     immediate = True
     action: model.SetMonitorAction
 
     def update(self) -> Status:
-        """Set it."""
+        """Set the monitor."""
         self.context.monitors = {**self.context.monitors, self.action.monitor_ref: self.action.value}
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one, to what."""
+        """Describe monitor and value."""
         return f"monitor {self.action.monitor_ref} is {str(self.action.value).lower()}"

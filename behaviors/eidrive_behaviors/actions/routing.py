@@ -1,4 +1,4 @@
-"""AssignRouteAction and AcquirePositionAction: where an actor goes."""
+"""AssignRouteAction, AcquirePositionAction and RandomRouteAction: routes of actors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.teleport import position_in_words
+from eidrive_behaviors.actions.teleport import describe_position
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
     Goal,
@@ -20,21 +20,22 @@ from eidrive_scenario.api.actions import (
 )
 from eidrive_scenario.api.common import EidriveError, Route, RouteError, generator
 
-RANDOM_WAY = 5000.0
-"""Length of the way that a vehicle which drives itself gets for a random route [m]."""
+RANDOM_ROUTE_LENGTH = 5000.0
+"""Length of a random route for a vehicle with an active controller [m]."""
 
 
 class AssignRouteAction(ActionBehaviour):
-    """Gives the actor a route over the lanes. At forks it takes the route's way; who drives itself gets its points.
+    """Assignment of a route over the lanes. It selects the branch at junctions.
 
-    A closed route goes on from its last waypoint to its first, again and again.
+    An active controller receives the points of the route. A closed route continues from its last waypoint to the first
+    one.
     """
 
     immediate = True
     action: model.AssignRouteAction
 
     def update(self) -> Status:
-        """Lay the route out, from where the actor is if there is a way from there."""
+        """Assign the route, from the current location if a path leads from there."""
         route = self.action.route or self.context.catalog_entry(self.action.catalog_reference, model.Route, self.action)
         here = self.context.location(self.actor.name) if self.actor.present else None
         roads, seed = self.context.roads, self.context.seed
@@ -43,51 +44,52 @@ class AssignRouteAction(ActionBehaviour):
             return resolve_position(position, self.context, self.actor.name)
 
         try:
-            found = build_route(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
+            path = build_route(route, roads, place, here, seed=seed, again=True)  # type: ignore[arg-type]
         except EidriveError:
             if here is None:
                 raise
-            found = build_route(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
-        follow(self, found)
+            path = build_route(route, roads, place, seed=seed, again=True)  # type: ignore[arg-type]
+        assign_route(self, path)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one."""
+        """Describe the route."""
         if self.action.route is not None:
             return f"route {self.action.route.name} over {len(self.action.route.waypoint)} waypoints"
         return "route from a catalog"
 
 
 class AcquirePositionAction(ActionBehaviour):
-    """Routes the actor to a position, by the shortest way over the lanes; without roads straight to it."""
+    """Shortest route to a position over the lanes; a straight line without roads."""
 
     immediate = True
     action: model.AcquirePositionAction
 
     def update(self) -> Status:
-        """Lay the route out. Raises ScenarioError where there is none."""
+        """Assign the route. Raise ScenarioError if none exists."""
         place = resolve_position(self.action.position, self.context, self.actor.name)
         here = self.context.location(self.actor.name)
         if self.context.roads is not None and here is not None and place.location is not None:
             try:
                 route = self.context.roads.route(here, place.location)
             except RouteError as error:
-                raise self.error(f"finds {error.diagnostics[0].message}", error.diagnostics[0].hint) from None
-            follow(self, route)
+                raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
+            assign_route(self, route)
         elif self.actor.driven:
             goal = self.actor.goal
             self.actor.goal = replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]]))
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Where to."""
-        return f"drive to {position_in_words(self.action.position)}"
+        """Describe the position."""
+        return f"drive to {describe_position(self.action.position)}"
 
 
 class RandomRouteAction(ActionBehaviour):
-    """Lets the actor drive about: at each fork it takes one of the branches, all as likely, from now on.
+    """Random choice of branches: at each junction one of the branches with equal probability.
 
-    Who drives itself gets a way of that kind of some kilometers as its path. The run's seed decides.
+    An active controller receives such a route of several kilometers as its path. The choice depends on the seed of the
+    run.
     """
 
     immediate = True
@@ -104,30 +106,30 @@ class RandomRouteAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         self._starts = 0
         if context.roads is None:
-            raise self.error("needs a road network", "name one in RoadNetwork/LogicFile")
+            raise self.error("the scenario has no road network", "specify one in RoadNetwork/LogicFile")
 
     def initialise(self) -> None:
-        """Each start draws a way of its own."""
+        """Count the start, so that each start draws a separate route."""
         self._starts += 1
 
     def update(self) -> Status:
-        """Forget the route, and choose at random."""
+        """Discard the route and select branches at random."""
         actor, roads = self.actor, self.context.roads
         choose = uniform_branch_selector(generator(self.context.seed, "random route", actor.name, self._starts))
         actor.motion.route, actor.motion.branch_selector = None, choose
         here = self.context.location(actor.name)
         if actor.driven and roads is not None and here is not None:
-            way = random_route(roads, here, RANDOM_WAY, choose)
+            way = random_route(roads, here, RANDOM_ROUTE_LENGTH, choose)
             actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """What it does."""
+        """Describe the action."""
         return "drive about at random"
 
 
-def follow(behaviour: ActionBehaviour, route: Route) -> None:
-    """Make a route the actor's own."""
+def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
+    """Assign a route to the actor."""
     actor = behaviour.actor
     actor.motion.route, actor.motion.branch_selector = route, None
     if actor.driven:

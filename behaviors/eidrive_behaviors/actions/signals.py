@@ -1,4 +1,4 @@
-"""Actions on traffic signals: set one, or the phase of a controller."""
+"""Actions on traffic signals: state of a signal, phase of a signal controller."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from eidrive_scenario.api.common import suggestion
 
 
 class TrafficSignalStateAction(ActionBehaviour):
-    """Sets the state of one signal, until its controller's next phase begins; the text means what its type makes of it.
+    """State of one signal until the next phase of its controller starts. The signal type interprets the text.
 
-    Its name is the signal's id in the road network, or ScenarioRunner's `id=…` and `pos=x,y`.
+    Its name is the signal id in the road network, or `id=…` or `pos=x,y` as in ScenarioRunner.
     """
 
     immediate = True
@@ -26,22 +26,25 @@ class TrafficSignalStateAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
-        odd = context.signals.unknown(action.name, action)
-        if odd is not None:
-            context.warnings.append(odd)
+        warning = context.signals.unknown(action.name, action)
+        if warning is not None:
+            context.warnings.append(warning)
 
     def update(self) -> Status:
-        """Set it."""
+        """Set the state."""
         self.context.signals.set_state(self.action.name, self.action.state)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one, to what."""
+        """Describe signal and state."""
         return f"signal {self.action.name} shows {self.action.state}"
 
 
 class TrafficSignalControllerAction(ActionBehaviour):
-    """Lets a phase of a controller begin now; its cycle goes on from there, and so do those that refer to it."""
+    """Immediate start of a phase of a signal controller.
+
+    Its cycle continues from there, and so do the cycles of controllers that refer to it.
+    """
 
     immediate = True
     action: model.TrafficSignalControllerAction
@@ -59,17 +62,17 @@ class TrafficSignalControllerAction(ActionBehaviour):
         phases = [phase.name for phase in cycle.phases] if cycle is not None else [action.phase]
         if action.phase not in phases:
             raise self.error(
-                f"asks {action.traffic_signal_controller_ref!r} for a phase {action.phase!r}, which it does not have",
+                f"signal controller {action.traffic_signal_controller_ref!r} has no phase {action.phase!r}",
                 suggestion(action.phase, phases),
             )
 
     def update(self) -> Status:
-        """Begin it."""
+        """Start the phase."""
         self.context.signals.set_phase(
             self.action.traffic_signal_controller_ref, self.action.phase, max(self.context.time, 0.0)
         )
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one, to what."""
+        """Describe controller and phase."""
         return f"signal controller {self.action.traffic_signal_controller_ref} goes to {self.action.phase}"

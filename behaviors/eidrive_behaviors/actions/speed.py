@@ -1,4 +1,4 @@
-"""SpeedAction: bring an actor to a speed."""
+"""SpeedAction: change the speed of an actor."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import RateLimitedValue, follows, speed_limiter
+from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 
 REACHED = 0.2
-"""A driven vehicle that is this near to the target speed has reached it [m/s]."""
+"""Maximum speed error at which a driven vehicle has reached the target speed [m/s]."""
 
 
 class SpeedAction(ActionBehaviour):
-    """Takes the speed over to an absolute or relative target by the given dynamics.
+    """Transition of the speed to an absolute or relative target by the given dynamics.
 
-    Speed follows its shape over time; where the dynamics say a distance, the time in which that distance is covered.
-    A relative target is read anew in each step; a continuous one is kept up until a younger action ends it. The
-    vehicle's Performance bounds target and steepest slope (not those of a step); in the following mode `follow` it
-    bounds all accelerations and jerks. A vehicle that drives itself is given the speed as its goal, and has reached it
-    when it drives that fast; one that was just placed starts with it.
+    The shape is a function of time; for a distance it is the time in which that distance is covered. A relative target
+    is read in each step; a continuous one is kept until a later action ends it. The vehicle's Performance limits the
+    target, and the maximum slope of all shapes except the step. In the following mode `follow` it limits all
+    accelerations and jerks. An active controller receives the speed as its goal. The goal is reached when the vehicle
+    drives at that speed; a vehicle that was just teleported starts with it.
     """
 
     domains = Domain.LONGITUDINAL
@@ -41,7 +41,7 @@ class SpeedAction(ActionBehaviour):
         self._absolute = action.speed_action_target.absolute_target_speed
         self._relative = action.speed_action_target.relative_target_speed
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
-        self._tracker: RateLimitedValue | None = None
+        self._limiter: RateLimitedValue | None = None
 
     @property
     def _continuous(self) -> bool:
@@ -49,21 +49,21 @@ class SpeedAction(ActionBehaviour):
 
     @property
     def at_once(self) -> bool:
-        """A step, unless it is kept up or the vehicle takes its time for it."""
+        """True for a step that is neither continuous nor limited by the vehicle."""
         dynamics = self._dynamics
-        in_no_time = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
-        step = dynamics.dynamics_shape is model.DynamicsShape.STEP or in_no_time
-        return step and not self._continuous and not follows(self._dynamics)
+        instantaneous = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
+        step = dynamics.dynamics_shape is model.DynamicsShape.STEP or instantaneous
+        return step and not self._continuous and not is_follow_mode(self._dynamics)
 
     def initialise(self) -> None:
-        """Lay the transition from the present speed."""
-        start, target = self._present(), self._target()
-        self._transition = self._laid(start, target)
+        """Start the transition from the current speed."""
+        start, target = self._current_speed(), self._target()
+        self._transition = self._build_transition(start, target)
         vehicle = self.actor.entity
-        if follows(self._dynamics) and isinstance(vehicle, model.Vehicle):
-            self._tracker = speed_limiter(vehicle, start, backwards=start + target < 0.0)
+        if is_follow_mode(self._dynamics) and isinstance(vehicle, model.Vehicle):
+            self._limiter = speed_limiter(vehicle, start, backwards=start + target < 0.0)
 
-    def _laid(self, start: float, target: float) -> TransitionProfile:
+    def _build_transition(self, start: float, target: float) -> TransitionProfile:
         limit = slope_limit(start, target, *self.actor.limits()[1:])
         shape, value = self._dynamics.dynamics_shape, abs(self._dynamics.value)
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
@@ -76,31 +76,31 @@ class SpeedAction(ActionBehaviour):
         return transition
 
     def update(self) -> Status:
-        """The speed at the end of the step."""
+        """Set the speed at the end of the step."""
         transition = self._transition
         if self._relative is not None:
-            self._aim_anew(self._target())
+            self._retarget(self._target())
         if self.actor.driven:
-            return self._ask_driver()
+            return self._set_driver_goal()
         if transition.done and transition.extent > 0.0:
             speed = self._approach(transition.target)
         else:
             speed = transition.advance(self.context.dt)
-        if self._tracker is not None and self.context.dt > 0.0:
-            speed = self._tracker.advance(speed, self.context.dt)
+        if self._limiter is not None and self.context.dt > 0.0:
+            speed = self._limiter.advance(speed, self.context.dt)
         self.actor.motion.speed = speed
         reached = transition.done and abs(speed - transition.target) < EPSILON
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
-    def _aim_anew(self, target: float) -> None:
-        """The target has moved: a rate is kept by taking longer or shorter, a time or distance by another slope."""
+    def _retarget(self, target: float) -> None:
+        """Change the target. A rate keeps its slope and changes its duration; a time or distance keeps its duration."""
         transition = self._transition
         transition.target = target
         if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE and not transition.done:
-            transition.extent = self._laid(transition.start, target).extent
+            transition.extent = self._build_transition(transition.start, target).extent
 
-    def _ask_driver(self) -> Status:
-        """The speed of the transition becomes the goal, with its slope; done when the vehicle itself is as fast."""
+    def _set_driver_goal(self) -> Status:
+        """Set the goal to speed and slope of the transition. It is complete when the vehicle has that speed."""
         transition = self._transition
         before = transition.value
         speed = transition.advance(self.context.dt)
@@ -112,11 +112,11 @@ class SpeedAction(ActionBehaviour):
         reached = transition.done and abs(self.context.speed(self.actor.name) - transition.target) < REACHED
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
-    def _present(self) -> float:
+    def _current_speed(self) -> float:
         return self.context.speed(self.actor.name) if self.actor.driven else self.actor.motion.speed
 
     def _approach(self, target: float) -> float:
-        """The next speed after the transition, where a relative target moves on: as fast as the vehicle can."""
+        """Return the next speed after the transition toward a moving relative target, at the vehicle's limits [m/s]."""
         present = self.actor.motion.speed
         most = slope_limit(present, target, *self.actor.limits()[1:]) * self.context.dt
         return present + min(max(target - present, -most), most)
@@ -133,7 +133,7 @@ class SpeedAction(ActionBehaviour):
         return math.copysign(min(abs(speed), top), speed)
 
     def describe(self) -> str:
-        """Target and dynamics."""
+        """Describe target and dynamics."""
         if self._absolute is not None:
             target = f"{self._absolute.value:g} m/s"
         else:
@@ -143,13 +143,13 @@ class SpeedAction(ActionBehaviour):
             )
             target = f"{self._relative.value:g} {sign} the speed of {self._relative.entity_ref}"
             target += ", kept up" if self._continuous else ""
-        return f"speed to {target}, {dynamics_in_words(self._dynamics, 'm/s²')}"
+        return f"speed to {target}, {describe_dynamics(self._dynamics, 'm/s²')}"
 
 
 def slope_limit(start: float, target: float, faster: float, slower: float) -> float:
-    """Return the largest change of a signed speed [m/s²]: `slower` towards 0, `faster` away from it.
+    """Return the maximum change of a signed speed [m/s²]: `slower` toward 0, `faster` away from it.
 
-    A change of the direction of travel does both, within the smaller.
+    A change of the direction of travel has both parts, and the smaller limit applies.
     """
     if start * target < 0.0:
         return min(faster, slower)
@@ -157,9 +157,10 @@ def slope_limit(start: float, target: float, faster: float, slower: float) -> fl
 
 
 def duration_over(start: float, target: float, distance: float) -> float:
-    """Time [s] in which a change of speed covers a distance: all shapes but the step have the mean of both speeds.
+    """Return the time in which a speed change covers a distance [s].
 
-    Where the direction of travel turns, the distances before and after the turn are as the squares of the speeds.
+    All shapes except the step have the mean of both speeds. If the direction of travel changes, the distances before
+    and after the reversal are proportional to the squares of the speeds.
     """
     if abs(target - start) < EPSILON:
         return 0.0
@@ -169,8 +170,8 @@ def duration_over(start: float, target: float, distance: float) -> float:
     return 2.0 * distance / abs(start + target)
 
 
-def dynamics_in_words(dynamics: model.TransitionDynamics, rate: str) -> str:
-    """Shape and extent, as `linear in 3 s`."""
+def describe_dynamics(dynamics: model.TransitionDynamics, rate: str) -> str:
+    """Describe shape and extent, as `linear in 3 s`."""
     shape = dynamics.dynamics_shape.value
     if dynamics.dynamics_shape is model.DynamicsShape.STEP:
         return "at once"

@@ -1,4 +1,4 @@
-"""SynchronizeAction: arrive when another entity arrives."""
+"""SynchronizeAction: arrive at the same time as another entity."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from eidrive_scenario.api.actions import (
 from eidrive_scenario.api.common import EPSILON
 
 ON_LINE = 0.1
-"""So near to the speed of the straight last phase the first phase is over [m/s]."""
+"""Maximum speed difference to the linear last phase at which the first phase ends [m/s]."""
 HARD = 8.0
-"""Deceleration where there is too little way for anything softer [m/s²]."""
+"""Deceleration if the distance is too short for a lower one [m/s²]."""
 
 
 class SynchronizationPhase(Enum):
-    """Where the manoeuvre stands."""
+    """Phase of the maneuver."""
 
     SWING = "swing"
     LAST = "last"
@@ -37,43 +37,46 @@ class SynchronizationPhase(Enum):
 
 
 class SynchronizeAction(ActionBehaviour):
-    """Chooses the speed so that the actor is at its target when the master is at the master's target.
+    """Speed control by which the actor is at its target when the master is at the master's target.
 
-    With a final speed v1, the way s and the master's time t there are two phases of equal and opposite acceleration a:
-    a² t²/2 + a ((v0 + v1) t - 2 s) - (v1 - v0)²/2 = 0, newly solved in each step as the master's arrival changes; in
-    the last phase the speed lies on the line that ends in v1. Where the middle speed would be negative the actor stops
-    and waits. While the master stands, so that it arrives never, the actor stands too. Without a final speed the
-    acceleration is constant; an actor that is so fast that it would have to come back takes the mean speed of that
-    instant as its final speed. A steady state at the end shortens way and time. Ways are along the trajectory that an
-    entity follows, else along the roads. An entity with a negative speed arrives backwards.
+    With a final speed v1, the distance s and the master's time t there are two phases of equal and opposite
+    acceleration a: a² t²/2 + a ((v0 + v1) t - 2 s) - (v1 - v0)²/2 = 0. The equation is solved in each step, as the
+    master's arrival changes. In the last phase the speed is on the line that ends in v1. If the speed between the
+    phases would be negative, the actor stops and waits. While the master stands and therefore never arrives, the actor
+    stands too.
+
+    Without a final speed the acceleration is constant. An actor that is too fast for it, and would have to reverse,
+    uses the mean speed of that instant as its final speed. A steady state at the end shortens distance and time.
+    Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
+    speed arrives backwards.
     """
 
     domains = Domain.LONGITUDINAL
     action: model.SynchronizeAction
 
     def initialise(self) -> None:
-        """Begin with the first phase."""
+        """Start with the first phase."""
         self._phase = SynchronizationPhase.SWING
         self._rising: bool | None = None
         self._last = (math.inf, math.inf)
         self._measured: tuple[TrajectoryCurve | None, ...] = ()
-        """The trajectories along which the ways of both were measured last."""
-        self._same: dict[str, tuple[TrajectoryCurve, bool]] = {}
-        """By entity, the trajectory that it follows, and whether its target is a TrajectoryPosition on that one."""
+        """Trajectories along which the distances of both were measured last."""
+        self._targets: dict[str, tuple[TrajectoryCurve, bool]] = {}
+        """Per entity: its trajectory, and whether its target is a TrajectoryPosition on that trajectory."""
         self._sense = 1.0
-        """-1 while the actor drives backwards."""
+        """-1 while the actor drives backwards, else +1."""
         self._mean: float | None = None
-        """Speed at which to arrive where none is asked for and a constant deceleration would lead back [m/s]."""
+        """Arrival speed if none is specified and a constant deceleration would reverse the actor [m/s]."""
 
     def update(self) -> Status:
-        """The speed for the step."""
+        """Set the speed for the step."""
         motion, dt, final = self.actor.motion, self.context.dt, self._final_speed()
         self._sense = -1.0 if motion.speed < 0.0 or (motion.speed == 0.0 and (final or 0.0) < 0.0) else 1.0
         try:
             master_speed = self.context.speed(self.action.master_entity_ref)
-            way = self._way(self.actor.name, self.action.target_position, self._sense)
+            way = self._distance(self.actor.name, self.action.target_position, self._sense)
             sense = math.copysign(1.0, master_speed)
-            master_way = self._way(self.action.master_entity_ref, self.action.target_position_master, sense)
+            master_way = self._distance(self.action.master_entity_ref, self.action.target_position_master, sense)
         except EntityAbsentError:
             return Status.RUNNING
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
@@ -87,7 +90,7 @@ class SynchronizeAction(ActionBehaviour):
         time = max(master_way - theirs, EPSILON) / speed if speed > EPSILON else math.inf
         if way < mine + EPSILON or master_way < theirs + EPSILON or passed or time < dt + EPSILON:
             if changed:
-                return Status.RUNNING  # an action that starts beside this one may lay a trajectory
+                return Status.RUNNING  # An action that starts in the same step may assign a trajectory.
             if final is not None:
                 motion.speed = final
             return Status.SUCCESS
@@ -103,7 +106,7 @@ class SynchronizeAction(ActionBehaviour):
 
     def _next(self, way: float, time: float, final: float, dt: float) -> float:
         speed = self._sense * self.actor.motion.speed
-        steady = self._steady_way(final)
+        steady = self._steady_distance(final)
         if steady > 0.0 and final > EPSILON:
             if way - steady < EPSILON or time - steady / final < EPSILON:
                 self._phase = SynchronizationPhase.STEADY
@@ -149,8 +152,8 @@ class SynchronizeAction(ActionBehaviour):
                 return 0.0
         return speed + acceleration * dt
 
-    def _way(self, name: str, position: model.Position, sense: float) -> float:
-        """Return how far an entity has to go to its target [m]; negative if that lies behind on its trajectory.
+    def _distance(self, name: str, position: model.Position, sense: float) -> float:
+        """Return the distance of an entity to its target [m]; negative if the target is behind it on its trajectory.
 
         `sense` is -1 for an entity that drives backwards.
         """
@@ -168,16 +171,16 @@ class SynchronizeAction(ActionBehaviour):
         return straight if found is None else abs(found[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
-        """The way along the trajectory that the entity follows, in the direction in which it moves."""
+        """Return the distance along the trajectory of the entity, in its direction of motion [m]."""
         layout, here = progress.layout, progress.at(self.context.view.tick)
         frame = position.chosen()
-        known = self._same.get(name)
-        if known is None or known[0] is not layout:
-            on_it = isinstance(frame, model.TrajectoryPosition) and (
+        cached = self._targets.get(name)
+        if cached is None or cached[0] is not layout:
+            is_on_it = isinstance(frame, model.TrajectoryPosition) and (
                 trajectory_of(frame, self.context, name).poses == layout.poses
             )
-            self._same[name] = known = layout, on_it
-        if known[1] and isinstance(frame, model.TrajectoryPosition):
+            self._targets[name] = cached = layout, is_on_it
+        if cached[1] and isinstance(frame, model.TrajectoryPosition):
             target = frame.s
         else:
             place = resolve_position(position, self.context, name).pose
@@ -196,8 +199,8 @@ class SynchronizeAction(ActionBehaviour):
         factor = relative.speed_target_value_type is model.SpeedTargetValueType.FACTOR
         return master * relative.value if factor else master + relative.value
 
-    def _steady_way(self, final: float) -> float:
-        """The stretch at the end that is driven at the final speed [m]."""
+    def _steady_distance(self, final: float) -> float:
+        """Return the length of the final segment at the final speed [m]."""
         speed = self.action.final_speed
         if speed is None:
             return 0.0
@@ -209,5 +212,5 @@ class SynchronizeAction(ActionBehaviour):
         return of.target_time_steady_state.time * final if of.target_time_steady_state is not None else 0.0
 
     def describe(self) -> str:
-        """With whom."""
+        """Describe the master."""
         return f"arrive together with {self.action.master_entity_ref}"

@@ -1,4 +1,4 @@
-"""TeleportAction: put an actor at a position."""
+"""TeleportAction: move an actor to a position at once."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_positio
 
 
 class TeleportAction(ActionBehaviour):
-    """Puts the actor at a position at once, and brings it into the world if it was not there. Its speed stays."""
+    """Teleport of the actor to a position. An absent actor is added to the world; its speed is kept."""
 
     action: model.TeleportAction
 
     def update(self) -> Status:
-        """Put it there."""
+        """Teleport the actor."""
         place = resolve_position(self.action.position, self.context, self.actor.name)
         self.context.add_actor(self.actor.name, place)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """The kind of position."""
-        return f"teleport to {position_in_words(self.action.position)}"
+        """Describe the position."""
+        return f"teleport to {describe_position(self.action.position)}"
 
 
-def position_in_words(position: model.Position) -> str:
-    """A position's frame and numbers, as `LanePosition road 0 lane -3 s 50`."""
+def describe_position(position: model.Position) -> str:
+    """Describe frame and values of a position, as `LanePosition road 0 lane -3 s 50`."""
     frame = position.chosen()
     words = [type(frame).__name__]
     for name, value in vars(frame).items():

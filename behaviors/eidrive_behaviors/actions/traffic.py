@@ -1,4 +1,4 @@
-"""The traffic actions: swarms, sources, sinks and areas of background traffic, and their end."""
+"""Traffic actions: swarms, sources, sinks and areas of background traffic, and their stop."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from eidrive_scenario.api.common import Diagnostic, InputError, ScenarioError
 
 
 class TrafficInstanceAction(ActionBehaviour):
-    """Starts an instance of background traffic.
+    """Base class of actions that start a generator of background traffic.
 
-    It has no regular ending: it runs until a TrafficStopAction, or whatever stops the action itself, ends the instance.
-    The cars that are there then drive on.
+    It has no regular end. It runs until a TrafficStopAction, or the stop of the action itself, stops the generator.
+    Vehicles that are present then continue.
     """
 
     parent_element: model.TrafficAction
@@ -37,52 +37,52 @@ class TrafficInstanceAction(ActionBehaviour):
         parent: model.Element | None = None,
     ) -> None:
         super().__init__(action, context, actor=actor, parent=parent)
-        self._instance: traffic.TrafficGenerator | None = None
+        self._generator: traffic.TrafficGenerator | None = None
         if context.roads is None:
-            raise self.error("needs lanes to drive on", "name an OpenDRIVE file in RoadNetwork/LogicFile")
+            raise self.error("the scenario has no lanes", "specify an OpenDRIVE file in RoadNetwork/LogicFile")
         self.check()
 
     @property
     def traffic_name(self) -> str:
-        """What the traffic is called; its cars are called after it."""
+        """Name of the traffic, which prefixes the names of its road users."""
         return self.parent_element.traffic_name or type(self.action).__name__.removesuffix("Action")
 
     @property
     def background(self) -> traffic.BackgroundTraffic:
-        """All background traffic of the run."""
+        """Background traffic of the run."""
         return self.context.traffic.traffic
 
     def check(self) -> None:
-        """Find what is wrong with the action before the run."""
+        """Check the settings of the action before the run. Raise ScenarioError if they are invalid."""
 
     @abstractmethod
-    def make(self) -> traffic.TrafficGenerator:
-        """The instance, as it is at the start of the action."""
+    def build_generator(self) -> traffic.TrafficGenerator:
+        """Return the generator in its state at the start of the action."""
 
     def initialise(self) -> None:
-        """A new execution makes a new instance."""
-        self._instance = None
+        """Discard the generator of the previous execution."""
+        self._generator = None
 
     def update(self) -> Status:
-        """Run as long as the instance does."""
-        if self._instance is None:
-            self._instance = self.make()
-            self.context.traffic.start(self._instance)
-        return Status.RUNNING if self._instance.active else Status.SUCCESS
+        """Run until the generator is stopped."""
+        if self._generator is None:
+            self._generator = self.build_generator()
+            self.context.traffic.start(self._generator)
+        return Status.RUNNING if self._generator.active else Status.SUCCESS
 
     def terminate(self, new_status: Status) -> None:
-        """Who stops the action stops the traffic."""
-        if new_status is Status.INVALID and self._instance is not None:
-            self._instance.active = False
+        """Stop the generator if the action is stopped."""
+        if new_status is Status.INVALID and self._generator is not None:
+            self._generator.active = False
 
-    def at_least_zero(self, **numbers: float | None) -> None:
-        """Raises ScenarioError for a number below 0."""
+    def check_not_negative(self, **numbers: float | None) -> None:
+        """Raise ScenarioError for a negative number."""
         for name, value in numbers.items():
             if value is not None and not value >= 0.0:
-                raise self.error(f"has {name}={value:g}", "give a number of at least 0")
+                raise self.error(f"{name} is out of range (got {value:g}; expected at least 0)")
 
-    def mixture(self) -> traffic.TrafficMix:
-        """Who the traffic is made of."""
+    def traffic_mix(self) -> traffic.TrafficMix:
+        """Return the mix of road users."""
         return traffic.TrafficMix(
             self.context.scenario,
             getattr(self.action, "traffic_definition", None),
@@ -91,14 +91,14 @@ class TrafficInstanceAction(ActionBehaviour):
 
 
 class TrafficSwarmAction(TrafficInstanceAction):
-    """Keeps a number of vehicles between a circle and an ellipse around an entity."""
+    """Number of vehicles between a circle and an ellipse around an entity."""
 
     action: model.TrafficSwarmAction
 
     def check(self) -> None:
-        """Numbers, shares, and who is in the middle."""
+        """Check numbers, shares and traffic mix."""
         action = self.action
-        self.at_least_zero(
+        self.check_not_negative(
             innerRadius=action.inner_radius,
             semiMajorAxis=action.semi_major_axis,
             semiMinorAxis=action.semi_minor_axis,
@@ -106,15 +106,16 @@ class TrafficSwarmAction(TrafficInstanceAction):
         )
         speeds = self._speeds()
         if speeds is not None and not 0.0 <= speeds[0] <= speeds[1]:
-            raise self.error(f"has speeds from {speeds[0]:g} to {speeds[1]:g} m/s", "give 0 <= lower <= upper")
+            text = f"got {speeds[0]:g} to {speeds[1]:g} m/s; expected 0 <= lower <= upper"
+            raise self.error(f"the speed range is invalid ({text})")
         for shares in (self._directions(), self._sectors()):
             if shares is not None and (min(shares) < 0.0 or not sum(shares) > 0.0):
                 listed = ", ".join(f"{share:g}" for share in shares)
-                raise self.error(f"has the shares {listed}", "give shares of at least 0, not all 0")
-        self._mixture = self.mixture()
+                raise self.error(f"the shares are invalid (got {listed}; expected values of at least 0, not all 0)")
+        self._traffic_mix = self.traffic_mix()
 
-    def make(self) -> traffic.Swarm:
-        """The swarm."""
+    def build_generator(self) -> traffic.Swarm:
+        """Return the swarm."""
         action = self.action
         return traffic.Swarm(
             self.traffic_name,
@@ -125,7 +126,7 @@ class TrafficSwarmAction(TrafficInstanceAction):
             minor=action.semi_minor_axis,
             offset=action.offset,
             count=action.number_of_vehicles,
-            mixture=self._mixture,
+            mixture=self._traffic_mix,
             speeds=self._speeds(),
             directions=self._directions(),
             sectors=self._sectors(),
@@ -146,22 +147,22 @@ class TrafficSwarmAction(TrafficInstanceAction):
         return None if shares is None else (shares.front, shares.rear, shares.left, shares.right)
 
     def describe(self) -> str:
-        """How many, around whom."""
+        """Describe number and central entity."""
         return f"swarm of {self.action.number_of_vehicles} around {self.action.central_object.entity_ref}"
 
 
 class TrafficSourceAction(TrafficInstanceAction):
-    """Lets vehicles appear at a rate around a position."""
+    """Generation of vehicles at a rate around a position."""
 
     action: model.TrafficSourceAction
 
     def check(self) -> None:
-        """Numbers and shares."""
-        self.at_least_zero(radius=self.action.radius, rate=self.action.rate, speed=self._speed())
-        self._mixture = self.mixture()
+        """Check numbers and traffic mix."""
+        self.check_not_negative(radius=self.action.radius, rate=self.action.rate, speed=self._speed())
+        self._traffic_mix = self.traffic_mix()
 
-    def make(self) -> traffic.Source:
-        """The source. Raises ScenarioError where no lane is near."""
+    def build_generator(self) -> traffic.Source:
+        """Return the source. Raise ScenarioError if no lane is near."""
         place: ResolvedPosition = resolve_position(self.action.position, self.context, None)
         lanes, ground = self.background.fleet.lanes, self.background.ground
         x, y, radius = place.pose.x, place.pose.y, self.action.radius
@@ -170,14 +171,14 @@ class TrafficSourceAction(TrafficInstanceAction):
             for sites in (ground.driving, ground.walking)
         )
         if not len(driving) and not len(walking):
-            raise self.error(f"lies at x = {x:.1f} m, y = {y:.1f} m, where no lane is near", "move it to a lane")
+            raise self.error(f"no lane is near x = {x:.1f} m, y = {y:.1f} m", "move the position to a lane")
         return traffic.Source(
             self.traffic_name,
             self.background.key(self.traffic_name),
             place=(x, y),
             sites=lambda participant: walking if participant.walks else driving,
             rate=self.action.rate,
-            mixture=self._mixture,
+            mixture=self._traffic_mix,
             speed=self._speed(),
             started=self.context.time,
         )
@@ -186,22 +187,22 @@ class TrafficSourceAction(TrafficInstanceAction):
         return self.action.velocity if self.action.speed is None else self.action.speed
 
     def describe(self) -> str:
-        """How many."""
+        """Describe the rate."""
         return f"source of {self.action.rate:g} vehicles per second"
 
 
 class TrafficSinkAction(TrafficInstanceAction):
-    """Lets vehicles of background traffic disappear around a position; entities of the scenario stay."""
+    """Removal of background traffic around a position. Entities of the scenario remain."""
 
     action: model.TrafficSinkAction
 
     def check(self) -> None:
-        """Numbers and shares."""
-        self.at_least_zero(radius=self.action.radius, rate=self.action.rate)
-        self._mixture = self.mixture() if self.action.traffic_definition is not None else None
+        """Check numbers and traffic mix."""
+        self.check_not_negative(radius=self.action.radius, rate=self.action.rate)
+        self._traffic_mix = self.traffic_mix() if self.action.traffic_definition is not None else None
 
-    def make(self) -> traffic.Sink:
-        """The sink."""
+    def build_generator(self) -> traffic.Sink:
+        """Return the sink."""
         place = resolve_position(self.action.position, self.context, None)
         return traffic.Sink(
             self.traffic_name,
@@ -209,31 +210,31 @@ class TrafficSinkAction(TrafficInstanceAction):
             place=(place.pose.x, place.pose.y),
             radius=self.action.radius,
             rate=float("inf") if self.action.rate is None else self.action.rate,
-            categories=None if self._mixture is None else self._mixture.categories,
+            categories=None if self._traffic_mix is None else self._traffic_mix.categories,
         )
 
     def describe(self) -> str:
-        """How many."""
+        """Describe rate and radius."""
         rate = "all" if self.action.rate is None else f"{self.action.rate:g} per second of the"
         return f"sink of {rate} vehicles within {self.action.radius:g} m"
 
 
 class TrafficAreaAction(TrafficInstanceAction):
-    """Brings a number of participants into an area, once or again and again; done at once it ends immediately."""
+    """Number of road users in an area, added once or continuously. A single addition ends at once."""
 
     action: model.TrafficAreaAction
 
     def check(self) -> None:
-        """Shares, and roads of the ranges."""
-        self._mixture = self.mixture()
+        """Check the traffic mix and the roads of the ranges."""
+        self._traffic_mix = self.traffic_mix()
         if self.action.traffic_area.polygon is None:
-            self._stretches()
+            self._road_ranges()
 
-    def make(self) -> traffic.Area:
-        """The area."""
+    def build_generator(self) -> traffic.Area:
+        """Return the area."""
         outline = self.action.traffic_area.polygon
         if outline is None:
-            covers = traffic.stretches_cover(self.background.fleet.lanes, self._stretches())
+            covers = traffic.stretches_cover(self.background.fleet.lanes, self._road_ranges())
         else:
             places = [resolve_position(position, self.context, None).pose for position in outline.position]
             covers = traffic.polygon([(place.x, place.y) for place in places])
@@ -242,49 +243,47 @@ class TrafficAreaAction(TrafficInstanceAction):
             self.background.key(self.traffic_name),
             count=self.action.number_of_entities,
             continuous=self.action.continuous,
-            mixture=self._mixture,
+            mixture=self._traffic_mix,
             covers=covers,
         )
 
     def update(self) -> Status:
-        """Where it is not continuous its instance fills the area in this tick, and the action is done."""
+        """Run the generator; an area that is not continuous is filled in this time step and complete."""
         status = super().update()
         return status if self.action.continuous else Status.SUCCESS
 
-    def _stretches(self) -> list[traffic.Stretch]:
+    def _road_ranges(self) -> list[traffic.Stretch]:
         assert self.context.roads is not None
-        found = []
+        ranges = []
         for entry in self.action.traffic_area.road_range:
             cursors = [
                 traffic.Cursor(cursor.road_id, cursor.s, tuple(lane.id for lane in cursor.lane))
                 for cursor in entry.road_cursor
             ]
             try:
-                found += traffic.road_range(self.context.roads, cursors, entry.length)
+                ranges += traffic.road_range(self.context.roads, cursors, entry.length)
             except InputError as error:
-                found_problems = [
-                    Diagnostic(one.message, one.hint, entry.source, entry.line) for one in error.diagnostics
-                ]
-                raise ScenarioError(found_problems) from error
-        return found
+                diagnostics = [Diagnostic(d.message, d.hint, entry.source, entry.line) for d in error.diagnostics]
+                raise ScenarioError(diagnostics) from error
+        return ranges
 
     def describe(self) -> str:
-        """How many."""
+        """Describe the number."""
         return f"{self.action.number_of_entities} participants in an area"
 
 
 class TrafficStopAction(ActionBehaviour):
-    """Ends all instances of the traffic of its name, or of all traffic where it has none; the cars drive on."""
+    """Stop of all generators of a name, or of all traffic without a name. The vehicles continue."""
 
     immediate = True
     action: model.TrafficStopAction
     parent_element: model.TrafficAction
 
     def update(self) -> Status:
-        """End them."""
+        """Stop the generators."""
         self.context.traffic.stop(self.parent_element.traffic_name)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which."""
+        """Describe the traffic."""
         return f"stop traffic {self.parent_element.traffic_name or ''}".rstrip()

@@ -1,4 +1,4 @@
-"""Actions on trailers: couple and uncouple."""
+"""Actions on trailers: connection and disconnection."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
 class ConnectTrailerAction(ActionBehaviour):
-    """Couples a trailer at once, in place of one that is coupled; from the next step on it rolls behind the hitch."""
+    """Immediate connection of a trailer, in place of a connected one. It follows the hitch from the next step."""
 
     action: model.ConnectTrailerAction
 
     def update(self) -> Status:
-        """Couple it."""
+        """Connect the trailer."""
         for other in self.context.actors.values():
             if other.trailer == self.action.trailer_ref:
                 other.trailer = None
@@ -21,17 +21,17 @@ class ConnectTrailerAction(ActionBehaviour):
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one."""
+        """Describe the trailer."""
         return f"couple trailer {self.action.trailer_ref}"
 
 
 class DisconnectTrailerAction(ActionBehaviour):
-    """Uncouples the trailer at once; it stops where it is."""
+    """Immediate disconnection of the trailer, which stops at its position."""
 
     action: model.DisconnectTrailerAction
 
     def update(self) -> Status:
-        """Uncouple it."""
+        """Disconnect the trailer."""
         name, self.actor.trailer = self.actor.trailer, None
         if name is not None:
             trailer = self.context.actors[name].motion
@@ -40,5 +40,5 @@ class DisconnectTrailerAction(ActionBehaviour):
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """What it does."""
+        """Describe the action."""
         return "uncouple the trailer"

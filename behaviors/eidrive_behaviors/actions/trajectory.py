@@ -1,4 +1,4 @@
-"""FollowTrajectoryAction: move along a given curve, at the actor's speed or at given times."""
+"""FollowTrajectoryAction: motion along a given curve, at the actor's speed or at given times."""
 
 from __future__ import annotations
 
@@ -26,33 +26,33 @@ from eidrive_scenario.api.actions import (
 )
 from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
 
-APART = 1.0
-"""Who is further from the place on the trajectory at which he begins is put there, as by a teleport [m]."""
-TIMED = {
-    "polyline": "each vertex a time",
+TELEPORT_DISTANCE = 1.0
+"""Minimum distance to the start on the trajectory at which an actor is teleported there [m]."""
+TIME_ATTRIBUTES = {
+    "polyline": "a time for each vertex",
     "clothoid": "startTime and stopTime",
     "clothoid_spline": "timeEnd",
-    "nurbs": "each control point a time",
+    "nurbs": "a time for each control point",
 }
-"""By shape, what says when it is passed."""
+"""Required time attributes, per shape."""
 
 
 class FollowTrajectoryAction(ActionBehaviour):
-    """Moves the actor along a trajectory, from its start (or `initialDistanceOffset`) to its end.
+    """Motion along a trajectory from its start (or `initialDistanceOffset`) to its end.
 
-    Without timing the actor keeps its own speed, which other actions may set, and only the way is given. With timing
-    the vertex of time v is passed at `scale * v + offset`, counted from the start of the run or of the action; in the
+    Without timing the actor keeps its speed, which other actions may set, and only the path is specified. With timing
+    the vertex of time v is passed at `scale * v + offset`, relative to the start of the run or of the action. In the
     following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
-    speed and looks for its lane.
+    speed and is matched to a lane.
 
-    The heading is the one that the file gives, else that of the curve. A negative speed leads backwards: an actor that
-    looks along the curve goes back on it, and straight on beyond its start. One that looks the other way as the action
-    starts (by its own heading, by those of the file, or by the lane in which an actor without a place appears) drives
-    tail first to the end. Whether the position or the speed is set first in Init does not matter.
+    The heading is that of the file, else that of the curve. A negative speed moves backwards: an actor that faces along
+    the curve goes back on it, and straight on beyond its start. An actor that faces against the curve at the start of
+    the action moves tail first to the end. Its direction is that of its heading, of the headings of the file, or of the
+    lane in which an absent actor appears. The order of position and speed in Init has no effect.
 
-    In the mode `position` the actor is put on the trajectory. With `follow` a vehicle drives there from where it is and
-    leaves the curve where its front wheels cannot turn as far; until it is on it again it catches up with the times
-    within its Performance. Headings that the file gives are taken at their word in both.
+    In the mode `position` the actor is set onto the trajectory. With `follow` a vehicle drives there from its position
+    and leaves the curve where its front wheels cannot turn far enough. Until it is back on the curve it catches up with
+    the times within its Performance. Headings of the file are exact in both modes.
     """
 
     action: model.FollowTrajectoryAction
@@ -69,65 +69,66 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._pursuit: PathPursuit | None = None
         self._run: RateLimitedValue | None = None
         self._followed: TrajectoryProgress | None = None
-        self._trajectory = self._found()
+        self._trajectory = self._resolve_trajectory()
         self._timing = action.time_reference.timing
         if self._timing is not None and not has_times(self._trajectory.shape.chosen()):
             self._timing = None
-            hint = f"give {next(TIMED[shape] for shape in TIMED if getattr(self._trajectory.shape, shape) is not None)}"
-            what = "keeps the actor's own speed: its Timing has nothing to scale, as the trajectory has no times"
-            context.warnings += self.error(what, f"{hint}, or write <None/> for the TimeReference").diagnostics
+            shape = next(name for name in TIME_ATTRIBUTES if getattr(self._trajectory.shape, name) is not None)
+            what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
+            hint = f"specify {TIME_ATTRIBUTES[shape]}, or <None/> as the TimeReference"
+            context.warnings += self.error(what, hint).diagnostics
 
     @property
     def controls(self) -> Domain:
-        """The way alone, or the speed too."""
+        """Lateral domain, and with timing the longitudinal domain too."""
         return Domain.LATERAL if self._timing is None else Domain.LATERAL | Domain.LONGITUDINAL
 
     @property
     def is_actor_missing(self) -> bool:
-        """Never: who is not in the world appears on the trajectory."""
+        """False: an absent actor appears on the trajectory."""
         return False
 
     def initialise(self) -> None:
-        """Lay the trajectory out; positions relative to entities mean where those are now."""
+        """Sample the trajectory, with positions relative to entities at their current state."""
         present, motion = self.actor.present, self.actor.motion
         spline = self._trajectory.shape.clothoid_spline
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
             raise EntityAbsentError(self.actor.name)
-        self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolved, motion.pose)
+        self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose)
         self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self.actor.progress = self._followed = self._progress
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
         self._started = self.context.time
         follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
-        self._drives = follow and not self._layout.given and isinstance(self.actor.entity, model.Vehicle)
+        self._follows_limits = follow and not self._layout.given and isinstance(self.actor.entity, model.Vehicle)
         swings = follow and self._timing is not None and self._trajectory.shape.polyline is not None
         self._speeds = self._layout.speeds_from(abs(motion.speed)) if swings else None
-        self._looks = motion.pose.h if present else None
-        """Heading before the action [rad]; None for an actor that the trajectory brings into the world."""
+        self._heading = motion.pose.h if present else None
+        """Heading before the action [rad]; None for an actor that the trajectory adds to the world."""
         self._put: Pose | None = None
         self._pursuit = self._run = None
-        self._begun = self._turned = self._jumps = False
-        if self._timing is not None and not (self._drives and present):
+        self._begun = self._direction_known = self._teleports = False
+        if self._timing is not None and not (self._follows_limits and present):
             self._s = self._layout.at_time(self._clock(0.0), self._speeds)
 
     def _offset(self) -> float:
-        """Where on the trajectory the action begins [m]."""
+        """Return the arc length at which the action starts [m]."""
         offset = self.action.initial_distance_offset or 0.0
         return offset if self._layout.closed else min(offset, self._layout.length)
 
     def settle(self) -> None:
-        """All actions of Init have started: the speed, and whoever is placed by another one, are known."""
+        """Complete the start in Init: speed, and position set by another action, are known."""
         placed_here = self._put is not None and self.actor.motion.pose == self._put
-        self._look()
-        self._turn()
+        self._update_heading()
+        self._determine_direction()
         if placed_here:
             self._enter(self._pose(self._s))
 
-    def _look(self) -> None:
-        """Notice where the actor looks, if another action has placed it."""
+    def _update_heading(self) -> None:
+        """Update the heading if another action has teleported the actor."""
         if self._put is not None and self.actor.motion.pose != self._put:
-            self._looks = self.actor.motion.pose.h
+            self._heading = self.actor.motion.pose.h
             self._put = None
 
     def _enter(self, pose: Pose) -> None:
@@ -135,12 +136,12 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._put = self.actor.motion.pose
 
     def _begin(self) -> None:
-        """The first step: from where the actor is by now."""
+        """Prepare the first step from the actor's current pose."""
         motion, layout = self.actor.motion, self._layout
         self._begun = True
-        self._look()
+        self._update_heading()
         vehicle = self.actor.entity
-        if self._drives and self._put is None and isinstance(vehicle, model.Vehicle):
+        if self._follows_limits and self._put is None and isinstance(vehicle, model.Vehicle):
             if self._timing is not None:
                 self._s = self._offset()
             self._pursuit = PathPursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
@@ -150,43 +151,45 @@ class FollowTrajectoryAction(ActionBehaviour):
                     self._s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top
                 )
         start = layout.at(self._s)
-        self._jumps = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > APART
+        self._teleports = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > TELEPORT_DISTANCE
 
-    def _turn(self) -> None:
-        """Decide whether the actor drives tail first, as soon as it moves."""
+    def _determine_direction(self) -> None:
+        """Decide whether the actor moves tail first, as soon as it moves."""
         speed = self.actor.motion.speed
-        if self._turned or speed == 0.0:
+        if self._direction_known or speed == 0.0:
             return
-        self._turned = True
+        self._direction_known = True
         if speed < 0.0:
             pose, tangent = self._layout.at(self._s), self._layout.tangent(self._s)
-            looks = pose.h if self._layout.given else self._looks
-            if looks is None:
-                looks = self._looks_by_lane()
-            self._progress.way = -1 if looks is not None and math.cos(looks - tangent) < 0.0 else 1
+            heading = pose.h if self._layout.given else self._heading
+            if heading is None:
+                heading = self._heading_by_lane()
+            self._progress.way = -1 if heading is not None and math.cos(heading - tangent) < 0.0 else 1
 
-    def _looks_by_lane(self) -> float | None:
-        """Heading of the lane or road on which the first vertex lies; None where that says nothing."""
+    def _heading_by_lane(self) -> float | None:
+        """Return the heading of the lane or road of the first vertex [rad]; None for other positions."""
         first = next(one for one in self._trajectory.walk() if isinstance(one, model.Position))
         on_lane = isinstance(first.chosen(), model.LanePosition | model.RoadPosition)
-        return self._resolved(first).h if on_lane else None
+        return self._resolve_pose(first).h if on_lane else None
 
     def terminate(self, new_status: Status) -> None:
-        """Nothing measures along a trajectory that nobody follows any more."""
+        """Remove the progress along the trajectory, so that no distance refers to it any more."""
         if self._followed is not None and self.actor.progress is self._followed:
             self.actor.progress = None
         self._followed = None
 
     def update(self) -> Status:
-        """The pose at the end of the step."""
+        """Set the pose at the end of the step."""
         if self.actor.driven:
-            return self._ask_driver()
+            return self._set_driver_goal()
         motion, dt, layout = self.actor.motion, self.context.dt, self._layout
         if dt > 0.0 and not self._begun:
             self._begin()
         if dt > 0.0:
-            self._turn()
-        if self._pursuit is not None or (dt == 0.0 and self._drives and self.actor.present and self._put is None):
+            self._determine_direction()
+        if self._pursuit is not None or (
+            dt == 0.0 and self._follows_limits and self.actor.present and self._put is None
+        ):
             return self._drive(self._pursuit)
         way = self._progress.way
         if self._timing is None:
@@ -206,13 +209,13 @@ class FollowTrajectoryAction(ActionBehaviour):
         if dt == 0.0 or not self.actor.present:
             self._enter(pose)
         else:
-            rail = None if self._timing is not None else partial(self._carried, before)
-            motion.move_to(pose, land=done, jump=self._jumps, rail=rail)
-        self._jumps = False
+            rail = None if self._timing is not None else partial(self._pose_after_distance, before)
+            motion.move_to(pose, land=done, jump=self._teleports, rail=rail)
+        self._teleports = False
         return Status.SUCCESS if done else Status.RUNNING
 
-    def _carried(self, before: float, distance: float) -> Pose:
-        """Return the pose after a step of another length than that of the speed: a distance action without limits."""
+    def _pose_after_distance(self, before: float, distance: float) -> Pose:
+        """Return the pose after a step of another length, as a distance action without limits requests it."""
         self._s = before + self._progress.way * distance
         self._progress.move(self.context.view.tick, before, self._s)
         pose = self._pose(self._s)
@@ -221,13 +224,13 @@ class FollowTrajectoryAction(ActionBehaviour):
         return pose
 
     def _forwards(self, s: float) -> float:
-        """+1 where the actor looks along the curve, -1 where it goes on it tail first."""
+        """Return +1 if the actor faces along the curve, -1 if it moves tail first."""
         if not self._layout.given:
             return self._progress.way
         return -1.0 if math.cos(self._layout.at(s).h - self._layout.tangent(s)) < -EPSILON else 1.0
 
     def _drive(self, pursuit: PathPursuit | None) -> Status:
-        """The pose at the end of the step of a vehicle that follows as far as it can."""
+        """Set the pose of a vehicle in the following mode `follow` at the end of the step."""
         motion, dt, layout = self.actor.motion, self.context.dt, self._layout
         if pursuit is None or dt == 0.0:
             return Status.RUNNING
@@ -246,11 +249,15 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
         done = not (layout.closed and self._run is None) and pursuit.s > max(before, layout.length - EPSILON)
-        motion.move_to(pose, land=done, rail=None if self._run is not None else partial(self._carried, before))
+        motion.move_to(
+            pose,
+            land=done,
+            rail=None if self._run is not None else partial(self._pose_after_distance, before),
+        )
         return Status.SUCCESS if done else Status.RUNNING
 
     def _last_speed(self) -> float:
-        """At which a timed trajectory ends [m per s of its clock]."""
+        """Return the speed at the end of a timed trajectory [m per s of its clock]."""
         if self._speeds is not None:
             return self._speeds[-1]
         times, stations = self._layout.times, self._layout.timed
@@ -272,7 +279,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         back = pose.turned(math.pi)
         return back._replace(h=wrap_angle(back.h))
 
-    def _ask_driver(self) -> Status:
+    def _set_driver_goal(self) -> Status:
         count = max(2, math.ceil(self._layout.length / 2.0) + 1)
         points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
         goal = self.actor.goal
@@ -280,10 +287,10 @@ class FollowTrajectoryAction(ActionBehaviour):
         here = self.actor.motion.pose
         return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
 
-    def _resolved(self, position: model.Position) -> Pose:
+    def _resolve_pose(self, position: model.Position) -> Pose:
         return resolve_position(position, self.context, self.actor.name).pose
 
-    def _found(self) -> model.Trajectory:
+    def _resolve_trajectory(self) -> model.Trajectory:
         if self.action.trajectory is not None:
             return self.action.trajectory
         reference = self.action.catalog_reference
@@ -294,6 +301,6 @@ class FollowTrajectoryAction(ActionBehaviour):
         return self.context.catalog_entry(reference, model.Trajectory, self.action)
 
     def describe(self) -> str:
-        """Which one."""
+        """Describe trajectory and timing."""
         timing = "at its own speed" if self._timing is None else "by its times"
         return f"follow trajectory {self._trajectory.name} {timing}"

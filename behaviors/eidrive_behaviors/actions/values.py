@@ -8,82 +8,82 @@ from eidrive_scenario.api.actions import ActionBehaviour, model
 
 
 class ValueAction(ActionBehaviour):
-    """An action on one parameter or one variable: texts by their names, both."""
+    """Base class of actions on one parameter or one variable, both of which hold text."""
 
     immediate = True
     parent_element: model.ParameterAction | model.VariableAction
 
     @property
     def kind(self) -> str:
-        """What it is called."""
+        """Kind of the value: `parameter` or `variable`."""
         return "parameter" if isinstance(self.parent_element, model.ParameterAction) else "variable"
 
     @property
-    def which(self) -> str:
-        """Its name."""
-        around = self.parent_element
-        return around.parameter_ref if isinstance(around, model.ParameterAction) else around.variable_ref
+    def ref(self) -> str:
+        """Name of the parameter or variable."""
+        parent = self.parent_element
+        return parent.parameter_ref if isinstance(parent, model.ParameterAction) else parent.variable_ref
 
     @property
     def values(self) -> dict[str, str]:
-        """All of its kind."""
+        """All values of this kind by name."""
         return self.context.parameters if self.kind == "parameter" else self.context.variables
 
 
 class SetAction(ValueAction):
-    """Gives it a value."""
+    """Assignment of a value."""
 
     action: model.ParameterSetAction | model.VariableSetAction
 
     def update(self) -> Status:
-        """Set it."""
-        self.values[self.which] = self.action.value
+        """Set the value."""
+        self.values[self.ref] = self.action.value
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one, to what."""
-        return f"set {self.kind} {self.which} to {self.action.value}"
+        """Describe name and value."""
+        return f"set {self.kind} {self.ref} to {self.action.value}"
 
 
 class ModifyAction(ValueAction):
-    """Adds to its value, or multiplies it."""
+    """Addition to a value, or its multiplication."""
 
     action: model.ParameterModifyAction | model.VariableModifyAction
 
     def update(self) -> Status:
-        """Modify it."""
-        self.values[self.which] = modified(self, self.values.get(self.which, ""), self.which, self.action.rule)
+        """Modify the value."""
+        self.values[self.ref] = modify_value(self, self.values.get(self.ref, ""), self.ref, self.action.rule)
         return Status.SUCCESS
 
     def describe(self) -> str:
-        """Which one, how."""
-        return f"{describe_modification(self.action.rule)} {self.kind} {self.which}"
+        """Describe name and rule."""
+        return f"{describe_modification(self.action.rule)} {self.kind} {self.ref}"
 
 
 class ParameterSetAction(SetAction):
-    """Sets a parameter for the conditions that come; what the file took from it when it was read stays."""
+    """Assignment of a parameter for later conditions. Values that the reader substituted are not changed."""
 
 
 class ParameterModifyAction(ModifyAction):
-    """Adds to a parameter, or multiplies it, for the conditions that come."""
+    """Addition to a parameter, or its multiplication, for later conditions."""
 
 
 class VariableSetAction(SetAction):
-    """Sets a variable."""
+    """Assignment of a variable."""
 
 
 class VariableModifyAction(ModifyAction):
-    """Adds to a variable, or multiplies it."""
+    """Addition to a variable, or its multiplication."""
 
 
-def modified(
+def modify_value(
     behaviour: ActionBehaviour, text: str, name: str, rule: model.ModifyRule | model.VariableModifyRule
 ) -> str:
-    """The number in `text` after the rule, as text. Raises ScenarioError if it is no number."""
+    """Return the number in `text` after the rule, as text. Raise ScenarioError if it is not a number."""
     try:
         value = float(text)
     except ValueError:
-        raise behaviour.error(f"calculates with {name} = {text!r}", "give it a number first") from None
+        raise behaviour.error(f"{name} is not a number (got {text!r}; expected a number)") from None
     if rule.add_value is not None:
         value += rule.add_value.value
     elif rule.multiply_by_value is not None:
@@ -92,7 +92,7 @@ def modified(
 
 
 def describe_modification(rule: model.ModifyRule | model.VariableModifyRule) -> str:
-    """What a rule does."""
+    """Describe a rule."""
     if rule.add_value is not None:
         return f"add {rule.add_value.value:g} to"
     assert rule.multiply_by_value is not None

@@ -1,4 +1,4 @@
-"""RelativeClearanceCondition: nobody in the lanes around."""
+"""RelativeClearanceCondition: no entity in the surrounding lanes."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from eidrive_scenario.api.common import LaneLocation, footprint
 
 
 class RelativeClearanceCondition(EntityCondition):
-    """No (named) entity is within a stretch ahead and behind, in a range of lanes counted from the own one to the left.
+    """No (named) entity within a range ahead and behind, in a range of lanes counted to the left of the own lane.
 
-    The range must exist: an entity beside which there is no such lane has no clearance there. Lanes whose traffic comes
-    towards the entity, as it faces, count only with `oppositeLanes`; its own lane always counts. The stretch is
-    measured from the reference point of the entity along the road; with `freeSpace` whoever reaches into it with any
-    part of its box is in it, else whose reference point lies there.
+    The range must exist: without such a lane beside the entity there is no clearance. Lanes of oncoming traffic, with
+    respect to the entity's heading, count only with `oppositeLanes`; its own lane always counts. The range is measured
+    along the road from the reference point of the entity. With `freeSpace` every part of another box counts, else only
+    its reference point.
     """
 
     element: model.RelativeClearanceCondition
 
     def holds_for(self, context: RuntimeContext, entity: str) -> bool:
-        """Look for anybody in the area."""
+        """Return True if the lanes exist and no entity is in the area."""
         here = context.location(entity)
         if here is None or context.roads is None:
             return False
-        return self._exists(context, entity, here) and not self._within(context, entity, here)
+        return self._range_exists(context, entity, here) and not self._entities_within(context, entity, here)
 
     def explain_for(self, context: RuntimeContext, entity: str) -> str:
-        """Who is in the area."""
+        """Describe the entities in the area."""
         here = context.location(entity)
-        found = self._within(context, entity, here) if here is not None else []
+        found = self._entities_within(context, entity, here) if here is not None else []
         return f"{entity}: {', '.join(found)} within its clearance" if found else f"{entity}: clear around"
 
     def describe_for(self) -> str:
-        """The stretch."""
+        """Describe the range."""
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return f"clear {ahead:g} m ahead, {behind:g} m behind"
 
-    def _within(self, context: RuntimeContext, entity: str, here: LaneLocation) -> list[str]:
+    def _entities_within(self, context: RuntimeContext, entity: str, here: LaneLocation) -> list[str]:
         names = [ref.entity_ref for ref in self.element.entity_ref] or list(context.view.names)
         return [
             name
@@ -46,41 +46,41 @@ class RelativeClearanceCondition(EntityCondition):
         ]
 
     def _blocks(self, context: RuntimeContext, entity: str, here: LaneLocation, name: str) -> bool:
-        places = self._places(context, name)
-        if not places or not any(self._in_range(context, entity, here, there) for there in lanes_of(places)):
+        locations = self._locations(context, name)
+        if not locations or not any(self._in_range(context, entity, here, other) for other in covered_lanes(locations)):
             return False
         assert context.roads is not None
-        found = [context.roads.distance(here, there) for there in places]
+        found = [context.roads.distance(here, other) for other in locations]
         turn = facing(context, entity, here)
         along = [offset[0] * turn for offset in found if offset is not None]
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return bool(along) and min(along) <= ahead and max(along) >= -behind
 
-    def _places(self, context: RuntimeContext, name: str) -> list[LaneLocation]:
-        """Where somebody is: the reference point, with `freeSpace` the corners of the box too."""
-        there = context.location(name)
-        if there is None:
+    def _locations(self, context: RuntimeContext, name: str) -> list[LaneLocation]:
+        """Return locations of an entity: its reference point, and with `freeSpace` the corners of its box."""
+        other = context.location(name)
+        if other is None:
             return []
         if not self.element.free_space:
-            return [there]
+            return [other]
         assert context.roads is not None
         outline = footprint(np.array(entity_box(context, name))).tolist()
-        corners = (context.roads.locate_at(x, y, there) for x, y in outline)
-        return [there, *(corner for corner in corners if corner is not None)]
+        corners = (context.roads.locate_at(x, y, other) for x, y in outline)
+        return [other, *(corner for corner in corners if corner is not None)]
 
-    def _exists(self, context: RuntimeContext, entity: str, here: LaneLocation) -> bool:
+    def _range_exists(self, context: RuntimeContext, entity: str, here: LaneLocation) -> bool:
         assert context.roads is not None
         lanes = context.roads.lane_ids(here.road, here.s, drivable=True)
         return any(self._in_range(context, entity, here, here._replace(lane=lane)) for lane in lanes)
 
-    def _in_range(self, context: RuntimeContext, entity: str, here: LaneLocation, there: LaneLocation) -> bool:
+    def _in_range(self, context: RuntimeContext, entity: str, here: LaneLocation, other: LaneLocation) -> bool:
         assert context.roads is not None
-        runs = context.roads.orientation(here, there)
+        runs = context.roads.orientation(here, other)
         if runs is None:
             return False
         way = context.roads.driving_direction(here.road, here.lane) * facing(context, entity, here)
-        lane = there.lane * runs
-        same = lane == here.lane or context.roads.driving_direction(there.road, there.lane) * runs == way
+        lane = other.lane * runs
+        same = lane == here.lane or context.roads.driving_direction(other.road, other.lane) * runs == way
         if not same and not self.element.opposite_lanes:
             return False
         steps = lane - here.lane
@@ -94,10 +94,10 @@ class RelativeClearanceCondition(EntityCondition):
         )
 
 
-def lanes_of(places: list[LaneLocation]) -> list[LaneLocation]:
-    """A place in each of the lanes that a box covers between its corners, lane 0 left out."""
-    found = {(place.road, place.lane): place for place in places}
-    for road in {place.road for place in places}:
+def covered_lanes(locations: list[LaneLocation]) -> list[LaneLocation]:
+    """Return one location in each lane that a box covers between its corners, without lane 0."""
+    found = {(location.road, location.lane): location for location in locations}
+    for road in {location.road for location in locations}:
         lanes = [lane for name, lane in found if name == road]
         for lane in range(min(lanes) + 1, max(lanes)):
             if lane != 0:

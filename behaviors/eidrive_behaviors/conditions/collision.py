@@ -1,4 +1,4 @@
-"""CollisionCondition: an entity touches another one."""
+"""CollisionCondition: contact of an entity with another one."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ TYPES: dict[str, type[model.Element]] = {
 
 
 class CollisionCondition(EntityCondition):
-    """Its bounding box touches that of a named entity, or of any entity of a type."""
+    """Contact of the bounding box with that of a named entity, or of any entity of a type."""
 
     element: model.CollisionCondition
 
     def holds_for(self, context: RuntimeContext, entity: str) -> bool:
-        """Look for touch."""
-        return bool(self._touched(context, entity))
+        """Return True if another entity is touched."""
+        return bool(self._touched_entities(context, entity))
 
     def explain_for(self, context: RuntimeContext, entity: str) -> str:
-        """Whom it touches."""
-        touched = self._touched(context, entity)
-        return f"{entity}: collides with {', '.join(touched)}" if touched else f"{entity}: touches nobody"
+        """Describe the touched entities."""
+        touched = self._touched_entities(context, entity)
+        return f"{entity}: collides with {', '.join(touched)}" if touched else f"{entity}: touches no entity"
 
     def describe_for(self) -> str:
-        """With whom."""
+        """Describe the other entity or type."""
         if self.element.entity_ref is not None:
             return f"collides with {self.element.entity_ref.entity_ref}"
         assert self.element.by_type is not None
         return f"collides with a {self.element.by_type.type.value}"
 
-    def _touched(self, context: RuntimeContext, entity: str) -> list[str]:
+    def _touched_entities(self, context: RuntimeContext, entity: str) -> list[str]:
         box = entity_box(context, entity)
-        # Bodies that rebound within a step no longer overlap at its end: the contact that began counts too.
+        # Bodies that rebound within a step do not overlap at its end: the contact event counts too.
         begun: set[str] = set()
         for contact in context.view.contacts:
             if entity in (contact.first, contact.second):
                 begun |= {contact.first, contact.second}
         named = [
             name
-            for name in self._others(context)
+            for name in self._candidates(context)
             if name != entity and (name in begun or overlap(box, entity_box(context, name)))
         ]
-        return named if self.element.by_type is None else [*named, *self._traffic(context, box, begun)]
+        return named if self.element.by_type is None else [*named, *self._touched_traffic(context, box, begun)]
 
-    def _traffic(self, context: RuntimeContext, box: Sequence[float], begun: set[str]) -> list[str]:
-        """Background traffic of the type that touches a box: it has no entities, but it counts as such."""
+    def _touched_traffic(self, context: RuntimeContext, box: Sequence[float], begun: set[str]) -> list[str]:
+        """Return the background traffic of the type that touches a box. It counts although it has no entities."""
         assert self.element.by_type is not None
         kind, view = self.element.by_type.type.value, context.view
         rows = [view.rows[name] for name in context.traffic.names if name in view]
@@ -69,7 +69,7 @@ class CollisionCondition(EntityCondition):
             and (view.names[row] in begun or (close and overlap(box, view.boxes[row])))
         ]
 
-    def _others(self, context: RuntimeContext) -> list[str]:
+    def _candidates(self, context: RuntimeContext) -> list[str]:
         if self.element.entity_ref is not None:
             names = [self.element.entity_ref.entity_ref]
         else:

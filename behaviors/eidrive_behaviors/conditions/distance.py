@@ -17,31 +17,32 @@ from eidrive_scenario.api.actions import (
     resolve_position,
 )
 
-Measured = (
+DistanceElement = (
     model.DistanceCondition
     | model.RelativeDistanceCondition
     | model.TimeHeadwayCondition
     | model.TimeToCollisionCondition
 )
-"""Conditions that measure a distance."""
+"""Elements that specify a distance."""
 
 
 class GapCondition(QuantityCondition):
-    """A condition that measures a distance, in the coordinate system and along the axis that its element names.
+    """Base class of conditions that measure a distance in the coordinate system and along the axis of their element.
 
-    The `alongRoute` of 1.0 asks for the distance along the road; without it and without a word a distance is straight.
+    `alongRoute` of version 1.0 requests the distance along the road. Without it and without a distance type the
+    distance is straight.
     """
 
-    element: Measured
+    element: DistanceElement
 
-    def __init__(self, element: Measured, entities: Sequence[str], rule: str = "any") -> None:
+    def __init__(self, element: DistanceElement, entities: Sequence[str], rule: str = "any") -> None:
         super().__init__(element, entities, rule)
         along = bool(getattr(element, "along_route", None))
         self.frame = "road" if along else resolve_coordinate_system(element.coordinate_system)
         self.kind = "longitudinal" if along else resolve_distance_type(element.relative_distance_type)
 
     def gap(self, context: RuntimeContext, entity: str, target: str | ResolvedPosition) -> float:
-        """The distance [m], signed; NaN where there is none."""
+        """Return the signed distance [m]; NaN if there is none."""
         element = self.element
         try:
             return distance(
@@ -57,8 +58,8 @@ class GapCondition(QuantityCondition):
             return math.nan
 
 
-def place_of(context: RuntimeContext, position: model.Position, entity: str) -> ResolvedPosition | None:
-    """The place of a position now, None where it refers to an entity that is not in the world."""
+def current_place(context: RuntimeContext, position: model.Position, entity: str) -> ResolvedPosition | None:
+    """Return the current place of a position; None if it refers to an absent entity."""
     try:
         return resolve_position(position, context, entity)
     except EntityAbsentError:
@@ -66,18 +67,18 @@ def place_of(context: RuntimeContext, position: model.Position, entity: str) -> 
 
 
 class DistanceCondition(GapCondition):
-    """Distance to a position [m]; positions relative to entities move with them."""
+    """Distance to a position [m]. Positions relative to entities move with them."""
 
     element: model.DistanceCondition
     unit = "m"
 
     def what(self) -> str:
-        """What is compared."""
+        """Describe the compared quantity."""
         return f"distance to {type(self.element.position.chosen()).__name__}"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
-        """The amount of the distance."""
-        place = place_of(context, self.element.position, entity)
+        """Return the absolute distance [m]."""
+        place = current_place(context, self.element.position, entity)
         return math.nan if place is None else abs(self.gap(context, entity, place))
 
 
@@ -88,11 +89,11 @@ class RelativeDistanceCondition(GapCondition):
     unit = "m"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
-        """The amount of the distance."""
+        """Return the absolute distance [m]."""
         return abs(self.gap(context, entity, self.element.entity_ref))
 
     def what(self) -> str:
-        """Which distance, and to whom."""
+        """Describe the distance and the other entity."""
         gap = " free" if self.element.freespace else ""
         kind = (
             resolve_distance_type(self.element.relative_distance_type)
@@ -103,28 +104,28 @@ class RelativeDistanceCondition(GapCondition):
 
 
 class ReachPositionCondition(QuantityCondition):
-    """Within a tolerance [m] of a position, seen from above."""
+    """Horizontal distance to a position within a tolerance [m]."""
 
     element: model.ReachPositionCondition
     unit = "m"
 
     def explain_for(self, context: RuntimeContext, entity: str) -> str:
-        """The distance."""
+        """Describe the current distance."""
         gap = self.quantity(context, entity)
         return f"{entity}: {gap:.2f} m from the position, tolerance {self.element.tolerance:g} m"
 
     def describe_for(self) -> str:
-        """The tolerance."""
+        """Describe the tolerance."""
         return f"within {self.element.tolerance:g} m of {type(self.element.position.chosen()).__name__}"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
-        """The distance between the reference point and the position; infinite where that is nowhere."""
-        place = place_of(context, self.element.position, entity)
+        """Return the distance between reference point and position [m]; infinite while the position is undefined."""
+        place = current_place(context, self.element.position, entity)
         if place is None:
             return math.inf
         here = context.pose(entity)
         return math.hypot(place.pose.x - here.x, place.pose.y - here.y)
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """At most the tolerance."""
+        """Return the rule: at most the tolerance."""
         return model.Rule.LESS_OR_EQUAL, self.element.tolerance

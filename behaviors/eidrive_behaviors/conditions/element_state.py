@@ -1,4 +1,4 @@
-"""StoryboardElementStateCondition: an element is in a state, or passes through a transition."""
+"""StoryboardElementStateCondition: state or transition of a storyboard element."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ TRANSITIONS = {transition.value: transition for transition in ElementTransition}
 
 
 class StoryboardElementStateCondition(Condition):
-    """An element of the storyboard, by its name or by the end of its path (`Act::Event::Action`).
+    """State or transition of an element, by its name or by the end of its path (`Act::Event::Action`).
 
-    A transition is seen in the step in which it happens, by a trigger that is not asked then in the next one.
+    A transition is observed in the step in which it occurs. A trigger that is not evaluated in that step observes it in
+    the next one.
     """
 
     instant = True
     element: model.StoryboardElementStateCondition
-    _watch: ElementStateObserver | None = None
+    _observer: ElementStateObserver | None = None
 
     def bind(self, context: RuntimeContext) -> None:
-        """Find the element. Raises ScenarioError if the storyboard has none of that name and type."""
+        """Find the element. Raise ScenarioError if the storyboard has no element of that name and type."""
         kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
-        self._watch = context.progress.observe_element(kind, name)
-        if self._watch is None:
+        self._observer = context.progress.observe_element(kind, name)
+        if self._observer is None:
             raise ScenarioError(
                 Diagnostic(
                     f"the storyboard has no {kind} named {name!r}",
@@ -41,19 +42,19 @@ class StoryboardElementStateCondition(Condition):
             )
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Look at the element's state or at what it just went through."""
-        if self._watch is None:
+        """Return True if the element is in the state or passed through the transition."""
+        if self._observer is None:
             return False
         word = self.element.state.value
         if word in TRANSITIONS:
-            return self._watch.passed(TRANSITIONS[word])
-        return self._watch.in_state(STATES[word])
+            return self._observer.passed(TRANSITIONS[word])
+        return self._observer.in_state(STATES[word])
 
     def explain(self, context: RuntimeContext) -> str:
-        """Which element, and what of it."""
+        """Describe element and state."""
         return self.describe()
 
     def describe(self) -> str:
-        """Which element, and what of it."""
+        """Describe element and state."""
         kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
         return f"{kind} {name} in {self.element.state.value}"

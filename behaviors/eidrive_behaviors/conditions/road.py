@@ -1,58 +1,59 @@
-"""Conditions on an entity and its road: the end of the road, off the road."""
+"""Conditions on an entity and its road: end of the road, off the road."""
 
 from __future__ import annotations
 
-from eidrive_behaviors.conditions.motion import since, span
+from eidrive_behaviors.conditions.motion import describe_elapsed, elapsed_time
 from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
 
 
 class EndOfRoadCondition(QuantityCondition):
-    """Has been at the end of its road for a duration [s]."""
+    """End of the road reached for a duration [s]."""
 
     element: model.EndOfRoadCondition
     unit = "s"
 
     def explain_for(self, context: RuntimeContext, entity: str) -> str:
-        """How long."""
-        begin = context.actors[entity].end_of_road_since
-        return f"{entity}: {since(context, begin, 'at the end of its road', 'on its way')}"
+        """Describe the current duration."""
+        start = context.actors[entity].end_of_road_since
+        return f"{entity}: {describe_elapsed(context, start, 'at the end of its road', 'on its way')}"
 
     def describe_for(self) -> str:
-        """The duration."""
+        """Describe the required duration."""
         return f"at the end of its road for {self.element.duration:g} s"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
-        """How long it is there."""
-        return span(context, context.actors[entity].end_of_road_since)
+        """Return the time at the end of the road [s]."""
+        return elapsed_time(context, context.actors[entity].end_of_road_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """At least the duration."""
+        """Return the rule: at least the duration."""
         return model.Rule.GREATER_OR_EQUAL, self.element.duration
 
 
 class OffroadCondition(QuantityCondition):
-    """Has been off the road with its reference point for longer than a duration [s]. Lanes `none` are no road."""
+    """Reference point off the road for longer than a duration [s]. Lanes of type `none` are not part of the road."""
 
     element: model.OffroadCondition
     unit = "s"
 
     def bind(self, context: RuntimeContext) -> None:
-        """Have it kept up since when they are off the road; runs without this condition need not pay for it."""
+        """Enable the off-road check of the entities, which runs without this condition do not need."""
         for name in self.entities:
             context.actors[name].off_road_wanted = True
 
     def explain_for(self, context: RuntimeContext, entity: str) -> str:
-        """How long."""
-        return f"{entity}: {since(context, context.actors[entity].off_road_since, 'off the road', 'on the road')}"
+        """Describe the current duration."""
+        start = context.actors[entity].off_road_since
+        return f"{entity}: {describe_elapsed(context, start, 'off the road', 'on the road')}"
 
     def describe_for(self) -> str:
-        """The duration."""
+        """Describe the required duration."""
         return f"off the road for {self.element.duration:g} s"
 
     def quantity(self, context: RuntimeContext, entity: str) -> float:
-        """How long it is off the road."""
-        return span(context, context.actors[entity].off_road_since)
+        """Return the time off the road [s]."""
+        return elapsed_time(context, context.actors[entity].off_road_since)
 
     def threshold(self) -> tuple[model.Rule, float]:
-        """Longer than the duration."""
+        """Return the rule: longer than the duration."""
         return model.Rule.GREATER_THAN, self.element.duration

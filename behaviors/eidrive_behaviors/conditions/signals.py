@@ -7,47 +7,47 @@ from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 
 class TrafficSignalCondition(Condition):
-    """A signal shows a state: the same text, whatever its case, as no tool's states differ in that alone."""
+    """State of a signal, compared without case. No tool has states that differ in case only."""
 
     instant = True
     element: model.TrafficSignalCondition
 
     def bind(self, context: RuntimeContext) -> None:
-        """Say what is odd about the signal's name."""
-        odd = context.signals.unknown(self.element.name, self.element)
-        if odd is not None:
-            context.warnings.append(odd)
+        """Warn of an unknown signal name."""
+        warning = context.signals.unknown(self.element.name, self.element)
+        if warning is not None:
+            context.warnings.append(warning)
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Compare its state."""
+        """Return True if the signal has the state."""
         state = context.signals.state(self.element.name)
-        return state is not None and _plain(state) == _plain(self.element.state)
+        return state is not None and _normalized(state) == _normalized(self.element.state)
 
     def explain(self, context: RuntimeContext) -> str:
-        """Its state."""
+        """Describe the current state."""
         return f"signal {self.element.name} shows {context.signals.state(self.element.name) or 'nothing'}"
 
     def describe(self) -> str:
-        """The state."""
+        """Describe the required state."""
         return f"signal {self.element.name} shows {self.element.state}"
 
 
 class TrafficSignalControllerCondition(Condition):
-    """A controller is in a phase."""
+    """Phase of a signal controller."""
 
     instant = True
     element: model.TrafficSignalControllerCondition
 
     def bind(self, context: RuntimeContext) -> None:
-        """Look the phase up. Raises ScenarioError if the controller does not have it."""
+        """Look the phase up. Raise ScenarioError if the controller does not have it."""
         element = self.element
         cycle = context.signals.cycles.get(element.traffic_signal_controller_ref)
         phases = [phase.name for phase in cycle.phases] if cycle is not None else [element.phase]
         if element.phase not in phases:
-            what = f"{element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
+            what = f"signal controller {element.traffic_signal_controller_ref!r} has no phase {element.phase!r}"
             raise ScenarioError(
                 Diagnostic(
-                    f"TrafficSignalControllerCondition can never hold: {what}",
+                    f"TrafficSignalControllerCondition: {what}",
                     suggestion(element.phase, phases),
                     element.source,
                     element.line,
@@ -55,18 +55,18 @@ class TrafficSignalControllerCondition(Condition):
             )
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Compare its phase."""
+        """Return True if the controller is in the phase."""
         return context.signals.phase(self.element.traffic_signal_controller_ref) == self.element.phase
 
     def explain(self, context: RuntimeContext) -> str:
-        """Its phase."""
+        """Describe the current phase."""
         name = self.element.traffic_signal_controller_ref
         return f"signal controller {name} is in {context.signals.phase(name) or 'no phase'}"
 
     def describe(self) -> str:
-        """The phase."""
+        """Describe the required phase."""
         return f"signal controller {self.element.traffic_signal_controller_ref} is in {self.element.phase}"
 
 
-def _plain(state: str) -> str:
+def _normalized(state: str) -> str:
     return state.strip().lower()

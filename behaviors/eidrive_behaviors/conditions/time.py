@@ -1,4 +1,4 @@
-"""Conditions on time: of the simulation, and of the day."""
+"""Conditions on the simulation time and on the time of day."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from eidrive_scenario.api.common import Diagnostic
 
 
 class SimulationTimeCondition(Condition):
-    """The time since the start of the run [s]."""
+    """Time since the start of the run [s]."""
 
     element: model.SimulationTimeCondition
 
@@ -26,37 +26,37 @@ class SimulationTimeCondition(Condition):
         return satisfies_rule(context.time, self.element.rule, self.element.value)
 
     def explain(self, context: RuntimeContext) -> str:
-        """The time."""
+        """Describe the current time."""
         sign = relation(self.element.rule, self.holds(context))
         return f"simulation time {context.time:.2f} s {sign} {self.element.value:g} s"
 
     def describe(self) -> str:
-        """Rule and limit."""
+        """Describe rule and limit."""
         return f"simulation time {describe_rule(self.element.rule)} {self.element.value:g} s"
 
     def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
-        """The time."""
+        """Return the time."""
         return (Measure("", context.time, self.element.rule, self.element.value, "s"),)
 
 
 class TimeOfDayCondition(Condition):
-    """The date and time of the day in the simulated world.
+    """Date and time of day in the simulated world.
 
-    The clock starts with the environment's TimeOfDay and runs with the simulation where that is animated. Without an
-    environment that says so there is no time of day, and the condition does not hold. Where one of the two times has
-    a zone and the other has none, both count in that zone.
+    The clock starts with the environment's TimeOfDay and runs with the simulation if that is animated. If no
+    environment specifies a TimeOfDay, the condition is false. If only one of the two times has a time zone, both refer
+    to that zone.
     """
 
     instant = True
     element: model.TimeOfDayCondition
 
     def bind(self, context: RuntimeContext) -> None:
-        """Say so where nothing in the scenario states a time of day."""
+        """Warn if no environment of the scenario specifies a time of day."""
         scenario = context.scenario
         trees = (scenario.document, *scenario.entries.values())
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
-            what = "TimeOfDayCondition never holds: no environment of the scenario has a TimeOfDay"
-            hint = "give one by an EnvironmentAction in Init"
+            what = "TimeOfDayCondition is never fulfilled: no environment of the scenario has a TimeOfDay"
+            hint = "specify one in an EnvironmentAction in Init"
             context.warnings.append(Diagnostic(what, hint, self.element.source, self.element.line))
 
     def holds(self, context: RuntimeContext) -> bool:
@@ -64,22 +64,24 @@ class TimeOfDayCondition(Condition):
         now = context.environment.clock(context.time)
         if now is None:
             return False
-        return satisfies_rule((now - _like(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0)
+        return satisfies_rule(
+            (now - _match_time_zone(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0
+        )
 
     def explain(self, context: RuntimeContext) -> str:
-        """The clock."""
+        """Describe the current time."""
         now = context.environment.clock(context.time)
         shown = "unknown" if now is None else now.isoformat()
         sign = relation(self.element.rule, self.holds(context))
         return f"time of day {shown} {sign} {self.element.date_time.isoformat()}"
 
     def describe(self) -> str:
-        """Rule and limit."""
+        """Describe rule and limit."""
         return f"time of day {describe_rule(self.element.rule)} {self.element.date_time.isoformat()}"
 
 
-def _like(moment: datetime, other: datetime) -> datetime:
-    """A moment with or without a time zone, as the other has one or not."""
+def _match_time_zone(moment: datetime, other: datetime) -> datetime:
+    """Return a moment with or without a time zone, as the other one."""
     if (moment.tzinfo is None) == (other.tzinfo is None):
         return moment
     return moment.replace(tzinfo=other.tzinfo)

@@ -1,4 +1,4 @@
-"""Conditions on parameters, variables and values from outside."""
+"""Conditions on parameters, variables and external values."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from eidrive_scenario.api.actions import (
     satisfies_rule,
 )
 
-WORDS = {"true": 1.0, "false": 0.0}
-"""What a boolean counts as."""
+BOOLEANS = {"true": 1.0, "false": 0.0}
+"""Numeric values of booleans."""
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?INF", re.ASCII)
 
 
-def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
-    """Two texts by a rule: as numbers where both are, else as words in the order of the alphabet."""
+def satisfies(text: str | None, rule: model.Rule, limit: str) -> bool:
+    """Compare two texts by a rule: as numbers if both are numbers, else in alphabetical order."""
     if text is None:
         return False
     first, second = _number(text), _number(limit)
@@ -40,91 +40,93 @@ def agrees(text: str | None, rule: model.Rule, limit: str) -> bool:
     return text <= limit
 
 
-def measured(text: str | None, rule: model.Rule, limit: str) -> tuple[Measure, ...]:
-    """What is compared, where both are numbers."""
+def numeric_measures(text: str | None, rule: model.Rule, limit: str) -> tuple[Measure, ...]:
+    """Return the compared numbers; empty if one of the texts is not a number."""
     first, second = _number(text or ""), _number(limit)
     return () if first is None or second is None else (Measure("", first, rule, second, ""),)
 
 
 def _number(text: str) -> float | None:
-    """A number as XML writes it; Python's own spellings, as 1_000, are words."""
+    """Return a number in XML notation; None for Python's own notations, as 1_000, and for other text."""
     plain = text.strip()
-    return float(plain) if NUMBER.fullmatch(plain) else WORDS.get(plain.lower())
+    return float(plain) if NUMBER.fullmatch(plain) else BOOLEANS.get(plain.lower())
 
 
 class ParameterCondition(Condition):
-    """The value of a parameter, as ParameterActions may have set it."""
+    """Value of a parameter, including changes by ParameterActions."""
 
     instant = True
     element: model.ParameterCondition
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Compare it."""
-        return agrees(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+        """Compare the value."""
+        return satisfies(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
 
     def explain(self, context: RuntimeContext) -> str:
-        """Its value."""
+        """Describe the current value."""
         value = context.parameters.get(self.element.parameter_ref)
         sign = relation(self.element.rule, self.holds(context))
         return f"parameter {self.element.parameter_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
-        """Rule and limit."""
+        """Describe rule and limit."""
         return f"parameter {self.element.parameter_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
     def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
-        """Its value."""
-        return measured(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
+        """Return the value."""
+        return numeric_measures(
+            context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value
+        )
 
 
 class VariableCondition(Condition):
-    """The value of a variable."""
+    """Value of a variable."""
 
     instant = True
     element: model.VariableCondition
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Compare it."""
-        return agrees(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+        """Compare the value."""
+        return satisfies(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
     def explain(self, context: RuntimeContext) -> str:
-        """Its value."""
+        """Describe the current value."""
         value = context.variables.get(self.element.variable_ref)
         sign = relation(self.element.rule, self.holds(context))
         return f"variable {self.element.variable_ref} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
-        """Rule and limit."""
+        """Describe rule and limit."""
         return f"variable {self.element.variable_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
     def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
-        """Its value."""
-        return measured(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
+        """Return the value."""
+        return numeric_measures(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
 
 class UserDefinedValueCondition(Condition):
-    """A value that somebody outside of the scenario gives; where nobody does it does not hold."""
+    """Value that is set from outside the scenario. Without a value the condition is false."""
 
     element: model.UserDefinedValueCondition
 
     def bind(self, context: RuntimeContext) -> None:
-        """Let the stage know that the value is wanted."""
+        """Register the request for the value."""
         context.requested_user_values.setdefault(self.element.name, self.element)
 
     def holds(self, context: RuntimeContext) -> bool:
-        """Compare it."""
-        return agrees(context.user_values.get(self.element.name), self.element.rule, self.element.value)
+        """Compare the value."""
+        return satisfies(context.user_values.get(self.element.name), self.element.rule, self.element.value)
 
     def explain(self, context: RuntimeContext) -> str:
-        """Its value."""
+        """Describe the current value."""
         value = context.user_values.get(self.element.name)
         sign = relation(self.element.rule, self.holds(context))
         return f"{self.element.name} = {value} {sign} {self.element.value}"
 
     def describe(self) -> str:
-        """Rule and limit."""
+        """Describe rule and limit."""
         return f"{self.element.name} {describe_rule(self.element.rule)} {self.element.value}"
 
     def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
-        """The value."""
-        return measured(context.user_values.get(self.element.name), self.element.rule, self.element.value)
+        """Return the value."""
+        return numeric_measures(context.user_values.get(self.element.name), self.element.rule, self.element.value)

@@ -1,1 +1,1 @@
-"""Stand-ins for controllers of other tools, one per module."""
+"""Controller models: implementations of controllers for scripted actors."""

@@ -1,4 +1,4 @@
-"""Adaptive cruise control: a set speed, and a time gap to who is ahead in the lane."""
+"""Adaptive cruise control: a set speed, and a time gap to the lead vehicle."""
 
 from __future__ import annotations
 
@@ -10,58 +10,58 @@ from eidrive_scenario.api.actions import Actor, ControllerModel, RuntimeContext,
 CLOSEST = 3.0
 """Gap to a standing vehicle [m]."""
 STOP = 1.0
-"""With less gap than this it stands at once [m]."""
+"""Gap below which the vehicle stops at once [m]."""
 LOOKOUT = 50.0
-"""So far it looks at least [m]."""
-SHARE = 0.7
-"""Of the vehicle's largest acceleration that a free road is driven with."""
+"""Minimum range [m]."""
+ACCELERATION_SHARE = 0.7
+"""Share of the vehicle's maximum acceleration that is used on a free road."""
 GAIN = 2.5
-"""Acceleration for a gap that is wide open [m/s²]."""
-OVERRULED = 1e-3
-"""A speed that differs by more than this was set by somebody else [m/s]."""
+"""Acceleration at a large gap [m/s²]."""
+SPEED_CHANGE = 1e-3
+"""Speed difference above which another action has set the speed [m/s]."""
 
 
 class AdaptiveCruise(ControllerModel):
-    """Keeps the set speed on a free road, and 3 m and a time gap behind who is ahead in its lane.
+    """Control of the set speed on a free road, and of 3 m plus a time gap behind the lead vehicle.
 
-    The law is that of esmini's ACC and ALKS controllers, so that scenarios which rely on them can be played: with the
-    gap g, the wanted gap w = 3 m + `timeGap` · max(v, v_lead) and f = min(1, g / w - 1) the acceleration is
-    2.5 f - f (v - v_set) - (1 - f) (v - min(v_set, v_lead)), within the vehicle's Performance and up to the set speed.
-    That is the speed which it is started with or which SpeedActions give; with the property `mode=override` it is
-    `setSpeed` [m/s], and SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
+    The law is that of esmini's ACC and ALKS controllers, so that scenarios for them can be run. With the gap g, the
+    wanted gap w = 3 m + `timeGap` · max(v, v_lead) and f = min(1, g / w - 1) the acceleration is 2.5 f - f (v - v_set)
+    - (1 - f) (v - min(v_set, v_lead)), within the vehicle's Performance and up to the set speed. The set speed is the
+    speed at activation, or that of SpeedActions. With the property `mode=override` it is `setSpeed` [m/s], and
+    SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
     """
 
     def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
         super().__init__(controller, context, actor)
         self.time_gap = number(controller, "timeGap", 1.5, least=0.0)
-        self.aside = number(controller, "lateralDist", 5.0, least=0.0)
-        self._alone = self.properties.get("mode") == "override"
-        self._given = number(controller, "setSpeed", None)
+        self.lateral_range = number(controller, "lateralDist", 5.0, least=0.0)
+        self._ignores_speed_actions = self.properties.get("mode") == "override"
+        self._set_speed_property = number(controller, "setSpeed", None)
 
     def on_activate(self) -> None:
-        """Drive on with the speed of now."""
+        """Start from the current speed."""
         self._last = self.actor.motion.speed
         self._set = self._last
-        if self._given is not None and self._alone:
-            self._set = self._given
+        if self._set_speed_property is not None and self._ignores_speed_actions:
+            self._set = self._set_speed_property
 
     def compute_speed(self) -> float:
-        """By the law."""
+        """Return the speed by the control law [m/s]."""
         now = self.actor.motion.speed
-        if not self._alone and abs(now - self._last) > OVERRULED:
+        if not self._ignores_speed_actions and abs(now - self._last) > SPEED_CHANGE:
             self._set = self._last = now
-        ahead = self._ahead()
-        self._last = self._free() if ahead is None else self._behind(*ahead)
+        ahead = self._find_lead()
+        self._last = self._free_road_speed() if ahead is None else self._following_speed(*ahead)
         return self._last
 
-    def _free(self) -> float:
+    def _free_road_speed(self) -> float:
         _, faster, slower = self.actor.limits()
         now, dt = self._last, self.context.dt
-        acceleration = min(max((self._set - now) * SHARE * faster, -slower), SHARE * faster)
+        acceleration = min(max((self._set - now) * ACCELERATION_SHARE * faster, -slower), ACCELERATION_SHARE * faster)
         then = now + acceleration * dt
         return self._set if abs(then - self._set) > abs(now - self._set) else then
 
-    def _behind(self, gap: float, lead: float) -> float:
+    def _following_speed(self, gap: float, lead: float) -> float:
         if gap < STOP:
             return 0.0
         _, faster, slower = self.actor.limits()
@@ -72,8 +72,8 @@ class AdaptiveCruise(ControllerModel):
         then = now + min(max(acceleration, -slower), faster) * self.context.dt
         return max(0.0, min(then, max(now, self._set)))
 
-    def _ahead(self) -> tuple[float, float] | None:
-        """Gap to [m] and speed of [m/s] the nearest one in the way."""
+    def _find_lead(self) -> tuple[float, float] | None:
+        """Return gap [m] and speed [m/s] of the nearest vehicle in the path; None if there is none."""
         found = [
             (gap, self.context.speed(name))
             for name, other in self.context.actors.items()
@@ -88,31 +88,34 @@ class AdaptiveCruise(ControllerModel):
             apart = roads.distance(here, there)
             slower = self.actor.limits()[2]
             reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / slower) if slower > 0.0 else math.inf
-            if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.aside:
-                same = here.lane == there.lane if here.road == there.road else self._beside(apart[1]) is False
+            if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.lateral_range:
+                same = here.lane == there.lane if here.road == there.road else self._is_beside_lane(apart[1]) is False
                 gap = apart[0] - self._overhang(name)
                 if same and gap > 0.0:
                     return gap
-        return self._close(name)
+        return self._bumper_gap(name)
 
-    def _beside(self, across: float) -> bool:
-        """True for a place that is further aside than half a lane."""
+    def _is_beside_lane(self, across: float) -> bool:
+        """Return True if a lateral distance [m] exceeds half the lane width."""
         here, roads = self.context.location(self.actor.name), self.context.roads
         return here is None or roads is None or abs(across) > 0.5 * roads.lane_width(here.road, here.lane, here.s)
 
-    def _close(self, name: str) -> float | None:
-        """The gap to who is right before the bumper in whatever lane, more to the right than to the left."""
+    def _bumper_gap(self, name: str) -> float | None:
+        """Return the gap to a vehicle just ahead of the bumper in any lane [m].
+
+        The lateral tolerance is larger to the right than to the left.
+        """
         me = self.actor.name
-        along, aside = (
+        along, lateral = (
             distance(self.context, me, name, frame="entity", kind=kind, freespace=True)
             for kind in ("longitudinal", "lateral")
         )
         faster_by = max(0.0, self._last - self.context.speed(name))
         length = entity_box(self.context, name)[3]
-        return along if 0.0 < along < 1.0 + length + 0.5 * faster_by and -0.5 < aside < 0.2 else None
+        return along if 0.0 < along < 1.0 + length + 0.5 * faster_by and -0.5 < lateral < 0.2 else None
 
     def _overhang(self, name: str) -> float:
-        """From reference point to reference point, less the gap between the two [m]."""
+        """Return the distance between the reference points minus the gap between the boxes [m]."""
         mine, theirs = self.actor.entity.bounding_box, self.context.actors[name].entity.bounding_box
         turn = math.cos(self.context.pose(self.actor.name).h - self.context.pose(name).h)
         rear = 0.5 * theirs.dimensions.length - math.copysign(theirs.center.x, turn)

@@ -1,4 +1,4 @@
-"""A driver outside of the run: the entity stands where it is until somebody says where it goes."""
+"""External controller: the entity keeps its pose until another program sets one."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from eidrive_scenario.api.actions import ControllerModel
 
 
 class ExternalDriver(ControllerModel):
-    """Stands still, and goes where `Simulation.set_pose` puts the entity: there it is in the next view.
+    """Standstill, or the pose of `Simulation.set_pose`, which applies in the next view.
 
-    For controllers that get poses from another program (esmini's ExternalController), or from somebody at the keyboard
-    (InteractiveController), and for runs without them. Its speed is the one that comes with the pose.
+    It is the controller model for poses of another program (esmini's ExternalController) or of keyboard input
+    (InteractiveController), and for runs without them. Its speed is that of the last pose.
     """
 
     accepts_external_poses = True
 
     def on_activate(self) -> None:
-        """Nothing to prepare."""
+        """Do nothing: the controller has no state."""
 
     def step(self) -> None:
-        """Move to the pose that was given since the last step, else stay."""
+        """Move to the pose that was set since the last step, else stand still."""
         name, motion = self.actor.name, self.actor.motion
         given = self.context.external_poses.pop(name, None)
         if not (self.actor.longitudinal or self.actor.lateral):
@@ -28,5 +28,5 @@ class ExternalDriver(ControllerModel):
             motion.move_to(given.pose, land=self.context.roads is not None)
 
     def compute_speed(self) -> float:
-        """That of the last pose [m/s]."""
+        """Return the speed of the last pose [m/s]."""
         return self.actor.motion.speed

@@ -1,4 +1,4 @@
-"""The careful and competent human driver of UN Regulation No. 157, Annex 4 Appendix 3."""
+"""Careful and competent human driver of UN Regulation No. 157, Annex 4 Appendix 3."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from eidrive_behaviors.controllers.road_ahead import LeadObject
 from eidrive_behaviors.controllers.safety_models import FULL, JERK_TIME, REACTION, EgoKinematics, G, SafetyModel
 
 TINY = 1e-9
-WANDERING = 0.375
-"""Further than this from the middle of its lane a vehicle is leaving it [m] (Table 1, risk perception point)."""
-HARD = 5.0
-"""A lead that brakes harder than this is a risk [m/s²] (3.3, deceleration)."""
+LEAVING_OFFSET = 0.375
+"""Distance from the lane center above which a vehicle leaves its lane [m] (Table 1, risk perception point)."""
+HARD_BRAKING = 5.0
+"""Minimum deceleration of a lead vehicle that is a risk [m/s²] (3.3, deceleration)."""
 DANGEROUS = 2.0
-"""Time to collision of a cut-in, or headway in the two other cases, below which it is dangerous [s] (3.1 to 3.3)."""
+"""Dangerous time to collision of a cut-in, or headway in the two other cases [s] (3.1 to 3.3)."""
 EMERGENCY = 0.85 * G
 """Full deceleration after full wrap [m/s²] (Table 1; derived from UN Regulation No. 152)."""
 RELEASE = 0.4
-"""Deceleration as the foot leaves the pedal [m/s²] (JRC-FSM)."""
+"""Deceleration when the pedal is released [m/s²] (JRC-FSM)."""
 
 
 class Risk(Enum):
-    """The three scenarios of the model."""
+    """Scenarios of the model."""
 
     NONE = auto()
     CUT_IN = auto()
@@ -32,7 +32,7 @@ class Risk(Enum):
 
 
 class DriverPhase(Enum):
-    """Of the driver: not at risk, evaluating one, moving the foot, braking."""
+    """Phase of the driver: no risk, evaluation of a risk, reaction, braking."""
 
     CALM = auto()
     PERCEIVING = auto()
@@ -42,14 +42,14 @@ class DriverPhase(Enum):
 
 @dataclass(frozen=True)
 class ReferenceDriverSettings:
-    """What scenarios may say of the driver.
+    """Settings of the driver.
 
     evaluation    risk evaluation time [s]
-    pedestrians   the same for pedestrians who walk towards the lane [s]
-    distance      how far a cutting-in vehicle moves while it is evaluated, in place of the time [m]; None: by time
-    moved         a cut-in begins with so much motion sideways [m]; None: 0.375 m from the middle of the lane
-    emergency     time to collision below which the car's emergency brake helps after full wrap [s]
-    full_stop     True: who once brakes does so until the car stands
+    pedestrians   risk evaluation time for pedestrians that walk toward the lane [s]
+    distance      lateral motion of a cutting-in vehicle during evaluation, instead of the time [m]; None: by time
+    moved         lateral motion at which a cut-in begins [m]; None: 0.375 m from the lane center
+    emergency     time to collision below which the car's emergency brake assists after full wrap [s]
+    full_stop     True: braking continues until standstill
     always        True: every perceived risk is dangerous
     """
 
@@ -63,11 +63,12 @@ class ReferenceDriverSettings:
 
 
 class ReferenceDriver(SafetyModel):
-    """Perceives a risk, evaluates it for 0.4 s, takes 0.75 s to react, and brakes: 0.774 G, reached in 0.6 s.
+    """Driver that perceives a risk, evaluates it for 0.4 s, reacts after 0.75 s and brakes by 0.774 G within 0.6 s.
 
-    A cut-in is perceived at 0.375 m from the middle of the lane and dangerous below 2 s to collision; a cut-out that
-    reveals somebody, and a lead that brakes by more than 5 m/s², below 2 s of headway. After full wrap the emergency
-    brake helps, by 0.85 G in 0.6 s; the two slopes add up, which the regulation leaves open.
+    A cut-in is perceived at 0.375 m from the lane center and is dangerous below 2 s to collision. A cut-out that
+    reveals another road user, and a lead vehicle that brakes by more than 5 m/s², are dangerous below 2 s of headway.
+    After full wrap the emergency brake assists by 0.85 G within 0.6 s; both slopes add up, which the regulation leaves
+    open.
     """
 
     reach: ClassVar[float] = 100.0
@@ -81,31 +82,31 @@ class ReferenceDriver(SafetyModel):
         self._emergency = False
         self._began: dict[str, float] = {}
 
-    def decide(self, own: EgoKinematics, seen: list[LeadObject]) -> float | None:
-        """One step of perceiving, reacting or braking."""
-        self._watch(seen)
-        self._focus(seen)
-        self._advance(own)
+    def decide(self, ego: EgoKinematics, seen: list[LeadObject]) -> float | None:
+        """Return the acceleration of one step [m/s²] after an update of perception, reaction and braking."""
+        self._track_approaches(seen)
+        self._select_lead(seen)
+        self._update_phase(ego)
         lead = self._lead
         if lead is not None and lead.covers and lead.time_to_collision < self.settings.emergency:
             self._emergency = True
         if self.phase is not DriverPhase.BRAKING and not self._emergency:
             return None
-        return self._braking(own)
+        return self._braking(ego)
 
-    def following_distance(self, own: EgoKinematics, lead: LeadObject) -> float:
-        """Two seconds and two meters, the headway below which a lead is dangerous."""
-        return 2.0 + DANGEROUS * own.speed
+    def following_distance(self, ego: EgoKinematics, lead: LeadObject) -> float:
+        """Return 2 m plus 2 s of the own speed, the headway below which a lead is dangerous [m]."""
+        return 2.0 + DANGEROUS * ego.speed
 
-    def _watch(self, seen: list[LeadObject]) -> None:
-        """Remember where those who move towards the lane began to."""
-        self._began = {one.name: self._began.get(one.name, one.across) for one in seen if one.nearing > TINY}
+    def _track_approaches(self, seen: list[LeadObject]) -> None:
+        """Store the lateral positions at which objects began to move toward the lane."""
+        self._began = {other.name: self._began.get(other.name, other.across) for other in seen if other.nearing > TINY}
 
-    def _focus(self, seen: list[LeadObject]) -> None:
+    def _select_lead(self, seen: list[LeadObject]) -> None:
         held = self.phase is not DriverPhase.CALM and self.settings.full_stop
         if held and self._lead is not None:
             name = self._lead.name
-            self._lead = next((one for one in seen if one.name == name), self._lead)
+            self._lead = next((other for other in seen if other.name == name), self._lead)
             return
         before = self._lead.name if self._lead is not None else None
         self._lead, risk = self._most_urgent(seen)
@@ -114,62 +115,65 @@ class ReferenceDriver(SafetyModel):
             self.risk = risk
 
     def _most_urgent(self, seen: list[LeadObject]) -> tuple[LeadObject | None, Risk]:
-        """The nearest one that is in the lane or cuts in; behind one that leaves the lane who is met first."""
-        found: LeadObject | None = None
+        """Return the nearest object that is in the lane or cuts in.
+
+        If it leaves the lane, the object behind it with the smaller time to collision replaces it.
+        """
+        nearest: LeadObject | None = None
         risk = Risk.NONE
-        for one in seen:
-            its = self._risk_of(one)
-            if its is None:
+        for other in seen:
+            other_risk = self._risk_of(other)
+            if other_risk is None:
                 continue
-            if found is None:
-                found, risk = one, its
-            elif risk is Risk.CUT_OUT and one.lanes == 0 and one.time_to_collision < found.time_to_collision:
-                found = one
-        return found, risk
+            if nearest is None:
+                nearest, risk = other, other_risk
+            elif risk is Risk.CUT_OUT and other.lanes == 0 and other.time_to_collision < nearest.time_to_collision:
+                nearest = other
+        return nearest, risk
 
-    def _risk_of(self, one: LeadObject) -> Risk | None:
-        """What the driver makes of one; None for one that is beside the lane and stays there."""
-        if one.walks:
-            return Risk.CUT_IN if one.nearing > TINY else None
-        if one.lanes == 0:
-            if abs(one.towards) > WANDERING and one.nearing < -TINY:
+    def _risk_of(self, other: LeadObject) -> Risk | None:
+        """Return the risk of one object; None for an object that stays beside the lane."""
+        if other.walks:
+            return Risk.CUT_IN if other.nearing > TINY else None
+        if other.lanes == 0:
+            if abs(other.towards) > LEAVING_OFFSET and other.nearing < -TINY:
                 return Risk.CUT_OUT
-            return Risk.DECELERATION if one.change < -HARD else Risk.NONE
-        return Risk.CUT_IN if self._cuts_in(one) else None
+            return Risk.DECELERATION if other.change < -HARD_BRAKING else Risk.NONE
+        return Risk.CUT_IN if self._cuts_in(other) else None
 
-    def _cuts_in(self, one: LeadObject) -> bool:
-        if one.name not in self._began:
+    def _cuts_in(self, other: LeadObject) -> bool:
+        if other.name not in self._began:
             return False
         if self.settings.moved is None:
-            return one.towards > WANDERING
-        return abs(one.across - self._began[one.name]) > self.settings.moved
+            return other.towards > LEAVING_OFFSET
+        return abs(other.across - self._began[other.name]) > self.settings.moved
 
-    def _advance(self, own: EgoKinematics) -> None:
+    def _update_phase(self, ego: EgoKinematics) -> None:
         lead = self._lead
-        if lead is None or own.speed <= TINY:
+        if lead is None or ego.speed <= TINY:
             self.phase, self.risk, self._emergency = DriverPhase.CALM, Risk.NONE, False
         elif self.phase is DriverPhase.CALM:
             if self._at_risk(lead):
                 self.phase, self._perceived_at = DriverPhase.PERCEIVING, lead.across
                 self._left = self.settings.pedestrians if lead.walks else self.settings.evaluation
         elif self.phase is DriverPhase.PERCEIVING:
-            self._left -= own.dt
+            self._left -= ego.dt
             if self._evaluated(lead):
                 self.phase, self._left = DriverPhase.REACTING, REACTION
         elif self.phase is DriverPhase.REACTING:
-            self._left -= own.dt
-            if not self._dangerous(own, lead):
+            self._left -= ego.dt
+            if not self._dangerous(ego, lead):
                 self.phase, self.risk = DriverPhase.CALM, Risk.NONE
             elif self._left < TINY:
                 self.phase = DriverPhase.BRAKING
-        elif not self.settings.full_stop and not self._dangerous(own, lead) and lead.closing < TINY:
+        elif not self.settings.full_stop and not self._dangerous(ego, lead) and lead.closing < TINY:
             self.phase, self.risk = DriverPhase.CALM, Risk.NONE
 
     def _at_risk(self, lead: LeadObject) -> bool:
         if self.risk is Risk.CUT_OUT:
             return lead.closing > TINY
         if self.risk is Risk.DECELERATION:
-            return lead.change < -HARD
+            return lead.change < -HARD_BRAKING
         return self.risk is Risk.CUT_IN and (lead.closing > TINY if lead.walks else self._cuts_in(lead))
 
     def _evaluated(self, lead: LeadObject) -> bool:
@@ -177,19 +181,19 @@ class ReferenceDriver(SafetyModel):
             return abs(lead.across - self._perceived_at) > self.settings.distance
         return self._left < TINY
 
-    def _dangerous(self, own: EgoKinematics, lead: LeadObject) -> bool:
+    def _dangerous(self, ego: EgoKinematics, lead: LeadObject) -> bool:
         if self.settings.always:
             return True
         if self.risk is Risk.CUT_IN:
             return lead.time_to_collision < DANGEROUS
-        return lead.headway(own.speed) < DANGEROUS
+        return lead.headway(ego.speed) < DANGEROUS
 
-    def _braking(self, own: EgoKinematics) -> float:
-        then = own.acceleration
+    def _braking(self, ego: EgoKinematics) -> float:
+        then = ego.acceleration
         if self.phase is DriverPhase.REACTING:
             then = min(then, -RELEASE)
         if self.phase is DriverPhase.BRAKING:
-            then -= FULL / JERK_TIME * own.dt
+            then -= FULL / JERK_TIME * ego.dt
         if self._emergency:
-            then -= EMERGENCY / JERK_TIME * own.dt
+            then -= EMERGENCY / JERK_TIME * ego.dt
         return max(then, -EMERGENCY if self._emergency else -FULL)

@@ -1,4 +1,4 @@
-"""What the driver of a car sees ahead of it: who is there, how far away, and how fast the two come nearer."""
+"""Perception of the road ahead: lead objects, their gaps and their closing speeds."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from eidrive_scenario.api.actions import Actor, RuntimeContext, model
 from eidrive_scenario.api.common import LaneLocation
 
 Span = tuple[float, float]
-"""From, to [m]"""
+"""Interval from, to [m]."""
 
 
 @dataclass(frozen=True)
 class LeadObject:
-    """Somebody ahead, in coordinates of the road: s along the own driving direction, t to the left of it.
+    """Object ahead in road coordinates: s along the own driving direction, t to the left of it.
 
-    name        of the entity
-    gap         free space along the road [m], 0 where the two overlap
-    aside       free space across the road [m], 0 where the two overlap
-    closing     by how much the own speed along the road is higher [m/s]
-    nearing     speed at which the two come nearer to each other across the road [m/s]
-    speed       of the other, along the road [m/s]
-    change      acceleration of the other, along its own heading [m/s²]
-    sideways    speed of the other across the road, whatever its direction [m/s]
-    lanes       0 in the own lane, 1 in the next one to the left, -1 to the right; further away is not seen
-    towards     how far its middle is from the middle of its lane, on our side [m]; negative on the far side
-    intrusion   how far its front wheel on our side is inside our lane [m]; negative outside
-    covers      True where it is as wide as our front, or all before it: a full wrap
-    across      t of its reference point from ours [m]
+    name        name of the entity
+    gap         free space along the road [m], 0 if both overlap
+    aside       free space across the road [m], 0 if both overlap
+    closing     own speed along the road minus the speed of the object [m/s]
+    nearing     closing speed across the road [m/s]
+    speed       speed of the object along the road [m/s]
+    change      acceleration of the object along its heading [m/s²]
+    sideways    absolute speed of the object across the road [m/s]
+    lanes       0 in the own lane, 1 in the next lane to the left, -1 to the right; further lanes are ignored
+    towards     distance of its center from the center of its lane, toward the own side [m]; negative on the far side
+    intrusion   distance of its near front wheel inside the own lane [m]; negative outside
+    covers      True if it covers the full width of the own front, or lies within it: a full wrap
+    across      t of its reference point relative to the own one [m]
     walks       True for a pedestrian
     """
 
@@ -49,38 +49,38 @@ class LeadObject:
 
     @property
     def time_to_collision(self) -> float:
-        """Gap by closing speed [s]; infinite where it does not close."""
+        """Gap divided by closing speed [s]; infinite if it does not close."""
         return self.gap / self.closing if self.closing > 0.0 else math.inf
 
     def headway(self, speed: float) -> float:
-        """Time headway at the own speed [s]; infinite where the gap does not close."""
+        """Return the time headway at the own speed [s]; infinite if the gap does not close."""
         return self.gap / speed if self.closing > 0.0 and speed > 0.0 else math.inf
 
 
 class RoadAhead:
-    """Looks along the road of one actor, up to a range [m].
+    """Search along the road of one actor, up to a range [m].
 
-    tolerance  by which a full wrap may miss the edges of the front [m]
-    later      by how much the others are ahead of the actor in time [s]
+    tolerance  maximum lateral gap to the edges of the front at which a full wrap counts [m]
+    later      time by which the states of other actors are predicted [s]
     """
 
     def __init__(
         self, context: RuntimeContext, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0
     ) -> None:
-        self._stage, self._actor, self._reach = context, actor, reach
+        self._context, self._actor, self._reach = context, actor, reach
         self._tolerance, self._later = tolerance, later
 
     def find_lead_objects(self) -> list[LeadObject]:
-        """Those ahead in this lane or the next ones, and pedestrians wherever they are; the nearest first."""
-        here, roads = self._stage.location(self._actor.name), self._stage.roads
+        """Return objects ahead in the own and adjacent lanes, and pedestrians in any lane, by ascending gap."""
+        here, roads = self._context.location(self._actor.name), self._context.roads
         if here is None or roads is None:
             return []
-        others = (other for other in self._stage.actors.values() if other is not self._actor and other.present)
-        found = (self._seen(here, other) for other in others if other.name in self._stage.view)
-        return sorted((one for one in found if one is not None), key=lambda one: one.gap)
+        others = (other for other in self._context.actors.values() if other is not self._actor and other.present)
+        found = (self._observe(here, other) for other in others if other.name in self._context.view)
+        return sorted((candidate for candidate in found if candidate is not None), key=lambda candidate: candidate.gap)
 
-    def _seen(self, here: LaneLocation, other: Actor) -> LeadObject | None:
-        roads, there = self._stage.roads, self._stage.location(other.name)
+    def _observe(self, here: LaneLocation, other: Actor) -> LeadObject | None:
+        roads, there = self._context.roads, self._context.location(other.name)
         apart = roads.distance(here, there) if roads is not None and there is not None else None
         if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
             return None
@@ -94,7 +94,7 @@ class RoadAhead:
         along, across = self._velocity(self._actor, here)
         its_along, its_across = self._velocity(other, there)
         moved = (apart[0] + its_along * self._later, apart[1] + its_across * self._later)
-        mine, theirs = self._box(self._actor, here), self._box(other, there, *moved)
+        mine, theirs = self._extents(self._actor, here), self._extents(other, there, *moved)
         border = 0.5 * width - side * here.offset * way
         return LeadObject(
             name=other.name,
@@ -107,25 +107,25 @@ class RoadAhead:
             sideways=abs(its_across),
             lanes=0 if own else int(side),
             towards=-side * (there.offset * way + 0.5 * sum(theirs[1]) - apart[1]),
-            intrusion=border - side * self._wheel(other, there, moved[1], side),
+            intrusion=border - side * self._front_wheel_offset(other, there, moved[1], side),
             covers=self._covers(mine[1], theirs[1]),
             across=moved[1],
             walks=walks,
         )
 
-    def _turn(self, actor: Actor, place: LaneLocation) -> float:
-        """Angle of an actor to the driving direction of the lane below the observer's road frame [rad]."""
-        roads = self._stage.roads
+    def _relative_heading(self, actor: Actor, place: LaneLocation) -> float:
+        """Return the angle of an actor to the own driving direction at a lane location [rad]."""
+        roads = self._context.roads
         assert roads is not None
         lane = roads.lane_pose_at(*place[:4]).h
-        here = self._stage.location(self._actor.name)
+        here = self._context.location(self._actor.name)
         assert here is not None
         flip = 0.0 if roads.driving_direction(here.road, here.lane) > 0 else math.pi
-        return self._stage.pose(actor.name).h - lane - flip
+        return self._context.pose(actor.name).h - lane - flip
 
-    def _box(self, actor: Actor, place: LaneLocation, along: float = 0.0, across: float = 0.0) -> tuple[Span, Span]:
-        """What an actor takes up along and across the road, from the observer's reference point on [m]."""
-        turn, bounds = self._turn(actor, place), actor.entity.bounding_box
+    def _extents(self, actor: Actor, place: LaneLocation, along: float = 0.0, across: float = 0.0) -> tuple[Span, Span]:
+        """Return the extents of an actor along and across the road, relative to the own reference point [m]."""
+        turn, bounds = self._relative_heading(actor, place), actor.entity.bounding_box
         cos, sin = math.cos(turn), math.sin(turn)
         x = along + bounds.center.x * cos - bounds.center.y * sin
         y = across + bounds.center.x * sin + bounds.center.y * cos
@@ -133,9 +133,9 @@ class RoadAhead:
         half_y = 0.5 * (bounds.dimensions.length * abs(sin) + bounds.dimensions.width * abs(cos))
         return (x - half_x, x + half_x), (y - half_y, y + half_y)
 
-    def _wheel(self, actor: Actor, place: LaneLocation, across: float, side: float) -> float:
-        """t of the corner beside the front axle that is nearest to the observer [m]."""
-        turn, bounds = self._turn(actor, place), actor.entity.bounding_box
+    def _front_wheel_offset(self, actor: Actor, place: LaneLocation, across: float, side: float) -> float:
+        """Return t of the corner beside the front axle that is nearest to the own actor [m]."""
+        turn, bounds = self._relative_heading(actor, place), actor.entity.bounding_box
         axles = actor.entity.axles if isinstance(actor.entity, model.Vehicle) else None
         front = axles.front_axle if axles is not None else None
         x = front.position_x if front is not None else bounds.center.x + 0.5 * bounds.dimensions.length
@@ -143,20 +143,20 @@ class RoadAhead:
         return across + x * math.sin(turn) + y * math.cos(turn)
 
     def _velocity(self, actor: Actor, place: LaneLocation) -> tuple[float, float]:
-        """Along and across the road [m/s]."""
-        view = self._stage.view
+        """Return the velocity along and across the road [m/s]."""
+        view = self._context.view
         vx, vy, _ = view.velocity[view.rows[actor.name]].tolist()
-        axis = self._stage.pose(actor.name).h - self._turn(actor, place)
+        axis = self._context.pose(actor.name).h - self._relative_heading(actor, place)
         cos, sin = math.cos(axis), math.sin(axis)
         return vx * cos + vy * sin, vy * cos - vx * sin
 
     def _change(self, actor: Actor) -> float:
-        view = self._stage.view
+        view = self._context.view
         ax, ay, _ = view.acceleration[view.rows[actor.name]].tolist()
-        h = self._stage.pose(actor.name).h
+        h = self._context.pose(actor.name).h
         return float(ax * math.cos(h) + ay * math.sin(h))
 
     def _covers(self, mine: Span, theirs: Span) -> bool:
-        slack = self._tolerance
-        inside = theirs[0] >= mine[0] - slack and theirs[1] <= mine[1] + slack
-        return inside or (theirs[0] <= mine[0] + slack and theirs[1] >= mine[1] - slack)
+        tolerance = self._tolerance
+        inside = theirs[0] >= mine[0] - tolerance and theirs[1] <= mine[1] + tolerance
+        return inside or (theirs[0] <= mine[0] + tolerance and theirs[1] >= mine[1] - tolerance)

@@ -127,7 +127,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def error(self, message: str, hint: str = "") -> ScenarioError:
         """An error at the place of this action in the file."""
         where = self.action
-        return ScenarioError(Diagnostic(f"{type(where).__name__} {message}", hint, where.source, where.line))
+        return ScenarioError(Diagnostic(f"{type(where).__name__}: {message}", hint, where.source, where.line))
 
 
 def _is_finite(value: object) -> bool:
