@@ -1,15 +1,15 @@
-"""Everything that this package raises on purpose.
+"""Exceptions of this package, and the diagnostics of invalid input.
 
 EidriveError
-├── InputError           what a person typed is wrong: one or many Problems, each with file, line and remedy
+├── InputError           invalid user input: one or several diagnostics, each with file, line and hint
 │   ├── ScenarioError    an OpenSCENARIO file
-│   │   └── ConstraintError  a parameter's value is one that the file itself rules out
+│   │   └── ConstraintError  a parameter's value violates its ConstraintGroups
 │   ├── RoadError        an OpenDRIVE file
-│   └── SettingError     an option, a controller's property, a channel profile
-├── RegistryError        two extensions claim one name, or one does not load
-└── SimulationError      the run itself broke
-    ├── ExtensionError   an extension raised an exception or returned something invalid
-    └── WallLimitError   a run took longer than its limit of wall time
+│   └── SettingError     an option, a controller property, a channel profile
+├── RegistryError        two extensions have the same name, or one does not load
+└── SimulationError      the run was aborted by an internal error
+    ├── ExtensionError   an extension raised an exception or returned an invalid result
+    └── WallLimitError   a run exceeded its limit of wall time
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ MAX_DIAGNOSTICS = 200
 MAX_TEXT = 1000
 """Maximum number of characters of a message."""
 _MAX_WORD = 100
-"""Maximum number of characters of a word that is compared with others."""
+"""Maximum number of characters of a word for which similar words are searched."""
 _MAX_CANDIDATES = 2000
-"""Maximum number of words that a misspelt one is compared with."""
+"""Maximum number of words with which a misspelled word is compared."""
 
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One thing that is wrong with an input, where it stands, and what would be right."""
+    """One error, warning or note about an input: the message, a hint for its correction, and the location."""
 
     message: str
     hint: str = ""
     source: str = ""
     line: int | None = None
     rule: str = ""
-    """Which rule of `eidrive check` found it, where one did; docs/checks.md says more about it."""
+    """Name of the rule of `eidrive check` that is violated (see docs/checks.md); "" for errors outside of rules."""
 
     def __post_init__(self) -> None:
         if len(self.message) > MAX_TEXT or len(self.hint) > MAX_TEXT:
@@ -46,17 +46,17 @@ class Diagnostic:
             object.__setattr__(self, "hint", shortened(self.hint))
 
     def __str__(self) -> str:
-        place = f"{self.source}:{self.line}" if self.line is not None else self.source
-        head = f"{place}: {self.message}" if place else self.message
+        location = f"{self.source}:{self.line}" if self.line is not None else self.source
+        head = f"{location}: {self.message}" if location else self.message
         return f"{head}; {self.hint}" if self.hint else head
 
 
 class EidriveError(Exception):
-    """Base of all errors of this package."""
+    """Base class of all exceptions of this package."""
 
 
 class InputError(EidriveError):
-    """Invalid input. `diagnostics` holds all diagnostics in the order of the file."""
+    """Invalid user input. `diagnostics` holds all diagnostics in the order of the file."""
 
     def __init__(self, diagnostics: Diagnostic | Sequence[Diagnostic]) -> None:
         self.diagnostics: tuple[Diagnostic, ...] = (
@@ -69,44 +69,44 @@ class InputError(EidriveError):
 
 
 class ScenarioError(InputError):
-    """An OpenSCENARIO file is wrong."""
+    """Invalid OpenSCENARIO file."""
 
 
 class ConstraintError(ScenarioError):
-    """Parameters have values that their constraints rule out, and nothing else is wrong.
+    """Violation of parameter constraints, without any other error.
 
-    The standard has such a scenario not evaluated: one run of many is left out, not failed.
+    By the standard such a scenario is not evaluated: a run of a distribution is skipped, not failed.
     """
 
 
 class RoadError(InputError):
-    """An OpenDRIVE file is wrong."""
+    """Invalid OpenDRIVE file."""
 
 
 class SettingError(InputError):
-    """An option, a controller's property or a profile is wrong."""
+    """Invalid option, controller property or profile."""
 
 
 class RegistryError(EidriveError):
-    """Two extensions claim one name, or an extension does not load."""
+    """Duplicate name of extensions, or an extension that does not load."""
 
 
 class SimulationError(EidriveError):
-    """The run itself broke."""
+    """Run that was aborted by an internal error."""
 
     def as_json(self) -> dict[str, Any]:
-        """Return what `--json` prints of a run that was aborted by this error."""
+        """Return the JSON object that `--json` prints for a run that was aborted by this error."""
         return {"kind": "run", "message": str(self)}
 
 
 @dataclass(frozen=True)
 class ExtensionPlace:
-    """An extension at work: what it is, for whom, when, and the line of its code.
+    """Call of an extension: the extension, the station, actor or element, the time, and the line of its code.
 
     kind      singular of the entry-point group (detector, planner, …), or observer
-    name      of the entry point; of an observer, its class
+    name      name of the entry point; class of an observer
     value     module and object of the entry point
-    subject   for whom it was called: station 'Ego', actor 'Ego', or the place of an element in the file
+    subject   station 'Ego', actor 'Ego', or the location of an element in the file
     time      simulated time [s]; None before the run
     """
 
@@ -127,12 +127,12 @@ class ExtensionPlace:
         return f"{place}{self.kind} {self.name!r}{value}{subject}{time}"
 
     def as_json(self) -> dict[str, Any]:
-        """Return the fields with their names, without those that are not known."""
+        """Return the fields by name, without unknown ones."""
         return {key: value for key, value in asdict(self).items() if value not in ("", None)}
 
 
 class ExtensionError(SimulationError):
-    """An extension raised an exception or returned something invalid; `place` says which one and where."""
+    """Exception or invalid result of the extension that `place` identifies."""
 
     def __init__(self, place: ExtensionPlace, description: str) -> None:
         super().__init__(f"{place}: {description}")
@@ -147,11 +147,11 @@ class ExtensionError(SimulationError):
 
 
 class WallLimitError(SimulationError):
-    """A run or a check took longer than its limit of wall time.
+    """Run or check that exceeded its limit of wall time.
 
-    limit   [s] of wall time
-    place   the extension that was running; None if none was
-    time    simulated time [s] that the run had reached; None before the run
+    limit   wall time [s]
+    place   extension that was running; None if none was
+    time    simulated time of the run [s]; None before the run
     where   `file:line in function` that was running
     """
 
@@ -175,9 +175,9 @@ class WallLimitError(SimulationError):
 
 
 class InvalidResult(Exception):
-    """An extension returned something that cannot be used; the run reports it as ExtensionError.
+    """Invalid result of an extension; the run reports it as ExtensionError.
 
-    extension  the object whose `method` returned it
+    extension  object whose `method` returned the result
     """
 
     def __init__(self, extension: object, method: str, description: str) -> None:
@@ -206,21 +206,32 @@ class ErrorCollector:
         return True
 
     def raise_if_any(self) -> None:
-        """Raise InputError if diagnostics are stored, each once."""
+        """Raise InputError with the stored diagnostics, each once, if there are any."""
         if self._diagnostics:
             raise InputError(list(dict.fromkeys(self._diagnostics)))
 
 
-def capped(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """The first MAX_DIAGNOSTICS of several diagnostics, and one that counts the others."""
-    shown = list(diagnostics[:MAX_DIAGNOSTICS])
-    if len(diagnostics) > MAX_DIAGNOSTICS:
-        shown.append(Diagnostic(f"{len(diagnostics) - MAX_DIAGNOSTICS} more are not listed", "", shown[-1].source))
-    return shown
+def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return each diagnostic once: files in the order of their first diagnostic, lines of a file ascending."""
+    unique = list(dict.fromkeys(diagnostics))
+    files = {source: number for number, source in enumerate(dict.fromkeys(one.source for one in unique))}
+    return sorted(unique, key=lambda diagnostic: (files[diagnostic.source], diagnostic.line or 0))
+
+
+def limit_diagnostics(diagnostics: Sequence[Diagnostic], count: int = 0) -> list[Diagnostic]:
+    """Return the first MAX_DIAGNOSTICS diagnostics, and one with the number of the others.
+
+    count  number of further diagnostics that were not collected
+    """
+    if count == 0 and len(diagnostics) <= MAX_DIAGNOSTICS + 1:
+        return list(diagnostics)  # one more diagnostic takes no more room than its count
+    listed = list(diagnostics[:MAX_DIAGNOSTICS])
+    unlisted = len(diagnostics) - len(listed) + count
+    return [*listed, Diagnostic(f"{unlisted} more are not listed", "", listed[-1].source, listed[-1].line)]
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:
-    """A text of at most `length` characters: the middle of a longer one is left out."""
+    """Return a text of at most `length` characters; the middle of a longer one is omitted."""
     if len(text) <= length:
         return text
     half = (length - 3) // 2
@@ -228,7 +239,7 @@ def shortened(text: str, length: int = MAX_TEXT) -> str:
 
 
 def quoted(value: object, length: int = 200) -> str:
-    """A value as a message quotes it: its `repr`, shortened, at a cost that does not depend on its size."""
+    """Return the shortened `repr` of a value for a message, at a cost that does not depend on its size."""
     if isinstance(value, str | bytes):
         return repr(shortened(value, length) if isinstance(value, str) else value[:length])
     if isinstance(value, int) and abs(value) > 10**18:
@@ -241,18 +252,18 @@ def quoted(value: object, length: int = 200) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """What would be right in place of `word`: the nearest of `known`, or all of them when none is near.
+    """Return a hint for an unknown word: the most similar of `known`, or a list of them if none is similar.
 
-    A word that is too long to be a misspelling, or one of too many, is not compared: the cost stays small.
+    To limit the cost, no similar word is searched if the word is too long or the known ones are too many.
     """
     candidates = sorted(known)
     if len(word) <= _MAX_WORD and len(candidates) <= _MAX_CANDIDATES:
-        near = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
-        if not near:
+        similar = difflib.get_close_matches(word, candidates, n=1, cutoff=0.6)
+        if not similar:
             lowered = {candidate.lower(): candidate for candidate in candidates}
-            near = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
-        if near:
-            return f"did you mean {near[0]!r}?"
+            similar = [lowered[match] for match in difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)]
+        if similar:
+            return f"did you mean {similar[0]!r}?"
     if not candidates:
         return "none is known here"
     shown = ", ".join(shortened(name, _MAX_WORD) for name in candidates[:12])

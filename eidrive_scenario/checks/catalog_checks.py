@@ -1,12 +1,16 @@
-"""Check of a catalog file by itself, without a scenario that uses it."""
+"""Check of a catalog file without a scenario that uses it."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from eidrive_scenario.checks.registry import check_rule_names
+from eidrive_scenario.checks.report import CheckReport
+from eidrive_scenario.checks.rule import Level
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario.catalogs import twins_in
-from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector, sort_diagnostics
+from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import OpenScenario
 from eidrive_scenario.openscenario.reading.document import VERSIONS, version_of
 from eidrive_scenario.openscenario.reading.parsing import open_document
@@ -15,12 +19,18 @@ from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.validation.rules import check_values
 
 
-def check_catalog(path: Path) -> tuple[tuple[Diagnostic, ...], tuple[Diagnostic, ...]]:
-    """Return the errors and the warnings of a catalog file.
+def check_catalog(path: Path, ignored: Collection[str] = ()) -> CheckReport:
+    """Check a catalog file. No rule applies to a catalog without a scenario.
 
-    Each entry is read with the defaults of the parameters that it declares. What an entry refers to in other catalogs
-    is checked with the scenarios that use it, as only these name the folders.
+    Each entry is read with the defaults of the parameters that it declares. References of an entry to other catalogs
+    are checked with the scenarios that use it, as only these define the folders. Raise SettingError if `ignored` has
+    an unknown name.
     """
+    check_rule_names(ignored)
+    return CheckReport.collect(_diagnostics(path))
+
+
+def _diagnostics(path: Path) -> Iterator[tuple[Level, Diagnostic]]:
     collector = DiagnosticCollector()
     try:
         document = open_document(path)
@@ -34,4 +44,5 @@ def check_catalog(path: Path) -> tuple[tuple[Diagnostic, ...], tuple[Diagnostic,
             collector.errors.extend(twins_in(catalog, document.name).values())
     except ScenarioError as error:
         collector.errors.extend(error.diagnostics)
-    return tuple(sort_diagnostics(collector.errors)), tuple(sort_diagnostics(collector.warnings))
+    yield from ((Level.ERROR, diagnostic) for diagnostic in collector.errors)
+    yield from ((Level.WARNING, diagnostic) for diagnostic in collector.listed_warnings())

@@ -1,4 +1,4 @@
-"""What can be said against a parameter value distribution without playing its runs."""
+"""Check of a parameter value distribution without its runs."""
 
 from __future__ import annotations
 
@@ -6,106 +6,114 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eidrive_scenario.checks.registry import run_rules
-from eidrive_scenario.checks.scenario_checks import CheckReport, check_scenario
-from eidrive_scenario.checks.scenario_rules import Level
+from eidrive_scenario.checks.registry import check_rule_names, run_rules
+from eidrive_scenario.checks.report import CheckReport
+from eidrive_scenario.checks.rule import Level
+from eidrive_scenario.checks.scenario_checks import scenario_diagnostics
 from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError
 from eidrive_scenario.openscenario import ConcreteRun, DistributionExpansion, load_distribution, load_scenario
 from eidrive_scenario.openscenario.distributions import CartesianProduct, ListedValues
 
-_MOST_LOADED = 1000
-"""Runs that are read; the file of a distribution may list more values."""
-_SPREAD = 100
-"""Runs that are read besides, spread over all combinations."""
+_MAX_VALUE_RUNS = 1000
+"""Maximum number of runs that are read for the listed values; a distribution may list more."""
+_SPREAD_RUNS = 100
+"""Number of further runs that are read, spread over all combinations."""
 _FIRST_DRAWS = 20
+"""Number of runs that are read of a stochastic distribution before the spread ones."""
 
 
 @dataclass(frozen=True)
 class DistributionCheckReport(CheckReport):
-    """What keeps a distribution's runs from being played, what is worth knowing, and how many runs there are."""
+    """Diagnostics of a distribution and of its scenario, and the number of concrete runs."""
 
     runs: int = 0
 
 
 def check_distribution(path: Path, ignored: Collection[str] = ()) -> DistributionCheckReport:
-    """Read a distribution, its scenario, and the scenario with each value that the distribution lists.
+    """Check a distribution, its scenario, and the scenario with each value that the distribution lists.
 
-    Every listed value is in one of the runs that are read, with the first value of all other parameters; so are the
-    ends of each range, and the first draws. A run that constraints rule out is a warning, as it will be left out. What
-    the rules find in these runs and in some more all over, and not in the scenario alone, is told with a run's number.
+    One run is read for each listed value, with the first values of all other parameters; also for the ends of each
+    range and for the first draws. A run with a violated constraint is a warning, as it is skipped. Diagnostics of the
+    rules that these and the spread runs have, but not the scenario itself, are reported with the number of a run.
+    Raise SettingError if `ignored` has an unknown name.
     """
+    check_rule_names(ignored)
     try:
-        unfolding = load_distribution(path)
+        expansion = load_distribution(path)
     except InputError as error:
-        return DistributionCheckReport(error.diagnostics)
-    alone = check_scenario(unfolding.scenario, ignored)
-    if alone.errors:
-        known = (*unfolding.warnings, *alone.warnings)
-        return DistributionCheckReport(alone.errors, known, len(unfolding), notes=alone.notes)
-    found = _Gathered(alone, unfolding.warnings, ignored)
-    telling = sorted(set(_telling(unfolding)))
-    for number in telling[:_MOST_LOADED]:
-        found.read(unfolding[number], every_value=True)
-    for number in unfolding.spread(_SPREAD):
-        found.read(unfolding[number], every_value=False)
-    if len(telling) > _MOST_LOADED:
-        unread = f"{len(telling) - _MOST_LOADED} of the listed values were not tried"
-        found.told[Level.WARNING][Diagnostic(unread, "run them", unfolding.source)] = None
-    diagnostics, warnings, notes = (tuple(found.told[level]) for level in (Level.ERROR, Level.WARNING, Level.NOTE))
-    return DistributionCheckReport(diagnostics, warnings, len(unfolding), notes=notes)
+        return DistributionCheckReport.collect((Level.ERROR, diagnostic) for diagnostic in error.diagnostics)
+    found = _DistributionDiagnostics(expansion, ignored)
+    if not any(level is Level.ERROR for level, _ in found):
+        found.read_runs()
+    return DistributionCheckReport.collect(found, runs=len(expansion))
 
 
-class _Gathered:
-    """What is found in one run after the other; of each rule at each place once."""
+class _DistributionDiagnostics:
+    """Diagnostics of a distribution: each rule once per element over all runs that are read."""
 
-    def __init__(self, alone: CheckReport, warnings: Iterable[Diagnostic], ignored: Collection[str]) -> None:
-        self.told: dict[Level, dict[Diagnostic, None]] = {
-            Level.ERROR: {},
-            Level.WARNING: dict.fromkeys((*warnings, *alone.warnings)),
-            Level.NOTE: dict.fromkeys(alone.notes),
-        }
+    def __init__(self, expansion: DistributionExpansion, ignored: Collection[str]) -> None:
+        self._expansion = expansion
         self._ignored = ignored
-        self._known = {_place(diagnostic) for diagnostic in (*alone.warnings, *alone.notes) if diagnostic.rule}
+        self._found: dict[tuple[Level, Diagnostic], None] = {}
+        self._add(Level.WARNING, expansion.warnings)
+        self._found.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored)))
+        self._known_rules = {_location(diagnostic) for _, diagnostic in self._found if diagnostic.rule}
         self._read: set[int] = set()
 
-    def read(self, run: ConcreteRun, *, every_value: bool) -> None:
-        """Read the scenario of a run, and ask the rules; with `every_value` each value that is refused is told."""
+    def __iter__(self) -> Iterator[tuple[Level, Diagnostic]]:
+        return iter(self._found)
+
+    def read_runs(self) -> None:
+        """Read the runs of all listed values, and further ones spread over all combinations."""
+        value_runs = sorted(set(_value_runs(self._expansion)))
+        for number in value_runs[:_MAX_VALUE_RUNS]:
+            self._read_run(self._expansion[number], every_value=True)
+        for number in self._expansion.spread(_SPREAD_RUNS):
+            self._read_run(self._expansion[number], every_value=False)
+        if len(value_runs) > _MAX_VALUE_RUNS:
+            message = f"{len(value_runs) - _MAX_VALUE_RUNS} of the listed values are not checked"
+            self._add(Level.WARNING, [Diagnostic(message, "run them", self._expansion.source)])
+
+    def _read_run(self, run: ConcreteRun, *, every_value: bool) -> None:
+        """Read the scenario of a run and evaluate the rules; with `every_value` each invalid value is reported."""
         if run.number in self._read:
             return
         self._read.add(run.number)
         try:
             scenario = load_scenario(run.scenario, run.assignments)
         except InputError as error:
-            self._refused(error, every_value)
+            self._add_invalid_run(error, every_value)
             return
         for level, diagnostic in run_rules(scenario, self._ignored):
-            if _place(diagnostic) not in self._known:
-                self._known.add(_place(diagnostic))
-                self.told[level][replace(diagnostic, message=f"in run {run.number}: {diagnostic.message}")] = None
+            if _location(diagnostic) not in self._known_rules:
+                self._known_rules.add(_location(diagnostic))
+                self._add(level, [replace(diagnostic, message=f"in run {run.number}: {diagnostic.message}")])
 
-    def _refused(self, error: InputError, every_value: bool) -> None:
-        """A run that cannot be played; of one that was read besides only what is new."""
-        known = {_place(diagnostic) for told in self.told.values() for diagnostic in told}
-        diagnostics = [one for one in error.diagnostics if every_value or _place(one) not in known]
+    def _add_invalid_run(self, error: InputError, every_value: bool) -> None:
+        """Add the errors of a run that cannot be read; of a spread run only those at new locations."""
+        known = {_location(diagnostic) for _, diagnostic in self._found}
+        diagnostics = [one for one in error.diagnostics if every_value or _location(one) not in known]
         if isinstance(error, ConstraintError):
-            left_out = (replace(one, hint=f"{one.hint}; such runs are left out") for one in diagnostics)
-            self.told[Level.WARNING].update(dict.fromkeys(left_out))
+            self._add(Level.WARNING, (replace(one, hint=f"{one.hint}; such runs are skipped") for one in diagnostics))
         else:
-            self.told[Level.ERROR].update(dict.fromkeys(diagnostics))
+            self._add(Level.ERROR, diagnostics)
+
+    def _add(self, level: Level, diagnostics: Iterable[Diagnostic]) -> None:
+        self._found.update(dict.fromkeys((level, diagnostic) for diagnostic in diagnostics))
 
 
-def _place(diagnostic: Diagnostic) -> tuple[str, str, int | None]:
+def _location(diagnostic: Diagnostic) -> tuple[str, str, int | None]:
     return diagnostic.rule, diagnostic.source, diagnostic.line
 
 
-def _telling(unfolding: DistributionExpansion) -> Iterator[int]:
-    """Numbers of runs that hold each listed value at least once."""
-    varied = unfolding.varied
+def _value_runs(expansion: DistributionExpansion) -> Iterator[int]:
+    """Yield numbers of runs that contain each listed value at least once."""
+    varied = expansion.varied
     if not isinstance(varied, CartesianProduct):
-        yield from range(min(len(unfolding), _FIRST_DRAWS))
+        yield from range(min(len(expansion), _FIRST_DRAWS))
         return
     yield 0
-    stride = len(unfolding)
+    stride = len(expansion)
     for choices in varied.choices:
         stride //= choices.count
         ends = (0, min(1, choices.count - 1), choices.count - 1)

@@ -1,40 +1,54 @@
-"""All rules of `eidrive check`, and what they find in a scenario that could be read."""
+"""Registry of all rules of `eidrive check`, and their evaluation on scenarios and road files."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
-from eidrive_scenario.checks.road_rules import ROAD_RULES, RoadLintContext
-from eidrive_scenario.checks.scenario_rules import RULES, Level, Rule
+from eidrive_scenario.checks.road_rules import ROAD_FILE_RULES, ROAD_RULES, RoadFileContext, RoadLintContext
+from eidrive_scenario.checks.rule import Level, Rule, S
+from eidrive_scenario.checks.scenario_rules import RULES
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.roads import RoadNetwork
 
-ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES)
+ALL_RULES: tuple[Rule[RoadLintContext], ...] = (*RULES, *ROAD_RULES, *ROAD_FILE_RULES)
+"""All rules; each name, level and summary is defined once."""
 
 
 def run_rules(scenario: Scenario, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
-    """What the rules find, but for those whose names are ignored; without those on roads where these cannot be read.
+    """Yield the diagnostics of all rules except `ignored`; if the road file is invalid, only of rules without roads.
 
-    Raises SettingError if a rule is to be ignored that does not exist.
+    Raise SettingError if `ignored` has an unknown name.
     """
     check_rule_names(ignored)
-    chosen = ALL_RULES
+    rules = ALL_RULES
     roads = None
     try:
         roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     except InputError:
-        chosen = RULES
-    context = RoadLintContext(scenario, roads)
-    for rule in chosen:
-        if rule.name not in ignored:
-            for diagnostic in rule.run(context):
-                yield rule.level, diagnostic
+        rules = RULES
+    yield from _run(rules, RoadLintContext(scenario, roads), ignored)
+
+
+def run_road_file_rules(roads: RoadNetwork, ignored: Collection[str] = ()) -> Iterator[tuple[Level, Diagnostic]]:
+    """Yield the diagnostics of the rules about road files, except `ignored`.
+
+    Raise SettingError if `ignored` has an unknown name.
+    """
+    check_rule_names(ignored)
+    yield from _run(ROAD_FILE_RULES, RoadFileContext(roads), ignored)
 
 
 def check_rule_names(ignored: Collection[str]) -> None:
-    """Raises SettingError if a rule is to be ignored that does not exist."""
+    """Raise SettingError if `ignored` has an unknown name."""
     known = {rule.name for rule in ALL_RULES}
     for name in ignored:
         if name not in known:
-            raise SettingError(Diagnostic(f"there is no rule {name!r}", suggestion(name, known)))
+            raise SettingError(Diagnostic(f"rule {name!r} does not exist", suggestion(name, known)))
+
+
+def _run(rules: Iterable[Rule[S]], context: S, ignored: Collection[str]) -> Iterator[tuple[Level, Diagnostic]]:
+    for rule in rules:
+        if rule.name not in ignored:
+            for diagnostic in rule.run(context):
+                yield rule.level, diagnostic

@@ -1,4 +1,4 @@
-"""What a rule is: a name to look it up by, how grave its findings are, and the function that finds them."""
+"""Rules of `eidrive check`: name, level, summary and the function that finds violations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ S = TypeVar("S", contravariant=True)
 
 
 class Level(Enum):
-    """How grave a finding is: an error stops a run, a warning is most likely a mistake, a note may be meant so."""
+    """Severity of a diagnostic: an error prevents a run, a warning is probably a mistake, a note may be intended."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -25,9 +25,9 @@ class Level(Enum):
 class Rule(Generic[S]):
     """One rule of `eidrive check`.
 
-    name   by which users look it up in docs/checks.md, and leave it out
-    about  what it finds, in a few words
-    check  yields its findings in what a survey knows of a scenario
+    name     key in docs/checks.md and argument of `--ignore`
+    summary  what violates the rule, in a few words
+    check    yields the violations in a lint context
     """
 
     name: str
@@ -36,11 +36,11 @@ class Rule(Generic[S]):
     check: Callable[[S], Iterable[Diagnostic]]
 
     def run(self, context: S) -> Iterator[Diagnostic]:
-        """What the rule finds, marked with its name."""
+        """Yield the diagnostics of the rule, with its name."""
         for diagnostic in self.check(context):
             yield replace(diagnostic, rule=self.name)
 
 
 def at(element: Element, message: str, hint: str = "") -> Diagnostic:
-    """A finding at the place of an element."""
+    """Return a diagnostic with the location of an element."""
     return Diagnostic(message, hint, element.source, element.line)

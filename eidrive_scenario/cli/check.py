@@ -18,7 +18,7 @@ from eidrive_scenario.library import definition, resolve_scenario
 from eidrive_scenario.wall_limit import LimitReached, check_wall_limit, limit_wall_time
 
 if TYPE_CHECKING:
-    from eidrive_scenario.checks.scenario_checks import CheckReport
+    from eidrive_scenario.checks.report import CheckReport
 
 _SUFFIX = ".xosc"
 _ROADS = ".xodr"
@@ -80,15 +80,16 @@ def check(
 
 def _inspect(path: Path, ignored: tuple[str, ...], wall_limit: float | None) -> CheckReport:
     """What is wrong with a file of any kind. Raises WallLimitError if that takes longer than the limit [s]."""
+    from eidrive_scenario.checks.catalog_checks import check_catalog
     from eidrive_scenario.checks.distribution_checks import check_distribution
-    from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario, inspect_catalog
+    from eidrive_scenario.checks.scenario_checks import check_road_file, check_scenario
     from eidrive_scenario.simulation.attribution import report_extension
 
     with limit_wall_time(wall_limit):
         try:
             kind = definition(path)
             if kind == "catalog":
-                return inspect_catalog(path, ignored)
+                return check_catalog(path, ignored)
             if kind == "roads" or path.suffix == _ROADS:
                 return check_road_file(path, ignored)
             return (check_distribution if kind == "distribution" else check_scenario)(path, ignored)

@@ -1,69 +1,73 @@
-"""What a reader finds wrong or outdated, gathered so that a file's findings come in one go."""
+"""Collection of the diagnostics of one scenario file, so that one reading reports all of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from eidrive_scenario.errors import MAX_DIAGNOSTICS, ConstraintError, Diagnostic, ScenarioError
+from eidrive_scenario.errors import (
+    MAX_DIAGNOSTICS,
+    ConstraintError,
+    Diagnostic,
+    ScenarioError,
+    limit_diagnostics,
+    sort_diagnostics,
+)
 from eidrive_scenario.openscenario.budget import Budget
 
 
 @dataclass(frozen=True)
 class ConstraintDiagnostic(Diagnostic):
-    """A parameter has a value that its constraints do not allow."""
+    """Violation of the ConstraintGroups of a parameter."""
 
 
 @dataclass
 class DiagnosticCollector:
-    """Problems that forbid a file, and warnings that do not.
+    """Errors, which prevent the use of a file, and warnings.
 
-    Reading ends with the error number MAX_DIAGNOSTICS, so that a file of errors costs no more than one of few. Of the
-    warnings the first MAX_DIAGNOSTICS are kept and the others counted.
+    Reading ends at error number MAX_DIAGNOSTICS, so that the cost of a file with many errors is bounded. The first
+    MAX_DIAGNOSTICS warnings are stored and the others counted.
     """
 
     errors: list[Diagnostic] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
-    uncounted: int = 0
-    """Number of warnings that are not kept."""
+    unlisted_warnings: int = 0
+    """Number of warnings that are not stored."""
     budget: Budget = field(default_factory=Budget)
-    """What the scenario may expand to."""
+    """Limits of the size to which the scenario may expand."""
 
     def error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
-        """Something is wrong. Raises ScenarioError with all errors once there are too many."""
+        """Store an error. Raise ScenarioError with all errors at error number MAX_DIAGNOSTICS."""
         self._add(Diagnostic(message, hint, source, line))
 
     def constraint_error(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
-        """A parameter has a value that its constraints do not allow."""
+        """Store a violation of parameter constraints, like `error`."""
         self._add(ConstraintDiagnostic(message, hint, source, line))
 
     def warning(self, message: str, hint: str = "", *, source: str = "", line: int | None = None) -> None:
-        """Something is outdated or doubtful."""
+        """Store a warning about something deprecated or questionable."""
         if len(self.warnings) < MAX_DIAGNOSTICS:
             self.warnings.append(Diagnostic(message, hint, source, line))
         else:
-            self.uncounted += 1
+            self.unlisted_warnings += 1
 
     def raise_on_error(self) -> tuple[Diagnostic, ...]:
-        """The warnings, if nothing is wrong.
+        """Return the sorted warnings if there is no error.
 
-        Raises ScenarioError with all problems in the order of the files: ConstraintError if nothing but values that
-        constraints rule out is wrong.
+        Raise ConstraintError if all errors are violations of constraints, and ScenarioError if others are among them;
+        its diagnostics are all errors in the order of the files.
         """
         if self.errors:
-            only_ruled_out = all(isinstance(diagnostic, ConstraintDiagnostic) for diagnostic in self.errors)
-            raise (ConstraintError if only_ruled_out else ScenarioError)(sort_diagnostics(self.errors))
-        more = [Diagnostic(f"{self.uncounted} more warnings are not listed")] if self.uncounted else []
-        return (*sort_diagnostics(self.warnings), *more)
+            only_constraints = all(isinstance(diagnostic, ConstraintDiagnostic) for diagnostic in self.errors)
+            raise (ConstraintError if only_constraints else ScenarioError)(sort_diagnostics(self.errors))
+        return self.listed_warnings()
+
+    def listed_warnings(self) -> tuple[Diagnostic, ...]:
+        """Return the warnings in the order of the files; the last one counts those that are not stored."""
+        return tuple(limit_diagnostics(sort_diagnostics(self.warnings), self.unlisted_warnings))
 
     def _add(self, diagnostic: Diagnostic) -> None:
         self.errors.append(diagnostic)
         if len(self.errors) >= MAX_DIAGNOSTICS:
-            last = Diagnostic(f"reading ends after {MAX_DIAGNOSTICS} errors", "", diagnostic.source, diagnostic.line)
-            raise ScenarioError([*sort_diagnostics(self.errors), last])
-
-
-def sort_diagnostics(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
-    """Each problem once, the files in the order in which they appear, the lines of a file ascending."""
-    unique = list(dict.fromkeys(diagnostics))
-    files = list(dict.fromkeys(diagnostic.source for diagnostic in unique))
-    return sorted(unique, key=lambda diagnostic: (files.index(diagnostic.source), diagnostic.line or 0))
+            listed = sort_diagnostics(self.errors)
+            message = f"reading ends after {MAX_DIAGNOSTICS} errors"
+            raise ScenarioError([*listed, Diagnostic(message, "", listed[-1].source, listed[-1].line)])

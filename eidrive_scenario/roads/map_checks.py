@@ -10,7 +10,15 @@ from typing import NamedTuple
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads.geometry.poses import lateral_axis
 from eidrive_scenario.roads.model.location import LaneKey
-from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.map_warnings import (
+    GEOMETRY_GAP,
+    HEADING_DISCONTINUITY,
+    JUNCTION_CONNECTION,
+    LANE_LINK,
+    LANE_WIDTH,
+    ROAD_SURFACE,
+    MapWarning,
+)
 from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
 from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
 
@@ -58,7 +66,7 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
     spans = "geometries that overlap or leave a gap in s"
     if abs(curves[0].s) > JUMP:
         what = f"{name}: the first geometry begins at s = {curves[0].s:g} m"
-        yield MapWarning("geometry-gap", spans, what, "let it begin at s=0", curves[0].line)
+        yield MapWarning(GEOMETRY_GAP, spans, what, "let it begin at s=0", curves[0].line)
     for one, other in pairwise(curves):
         if one.line is not None and one.line == other.line:
             continue
@@ -66,7 +74,7 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         if abs(missing) > JUMP:
             how = "ends before the next one begins" if missing > 0.0 else "runs on into the next one"
             what = f"{name}: the geometry at s = {one.s:g} m {how}, by {abs(missing):.3g} m"
-            yield MapWarning("geometry-gap", spans, what, "let s be the sum of the lengths before", other.line)
+            yield MapWarning(GEOMETRY_GAP, spans, what, "let s be the sum of the lengths before", other.line)
             continue
         end, start = one.at(one.length), other.at(0.0)
         apart = math.hypot(start.x - end.x, start.y - end.y)
@@ -74,11 +82,11 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         if apart > JUMP:
             what = f"{name} jumps by {apart:.3g} m at s = {other.s:g} m"
             hint = "let each geometry begin where the one before ends"
-            yield MapWarning("geometry-gap", "such jumps", what, hint, other.line)
+            yield MapWarning(GEOMETRY_GAP, "such jumps", what, hint, other.line)
         elif KINK < turn < CORNER:
             what = f"{name} has a kink of {turn:.3g} rad at s = {other.s:g} m"
             yield MapWarning(
-                "heading-discontinuity",
+                HEADING_DISCONTINUITY,
                 "such kinks",
                 what,
                 "let each geometry go on with the heading before",
@@ -89,7 +97,7 @@ def _jumps(road: Road) -> Iterator[MapWarning]:
         there = f"{abs(over):.3g} m {'after' if over > 0 else 'before'} that"
         what = f"{name} has length {road.length:g} m, but its geometry ends {there}"
         yield MapWarning(
-            "geometry-gap", "lengths that are not those of the geometry", what, "correct the length", road.line
+            GEOMETRY_GAP, "lengths that are not those of the geometry", what, "correct the length", road.line
         )
 
 
@@ -97,7 +105,7 @@ def _tilts(road: Road) -> Iterator[MapWarning]:
     for start, tilt, *_ in road.superelevation.pieces:
         if abs(tilt) > STEEP:
             what = f"road {road.id!r} is tilted by {tilt:.3g} rad at s = {start:g} m"
-            yield MapWarning("road-surface", "such tilts", what, "give <superelevation> in radians", road.line)
+            yield MapWarning(ROAD_SURFACE, "such tilts", what, "give <superelevation> in radians", road.line)
 
 
 def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning]:
@@ -108,15 +116,15 @@ def _widths(road: Road, section: LaneSection, lane: Lane) -> Iterator[MapWarning
     if lane.width_from > JUMP:
         until = "" if math.isinf(lane.width_from) else f" before its sOffset {lane.width_from:g}"
         what = f"{name} has no width{until}"
-        yield MapWarning("lane-width", "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
+        yield MapWarning(LANE_WIDTH, "lanes without a width", what, 'give a <width> at sOffset="0"', lane.line)
     widths = list(_extremes(lane, section.length))
     least, most = min(widths), max(widths)
     if least < NARROW:
         what = f"{name} becomes {least:.3g} m wide"
-        yield MapWarning("lane-width", "negative widths", what, "let widths be 0 or more", lane.line)
+        yield MapWarning(LANE_WIDTH, "negative widths", what, "let widths be 0 or more", lane.line)
     if most > WIDE:
         what = f"{name} becomes {most:.3g} m wide"
-        yield MapWarning("lane-width", "widths beyond all roads", what, "correct its terms", lane.line)
+        yield MapWarning(LANE_WIDTH, "widths beyond all roads", what, "correct its terms", lane.line)
 
 
 def _extremes(lane: Lane, length: float) -> Iterator[float]:
@@ -156,7 +164,7 @@ def _broken(road: Road, section: LaneSection, side: int, there: Mapping[int, Lan
                 word = "successor" if side > 0 else "predecessor"
                 what = f"lane {lane.id} of road {road.id!r} has the {word} {number}, which {where} does not have"
                 hint = "known: " + ", ".join(map(str, sorted(there)))
-                yield MapWarning("lane-link", "links to lanes that do not exist", what, hint, lane.line)
+                yield MapWarning(LANE_LINK, "links to lanes that do not exist", what, hint, lane.line)
 
 
 def _dead_ends(road: Road, links: LaneLinks) -> Iterator[MapWarning]:
@@ -185,8 +193,8 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
         what += f" in {link.element_type} {link.element_id!r}"
     if link is not None and link.element_type == "junction":
         hint = "add a <laneLink> from it to a <connection>"
-        return MapWarning("lane-link", "lanes that lead nowhere at junctions", what, hint, lane.line)
-    return MapWarning("lane-link", "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
+        return MapWarning(LANE_LINK, "lanes that lead nowhere at junctions", what, hint, lane.line)
+    return MapWarning(LANE_LINK, "lanes that lead nowhere", what, "link it, or let it taper off", lane.line)
 
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
@@ -203,9 +211,7 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
         if apart > JUMP:
             names = f"lane {one.lane.lane} of road {road.id!r} and lane {other.lane.lane} of road {beyond.id!r}"
             what = f"{names} are linked, and their ends are {apart:.3g} m apart"
-            yield MapWarning(
-                "geometry-gap", "linked lanes that do not meet", what, "let the roads meet there", lane.line
-            )
+            yield MapWarning(GEOMETRY_GAP, "linked lanes that do not meet", what, "let the roads meet there", lane.line)
 
 
 class RoadEnd(NamedTuple):
@@ -239,7 +245,7 @@ def _connection(roads: Mapping[str, Road], junction: Junction, connection: Conne
     if not incoming.sections or not connecting.sections:
         return
     name = f"connection {connection.id!r} of junction {junction.id!r}"
-    rule = "junction-connection"
+    rule = JUNCTION_CONNECTION
     ends = [link for link in (incoming.predecessor, incoming.successor) if link is not None]
     touches = any(link.element_type == "junction" and link.element_id == junction.id for link in ends)
     if junction.type == "default" and not touches:

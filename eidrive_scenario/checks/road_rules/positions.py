@@ -1,4 +1,4 @@
-"""Rules on places: roads, lanes and signals that the road network does not have."""
+"""Rules about positions, lanes and signals that the road network does not contain."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from eidrive_scenario.openscenario.model import (
     TrafficSignalStateAction,
 )
 
-BEYOND = 0.01
-"""Roads are as long as their files round them [m]."""
+LENGTH_TOLERANCE = 0.01
+"""Maximum rounding error of the length of a road in its file [m]."""
 _ADDRESS = "="
-"""ScenarioRunner addresses signals as `pos=x,y` or `id=7`."""
+"""Part of signal references of ScenarioRunner, such as `pos=x,y` or `id=7`."""
 
 
-def missing_places(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A position on a road or lane that is not there."""
+def unresolvable_positions(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield positions on a road or lane that does not exist."""
     seen: set[Diagnostic] = set()
     for error in context.unresolved.values():
         for diagnostic in error.diagnostics:
@@ -32,19 +32,19 @@ def missing_places(context: RoadLintContext) -> Iterator[Diagnostic]:
                 yield diagnostic
 
 
-def beyond_ends(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """An s before the start or beyond the end of its road: the engine takes the end, as others do."""
+def s_out_of_range(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield positions with an s outside the road; a run uses the end of the road, as other engines do."""
     for element in context.elements:
         if context.roads is None or not isinstance(element, LanePosition | RoadPosition):
             continue
         road = context.roads.roads.get(element.road_id)
-        if road is not None and not -BEYOND <= element.s <= road.length + BEYOND:
-            what = f"s = {element.s:g} lies beyond road {road.id!r}, which is {road.length:.2f} m long"
-            yield at(element, what, "its end is meant; give an s on the road")
+        if road is not None and not -LENGTH_TOLERANCE <= element.s <= road.length + LENGTH_TOLERANCE:
+            message = f"s = {element.s:g} is outside road {road.id!r}, which is {road.length:.2f} m long"
+            yield at(element, message, "the end of the road is used; specify an s on the road")
 
 
-def missing_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A change to a lane that no road has."""
+def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield lane changes to a lane that no road has."""
     if context.roads is None:
         return
     known = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
@@ -52,11 +52,11 @@ def missing_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
         target = element.lane_change_target.absolute_target_lane if isinstance(element, LaneChangeAction) else None
         if target is not None and target.value.strip() not in known - {"0"}:
             shown = ", ".join(sorted(known - {"0"}, key=int))
-            yield at(target, f"no road has a lane {target.value!r}", f"lanes of the roads are {shown}")
+            yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
 
 
-def missing_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
-    """A traffic signal that the road network does not have."""
+def unknown_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
+    """Yield traffic signals that the road network does not contain."""
     if context.roads is None:
         return
     known = set(context.roads.signals)
@@ -68,5 +68,5 @@ def missing_signals(context: RoadLintContext) -> Iterator[Diagnostic]:
         else:
             continue
         if name not in known and _ADDRESS not in name:
-            hint = suggestion(name, known) if known else "the road file declares none"
-            yield at(element, f"the road network has no traffic signal {name!r}", hint)
+            hint = suggestion(name, known) if known else "the road file defines none"
+            yield at(element, f"traffic signal {name!r} does not exist in the road network", hint)

@@ -1,18 +1,43 @@
-"""Rules about the road file itself."""
+"""Rules about the road file itself, for scenarios and for road files without a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
 
-from eidrive_scenario.checks.road_rules.context import RoadLintContext
+from eidrive_scenario.checks.rule import Level, Rule
 from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads.model.map_warnings import MAP_RULES
 
 
-def map_warning_rule(rule: str) -> Callable[[RoadLintContext], Iterator[Diagnostic]]:
-    """What the road network itself finds doubtful in its file, of one rule."""
+class HasRoads(Protocol):
+    """Lint context with a road network."""
 
-    def check(context: RoadLintContext) -> Iterator[Diagnostic]:
+    @property
+    def roads(self) -> RoadNetwork | None:
+        """Return the road network; None if the scenario has none."""
+
+
+@dataclass(frozen=True)
+class RoadFileContext:
+    """Lint context of a road file without a scenario."""
+
+    roads: RoadNetwork
+
+
+def map_warning_rule(name: str) -> Callable[[HasRoads], Iterator[Diagnostic]]:
+    """Return the check of a rule whose violations the road network reports itself."""
+
+    def check(context: HasRoads) -> Iterator[Diagnostic]:
         if context.roads is not None:
-            yield from (diagnostic for diagnostic in context.roads.map_warnings if diagnostic.rule == rule)
+            yield from (diagnostic for diagnostic in context.roads.map_warnings if diagnostic.rule == name)
 
     return check
+
+
+ROAD_FILE_RULES: tuple[Rule[HasRoads], ...] = tuple(
+    Rule(rule.name, Level.WARNING, rule.summary, map_warning_rule(rule.name)) for rule in MAP_RULES
+)
+"""Rules that need only the road file."""

@@ -11,13 +11,46 @@ from typing import NamedTuple
 from eidrive_scenario.errors import Diagnostic
 
 SHOWN = 4
-"""Further lines that a finding names."""
+"""Maximum number of further lines that a grouped warning lists."""
+
+
+class MapRule(NamedTuple):
+    """Name and summary of a rule of `eidrive check` about road files. The level of all of them is warning."""
+
+    name: str
+    summary: str
+
+
+GEOMETRY_GAP = MapRule("geometry-gap", "a road whose geometries do not join")
+HEADING_DISCONTINUITY = MapRule("heading-discontinuity", "a road whose heading changes abruptly")
+LANE_WIDTH = MapRule("lane-width", "a lane with a missing, negative or implausible width")
+LANE_SIDE = MapRule("lane-side", "a lane on the wrong side of the center lane")
+ROAD_LINK = MapRule("road-link", "a link to a missing junction, or to a point within a road")
+ROAD_SURFACE = MapRule("road-surface", "a cross section that is not read, or a superelevation that is too steep")
+ROAD_MARK = MapRule("road-mark", "an incomplete road mark")
+SIGNAL_OFF_ROAD = MapRule("signal-off-road", "a signal beyond the ends of its road")
+LANE_LINK = MapRule("lane-link", "a lane link to a missing lane, or a lane without a successor")
+JUNCTION_CONNECTION = MapRule("junction-connection", "a connection that does not match its junction")
+
+MAP_RULES = (
+    GEOMETRY_GAP,
+    HEADING_DISCONTINUITY,
+    LANE_WIDTH,
+    LANE_SIDE,
+    ROAD_LINK,
+    ROAD_SURFACE,
+    ROAD_MARK,
+    SIGNAL_OFF_ROAD,
+    LANE_LINK,
+    JUNCTION_CONNECTION,
+)
+"""All rules about road files, in the order of their listing."""
 
 
 class MapWarning(NamedTuple):
-    """One flaw: the rule that it breaks, what kind it is, what it is here, and what would be right."""
+    """Violation of a map rule at one element; violations of the same kind are reported together."""
 
-    rule: str
+    rule: MapRule
     kind: str
     message: str
     hint: str
@@ -26,7 +59,7 @@ class MapWarning(NamedTuple):
 
 def group_map_warnings(flaws: Iterable[MapWarning], source: str) -> tuple[Diagnostic, ...]:
     """One finding for each kind of flaw, with its rule of `eidrive check`."""
-    kinds: dict[tuple[str, str], list[MapWarning]] = {}
+    kinds: dict[tuple[MapRule, str], list[MapWarning]] = {}
     for flaw in flaws:
         kinds.setdefault((flaw.rule, flaw.kind), []).append(flaw)
     return tuple(_told(group, source) for group in kinds.values())
@@ -39,4 +72,4 @@ def _told(flaws: list[MapWarning], source: str) -> Diagnostic:
         lines = [str(flaw.line) for flaw in flaws[1 : 1 + SHOWN]]
         more = ", …" if len(flaws) > 1 + SHOWN else ""
         message += f"; {len(flaws) - 1} more of {first.kind}: line {', '.join(lines)}{more}"
-    return Diagnostic(message, first.hint, source, first.line, first.rule)
+    return Diagnostic(message, first.hint, source, first.line, first.rule.name)

@@ -8,7 +8,7 @@ from typing import Literal, overload
 from lxml import etree
 
 from eidrive_scenario.errors import Diagnostic, RoadError, quoted, suggestion
-from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.map_warnings import ROAD_MARK, MapRule, MapWarning
 
 MOST = 100
 """Problems after which reading ends."""
@@ -51,7 +51,7 @@ class AttributeReader:
         if before <= limit < before + amount:
             self.report_error(element, f"the file has more than {limit:g} {what}", "split it")
 
-    def report_warning(self, element: etree._Element, rule: str, kind: str, message: str, hint: str) -> None:
+    def report_warning(self, element: etree._Element, rule: MapRule, kind: str, message: str, hint: str) -> None:
         """Remember what is against the standard, and is read all the same."""
         if len(self.map_warnings) < MOST_DOUBTS:
             self.map_warnings.append(MapWarning(rule, kind, message, hint, line_of(element)))
@@ -91,7 +91,7 @@ class AttributeReader:
     def doubt_mark(self, element: etree._Element, what: str) -> None:
         """Remember what is missing or wrong in a road mark."""
         message, hint = f"{what}, and is drawn without it", "correct it, or take the element out"
-        self.report_warning(element, "road-mark", "road marks that are not complete", message, hint)
+        self.report_warning(element, ROAD_MARK, "road marks that are not complete", message, hint)
 
     def polynomial(self, element: etree._Element, start: str) -> tuple[float, float, float, float, float]:
         """A piece of a cubic: its start and a, b, c, d."""

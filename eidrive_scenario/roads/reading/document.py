@@ -11,7 +11,7 @@ from lxml import etree
 from eidrive_scenario.errors import Diagnostic, RoadError, suggestion
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.untrusted_xml import XmlLimits, parse_untrusted
-from eidrive_scenario.roads.model.map_warnings import MapWarning
+from eidrive_scenario.roads.model.map_warnings import ROAD_LINK, ROAD_SURFACE, MapWarning
 from eidrive_scenario.roads.model.polynomials import Polynomials
 from eidrive_scenario.roads.model.road_map import (
     Connection,
@@ -138,7 +138,7 @@ def _read_road(number: str, element: etree._Element, collector: AttributeReader)
         if profile.tag == "crossSectionSurface" or (profile.tag in ("shape", "crossfall") and not all(level)):
             message = f"road {number!r} has <{profile.tag}>, which is not read: its cross section is straight"
             hint = "say the slope by <superelevation>"
-            collector.report_warning(profile, "road-surface", "cross sections that are not read", message, hint)
+            collector.report_warning(profile, ROAD_SURFACE, "cross sections that are not read", message, hint)
     return Road(
         id=number,
         name=element.get("name", ""),
@@ -185,7 +185,7 @@ def _read_link(element: etree._Element | None, collector: AttributeReader) -> Ro
         # Of virtual junctions (1.6 to 1.8): a way into or out of a road between its ends.
         message = f"a road leads to road {number!r} between its ends, and ends there instead"
         hint = "split that road there, and join the parts by a junction"
-        collector.report_warning(element, "road-link", "roads that lead to others between their ends", message, hint)
+        collector.report_warning(element, ROAD_LINK, "roads that lead to others between their ends", message, hint)
         return None
     contact = collector.contact(element, "contactPoint")
     return RoadLink(cast(Literal["road", "junction"], kind), number, contact, line_of(element))
@@ -252,9 +252,7 @@ def _with_sound_links(
             )
             return link
         hint = "take the link out, or add the junction with its connections"
-        collector.map_warnings.append(
-            MapWarning("road-link", "roads that lead to no junction", message, hint, link.line)
-        )
+        collector.map_warnings.append(MapWarning(ROAD_LINK, "roads that lead to no junction", message, hint, link.line))
         return None
 
     return replace(road, predecessor=sound(road.predecessor), successor=sound(road.successor))

@@ -10,6 +10,7 @@ from typing import Literal
 
 from lxml import etree
 
+from eidrive_scenario.roads.model.map_warnings import LANE_SIDE
 from eidrive_scenario.roads.model.polynomials import Polynomials, combine
 from eidrive_scenario.roads.model.road_map import Lane, LaneHeight, LaneSection, RoadMark, RoadMarkLine
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
@@ -140,7 +141,7 @@ def _read_section(
             if wrong and number and sign:
                 # Its id is what links and positions name it by.
                 kind = "lanes under the wrong side"
-                collector.report_warning(element, "lane-side", kind, f"{message}, and is taken by its id", hint)
+                collector.report_warning(element, LANE_SIDE, kind, f"{message}, and is taken by its id", hint)
             elif wrong:
                 collector.report_error(element, message, hint)
                 continue

@@ -8,6 +8,7 @@ from dataclasses import replace
 from lxml import etree
 
 from eidrive_scenario.roads.geometry.poses import BEYOND
+from eidrive_scenario.roads.model.map_warnings import SIGNAL_OFF_ROAD
 from eidrive_scenario.roads.model.road_map import (
     Corner,
     Repeat,
@@ -65,7 +66,7 @@ def _read_place(road: Road, element: etree._Element, collector: AttributeReader)
     if abs(s - held) > BEYOND:
         message = f"a signal stands at s = {s:g} m of road {road.id!r}, and is put at s = {held:g} m"
         hint = f"the road runs from 0 to {road.length:g} m"
-        collector.report_warning(element, "signal-off-road", "signals beyond their roads", message, hint)
+        collector.report_warning(element, SIGNAL_OFF_ROAD, "signals beyond their roads", message, hint)
     return SignalPlace(
         road=road.id,
         s=held,

@@ -9,6 +9,7 @@ from lxml import etree
 from eidrive_scenario.errors import suggestion
 from eidrive_scenario.roads.model import curves
 from eidrive_scenario.roads.model.curves import Arc, Cubic, Curve, ReferenceLine
+from eidrive_scenario.roads.model.map_warnings import GEOMETRY_GAP
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader, line_of
 
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
@@ -41,7 +42,7 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
         there = f"{abs(covered - length):.3g} m {'after' if covered > length else 'before'} that"
         what = f"road {road.get('id')!r} has length {length:g} m, but its geometry ends {there}: the geometry counts"
         hint = "correct the length or complete the geometry"
-        collector.report_warning(road, "geometry-gap", "lengths that are not those of the geometry", what, hint)
+        collector.report_warning(road, GEOMETRY_GAP, "lengths that are not those of the geometry", what, hint)
         length = covered
     return ReferenceLine(found, length)
 

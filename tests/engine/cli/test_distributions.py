@@ -164,7 +164,7 @@ class TestCheck:
         assert f"{path}:7: the parameter 'End' is 'late', which is not a number; write it as 12.5 or 1e-3" in lines
         assert (
             f"{path}:6: the parameter 'OtherY' is '9', outside its constraints; it has to be lessThan 9; "
-            "such runs are left out (warning)"
+            "such runs are skipped (warning)"
         ) in lines
         assert lines[-1] == "1 file, 2 problems, 1 warning"
 
@@ -200,4 +200,4 @@ class TestCheck:
         )
         result = eidrive("check", path)
         assert result.exit_code == 0
-        assert result.stdout.count("such runs are left out (warning)") == 9
+        assert result.stdout.count("such runs are skipped (warning)") == 9

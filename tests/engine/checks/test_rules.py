@@ -182,5 +182,5 @@ def test_a_rule_can_be_left_out(folder: Path) -> None:
     collector(folder, "<StopTrigger/>")
     scenario = load_scenario(folder / "scenario.xosc")
     assert list(run_rules(scenario, ["no-stop-trigger"])) == []
-    with pytest.raises(SettingError, match="there is no rule 'no-stop'; did you mean 'no-stop-trigger'"):
+    with pytest.raises(SettingError, match="rule 'no-stop' does not exist; did you mean 'no-stop-trigger'"):
         list(run_rules(scenario, ["no-stop"]))
