@@ -3,7 +3,8 @@
 Stable: all names.
 """
 
-from eidrive_scenario.checks.scenario_checks import CheckReport, check_scenario
+from eidrive_scenario.checks.report import CheckReport
+from eidrive_scenario.checks.scenario_checks import check_scenario
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.openscenario import load_distribution, load_scenario
 from eidrive_scenario.recording.frame import Frame
