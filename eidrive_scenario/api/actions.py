@@ -1,7 +1,7 @@
 """Actions, conditions and controller models of the scenario subsystem.
 
-Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, `RuntimeContext`, `Actor`, `Domain`,
-`model`. The other names are those that the actions of this project use; they may change with a minor version.
+Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, their contexts, `Actor`, `Motion`,
+`Domain`, `model`. The other names are those that the actions of this project use; they may change with a minor version.
 """
 
 from eidrive_scenario import traffic
@@ -19,9 +19,15 @@ from eidrive_scenario.storyboard.context.condition import (
     satisfies_rule,
 )
 from eidrive_scenario.storyboard.context.controller_model import ControllerModel
-from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import (
+    ActionContext,
+    ConditionContext,
+    ControllerContext,
+    EntityAbsentError,
+)
 from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_controller
-from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion import STEEPEST, LateralStep, Motion
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.random_routes import random_route, uniform_branch_selector
 from eidrive_scenario.storyboard.kinematics.route import build_route
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, TrajectoryProgress, sample_trajectory
@@ -48,11 +54,14 @@ from eidrive_scenario.world.physics.multi_axle import turning_wheelbase
 __all__ = [
     "STEEPEST",
     "ActionBehaviour",
+    "ActionContext",
     "Actor",
     "AnimationState",
     "Appearance",
     "Commands",
     "Condition",
+    "ConditionContext",
+    "ControllerContext",
     "ControllerModel",
     "CustomCommand",
     "Domain",
@@ -71,7 +80,6 @@ __all__ = [
     "Override",
     "QuantityCondition",
     "ResolvedPosition",
-    "RuntimeContext",
     "StateChange",
     "TrajectoryCurve",
     "TrajectoryProgress",

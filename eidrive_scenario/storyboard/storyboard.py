@@ -16,7 +16,7 @@ from eidrive_scenario.storyboard.context.controller_model import build_controlle
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.external import ExternalObjects
 from eidrive_scenario.storyboard.kinematics.actor import Actor
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trailers import check_acyclic, declared_trailer, pairs, pose_behind
 from eidrive_scenario.storyboard.state.commands import Commands
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
@@ -52,7 +52,7 @@ class Storyboard:
         builder = Builder(scenario, self.context, actions or registry("actions"), conditions or registry("conditions"))
         self.init, self.root = builder.build()
         for name, actor in self.context.actors.items():
-            actor.trailer = declared_trailer(scenario.entities[name])
+            actor.set_trailer(declared_trailer(scenario.entities[name]))
         check_acyclic(self.context.actors)
         self._external = ExternalObjects(scenario, roads)
         self.context.warnings += self._external.warnings
@@ -127,8 +127,7 @@ class Storyboard:
         _check_placements(commands.placements)
         for front, back in trains:
             if front.present and back.present:
-                back.motion.pose = pose_behind(front, back, straight=front.motion.teleported)
-                back.motion.teleported, back.motion.speed = front.motion.teleported, front.motion.speed
+                back.motion.set_towed_state(pose_behind(front, back, straight=front.motion.teleported), front.motion)
                 commands.placements[back.name] = replace(back.motion.placement(), teleport=front.motion.teleported)
         passed_over = [name for name, look in self.context.appearances.items() if not look.visibility.traffic]
         self.context.traffic.step(view.without(passed_over), self.dt, commands)
@@ -142,7 +141,7 @@ class Storyboard:
         trains = list(pairs(self.context.actors))
         for front, back in trains:
             if front.present and (not back.present or self.context.view.tick < 0):
-                back.motion.speed = front.motion.speed
+                back.motion.set_speed(front.motion.speed)
                 self.context.add_actor(back.name, ResolvedPosition(pose_behind(front, back, straight=True)))
         return trains
 

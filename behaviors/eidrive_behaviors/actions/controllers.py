@@ -9,10 +9,10 @@ from py_trees.common import Status
 
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
+    ActionContext,
     Actor,
     Goal,
     Override,
-    RuntimeContext,
     is_agent_controller,
     model,
 )
@@ -76,7 +76,7 @@ class AssignControllerAction(ActionBehaviour):
     def __init__(
         self,
         action: model.AssignControllerAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -118,12 +118,8 @@ class OverrideControllerValueAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set or release the overrides."""
-        held = self.context.overrides.setdefault(self.actor.name, {})
         for override in self._overrides():
-            if override.active:
-                held[override.control] = override
-            else:
-                held.pop(override.control, None)
+            self.context.set_override(self.actor.name, override)
         return Status.SUCCESS
 
     def _overrides(self) -> list[Override]:
@@ -167,10 +163,7 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
     """Switch the domains of an actor's eidrive controller on or off; None keeps the state of a domain."""
     actor = behaviour.actor
     before = actor.driven
-    if lateral is not None:
-        actor.lateral = lateral
-    if longitudinal is not None:
-        actor.longitudinal = longitudinal
+    actor.activate_controller(lateral, longitudinal)
     if before is not actor.driven and actor.present:
         _join_lap(actor)
     if before and not actor.driven and actor.present:
@@ -179,7 +172,7 @@ def switch(behaviour: ActionBehaviour, lateral: bool | None, longitudinal: bool 
         onward = actor.motion.route.onward if actor.motion.route is not None else None
         lap = None if onward is None else onward.polyline(POINTS_APART)
         rest = _rest_of_route(actor)
-        actor.goal = Goal(speed=actor.motion.speed, path=lap if rest is None else rest, lap=lap)
+        actor.set_goal(Goal(speed=actor.motion.speed, path=lap if rest is None else rest, lap=lap))
 
 
 def _yielded_domains(lateral: bool | None, longitudinal: bool | None) -> tuple[bool | None, bool | None]:
@@ -194,7 +187,7 @@ def _join_lap(actor: Actor) -> None:
     """Drop the approach to a closed route if the actor is already on its lap as the control changes."""
     route, pose = actor.motion.route, actor.motion.pose
     if route is not None and route.lap is not None and _gap(route.lap, pose) <= _gap(route, pose):
-        actor.motion.route = route.lap
+        actor.motion.set_route(route.lap)
 
 
 def _gap(route: Route, pose: Pose) -> float:

@@ -16,7 +16,7 @@ class CustomCommandAction(ActionBehaviour):
     def update(self) -> Status:
         """Append the command to the commands of the step."""
         action = self.action
-        self.context.commands.custom.append(
+        self.context.request_command(
             CustomCommand(action.type, action.content, action.line, action.source, action.scope)
         )
         return Status.SUCCESS

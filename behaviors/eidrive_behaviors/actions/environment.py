@@ -16,8 +16,8 @@ class EnvironmentAction(ActionBehaviour):
     def update(self) -> Status:
         """Set the environment."""
         context = self.context
-        context.environment = merge_environment(context.environment, self._environment(), max(context.time, 0.0))
-        context.commands.environment = context.environment
+        merged = merge_environment(context.environment, self._environment(), max(context.time, 0.0))
+        context.set_environment(merged)
         return Status.SUCCESS
 
     def _environment(self) -> model.Environment:

@@ -13,10 +13,10 @@ from eidrive_behaviors.actions.speed import describe_dynamics
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
+    ActionContext,
     Domain,
     Goal,
     LateralStep,
-    RuntimeContext,
     TransitionProfile,
     count_lanes,
     facing,
@@ -49,7 +49,7 @@ class LaneChangeAction(ActionBehaviour):
     def __init__(
         self,
         action: model.LaneChangeAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -188,7 +188,7 @@ class LaneChangeAction(ActionBehaviour):
                 points.append(self._roads.pose(lane)[:3])
         if points:
             goal = self.actor.goal
-            self.actor.goal = replace(goal or Goal(), path=np.array(points), lap=None)
+            self.actor.set_goal(replace(goal or Goal(), path=np.array(points), lap=None))
         return Status.RUNNING
 
     def describe(self) -> str:

@@ -57,7 +57,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         other = self._same_way() * self.context.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
             motion.move_along_lane(error + other * self.context.dt)
-            motion.speed = other
+            motion.set_speed(other)
             return 0.0
         assert limits is not None
         dt = self.context.dt
@@ -73,7 +73,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
             wanted = min(wanted, self._acceleration + more)
         self._acceleration = wanted
         top = min(_infinite_if_none(limits.max_speed), self.actor.limits()[0])
-        motion.speed = min(max(motion.speed + wanted * dt, -top), top)
+        motion.set_speed(min(max(motion.speed + wanted * dt, -top), top))
         return error + (other - motion.speed) * dt
 
     @staticmethod

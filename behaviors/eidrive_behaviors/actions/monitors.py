@@ -15,7 +15,7 @@ class SetMonitorAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Set the monitor."""
-        self.context.monitors = {**self.context.monitors, self.action.monitor_ref: self.action.value}
+        self.context.set_monitor(self.action.monitor_ref, self.action.value)
         return Status.SUCCESS
 
     def describe(self) -> str:

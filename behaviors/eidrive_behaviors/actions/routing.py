@@ -10,8 +10,8 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.teleport import describe_position
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
+    ActionContext,
     Goal,
-    RuntimeContext,
     build_route,
     model,
     random_route,
@@ -77,7 +77,7 @@ class AcquirePositionAction(ActionBehaviour):
             assign_route(self, route)
         elif self.actor.driven:
             goal = self.actor.goal
-            self.actor.goal = replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]]))
+            self.actor.set_goal(replace(goal or Goal(), path=None, lap=None, waypoints=np.array([place.pose[:3]])))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -98,7 +98,7 @@ class RandomRouteAction(ActionBehaviour):
     def __init__(
         self,
         action: model.RandomRouteAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -116,11 +116,11 @@ class RandomRouteAction(ActionBehaviour):
         """Discard the route and select branches at random."""
         actor, roads = self.actor, self.context.roads
         choose = uniform_branch_selector(generator(self.context.seed, "random route", actor.name, self._starts))
-        actor.motion.route, actor.motion.branch_selector = None, choose
+        actor.motion.set_route(None, choose)
         here = self.context.location(actor.name)
         if actor.driven and roads is not None and here is not None:
             way = random_route(roads, here, RANDOM_ROUTE_LENGTH, choose)
-            actor.goal = replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None)
+            actor.set_goal(replace(actor.goal or Goal(), path=way.polyline(2.0), lap=None))
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -131,7 +131,7 @@ class RandomRouteAction(ActionBehaviour):
 def assign_route(behaviour: ActionBehaviour, route: Route) -> None:
     """Assign a route to the actor."""
     actor = behaviour.actor
-    actor.motion.route, actor.motion.branch_selector = route, None
+    actor.motion.set_route(route)
     if actor.driven:
         lap = None if route.onward is None else route.onward.polyline(2.0)
-        actor.goal = replace(actor.goal or Goal(), path=route.polyline(2.0), lap=lap)
+        actor.set_goal(replace(actor.goal or Goal(), path=route.polyline(2.0), lap=lap))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_scenario.api.actions import ActionBehaviour, RuntimeContext, model
+from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, model
 from eidrive_scenario.api.common import suggestion
 
 
@@ -20,7 +20,7 @@ class TrafficSignalStateAction(ActionBehaviour):
     def __init__(
         self,
         action: model.TrafficSignalStateAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -28,11 +28,11 @@ class TrafficSignalStateAction(ActionBehaviour):
         super().__init__(action, context, actor=actor, parent=parent)
         warning = context.signals.unknown(action.name, action)
         if warning is not None:
-            context.warnings.append(warning)
+            context.warn(warning)
 
     def update(self) -> Status:
         """Set the state."""
-        self.context.signals.set_state(self.action.name, self.action.state)
+        self.context.set_signal_state(self.action.name, self.action.state)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -52,7 +52,7 @@ class TrafficSignalControllerAction(ActionBehaviour):
     def __init__(
         self,
         action: model.TrafficSignalControllerAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -68,9 +68,7 @@ class TrafficSignalControllerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Start the phase."""
-        self.context.signals.set_phase(
-            self.action.traffic_signal_controller_ref, self.action.phase, max(self.context.time, 0.0)
-        )
+        self.context.set_signal_phase(self.action.traffic_signal_controller_ref, self.action.phase)
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import RateLimitedValue, is_follow_mode, speed_limiter
-from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, RuntimeContext, TransitionProfile, model
+from eidrive_scenario.api.actions import ActionBehaviour, ActionContext, Domain, Goal, TransitionProfile, model
 from eidrive_scenario.api.common import EPSILON
 
 REACHED = 0.2
@@ -31,7 +31,7 @@ class SpeedAction(ActionBehaviour):
     def __init__(
         self,
         action: model.SpeedAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -88,7 +88,7 @@ class SpeedAction(ActionBehaviour):
             speed = transition.advance(self.context.dt)
         if self._limiter is not None and self.context.dt > 0.0:
             speed = self._limiter.advance(speed, self.context.dt)
-        self.actor.motion.speed = speed
+        self.actor.motion.set_speed(speed)
         reached = transition.done and abs(speed - transition.target) < EPSILON
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 
@@ -105,9 +105,9 @@ class SpeedAction(ActionBehaviour):
         before = transition.value
         speed = transition.advance(self.context.dt)
         slope = 0.0 if transition.done or self.context.dt == 0.0 else (speed - before) / self.context.dt
-        self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
+        self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
         if self.actor.motion.teleported and transition.done:
-            self.actor.motion.speed = speed
+            self.actor.motion.set_speed(speed)
             return Status.RUNNING if self._continuous else Status.SUCCESS
         reached = transition.done and abs(self.context.speed(self.actor.name) - transition.target) < REACHED
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING

@@ -62,9 +62,9 @@ class SpeedProfileAction(ActionBehaviour):
         speed = self._segments[-1].speed if done else self._segments[index].at(self._elapsed)
         if self.actor.driven:
             slope = 0.0 if done else self._segments[index].slope
-            self.actor.goal = replace(self.actor.goal or Goal(), speed=speed, acceleration=slope)
+            self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=slope))
         else:
-            self.actor.motion.speed = speed
+            self.actor.motion.set_speed(speed)
         return Status.SUCCESS if done else Status.RUNNING
 
     def _corners(self, start: float) -> list[tuple[float, float]]:

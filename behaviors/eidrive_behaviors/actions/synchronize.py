@@ -92,16 +92,16 @@ class SynchronizeAction(ActionBehaviour):
             if changed:
                 return Status.RUNNING  # An action that starts in the same step may assign a trajectory.
             if final is not None:
-                motion.speed = final
+                motion.set_speed(final)
             return Status.SUCCESS
         way, present = max(way - mine, EPSILON), self._sense * motion.speed
         if final is None and self._mean is None and math.isfinite(time) and present > 2.0 * way / time:
             self._mean = way / time
         final = self._mean if final is None else self._sense * final
         if final is not None:
-            motion.speed = self._sense * self._next(way, time, final, dt)
+            motion.set_speed(self._sense * self._next(way, time, final, dt))
         elif math.isfinite(time):
-            motion.speed = self._sense * (present + 2.0 * (way / time - present) / time * dt)
+            motion.set_speed(self._sense * (present + 2.0 * (way / time - present) / time * dt))
         return Status.RUNNING
 
     def _next(self, way: float, time: float, final: float, dt: float) -> float:

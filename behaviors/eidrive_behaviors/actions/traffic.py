@@ -8,8 +8,8 @@ from py_trees.common import Status
 
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
+    ActionContext,
     ResolvedPosition,
-    RuntimeContext,
     model,
     resolve_position,
     traffic,
@@ -31,7 +31,7 @@ class TrafficInstanceAction(ActionBehaviour):
     def __init__(
         self,
         action: model.Element,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -50,7 +50,7 @@ class TrafficInstanceAction(ActionBehaviour):
     @property
     def background(self) -> traffic.BackgroundTraffic:
         """Background traffic of the run."""
-        return self.context.traffic.traffic
+        return self.context.background_traffic
 
     def check(self) -> None:
         """Check the settings of the action before the run. Raise ScenarioError if they are invalid."""
@@ -67,7 +67,7 @@ class TrafficInstanceAction(ActionBehaviour):
         """Run until the generator is stopped."""
         if self._generator is None:
             self._generator = self.build_generator()
-            self.context.traffic.start(self._generator)
+            self.context.start_traffic(self._generator)
         return Status.RUNNING if self._generator.active else Status.SUCCESS
 
     def terminate(self, new_status: Status) -> None:
@@ -281,7 +281,7 @@ class TrafficStopAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Stop the generators."""
-        self.context.traffic.stop(self.parent_element.traffic_name)
+        self.context.stop_traffic(self.parent_element.traffic_name)
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -16,8 +16,8 @@ class ConnectTrailerAction(ActionBehaviour):
         """Connect the trailer."""
         for other in self.context.actors.values():
             if other.trailer == self.action.trailer_ref:
-                other.trailer = None
-        self.actor.trailer = self.action.trailer_ref
+                other.set_trailer(None)
+        self.actor.set_trailer(self.action.trailer_ref)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -32,10 +32,11 @@ class DisconnectTrailerAction(ActionBehaviour):
 
     def update(self) -> Status:
         """Disconnect the trailer."""
-        name, self.actor.trailer = self.actor.trailer, None
+        name = self.actor.trailer
+        self.actor.set_trailer(None)
         if name is not None:
             trailer = self.context.actors[name].motion
-            trailer.speed = 0.0
+            trailer.set_speed(0.0)
             trailer.snap_to_lane()
         return Status.SUCCESS
 

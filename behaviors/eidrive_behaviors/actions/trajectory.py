@@ -12,11 +12,11 @@ from py_trees.common import Status
 from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, largest_curvature, wheelbase_of
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
+    ActionContext,
     Domain,
     EntityAbsentError,
     Goal,
     ResolvedPosition,
-    RuntimeContext,
     TrajectoryCurve,
     TrajectoryProgress,
     has_times,
@@ -60,7 +60,7 @@ class FollowTrajectoryAction(ActionBehaviour):
     def __init__(
         self,
         action: model.FollowTrajectoryAction,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -76,7 +76,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             shape = next(name for name in TIME_ATTRIBUTES if getattr(self._trajectory.shape, name) is not None)
             what = "the actor keeps its own speed: the trajectory has no times for Timing to scale"
             hint = f"specify {TIME_ATTRIBUTES[shape]}, or <None/> as the TimeReference"
-            context.warnings += self.error(what, hint).diagnostics
+            context.warn(*self.error(what, hint).diagnostics)
 
     @property
     def controls(self) -> Domain:
@@ -97,7 +97,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose)
         self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
-        self.actor.progress = self._followed = self._progress
+        self._followed = self._progress
+        self.actor.set_progress(self._progress)
         self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
         self._started = self.context.time
         follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
@@ -175,7 +176,7 @@ class FollowTrajectoryAction(ActionBehaviour):
     def terminate(self, new_status: Status) -> None:
         """Remove the progress along the trajectory, so that no distance refers to it any more."""
         if self._followed is not None and self.actor.progress is self._followed:
-            self.actor.progress = None
+            self.actor.set_progress(None)
         self._followed = None
 
     def update(self) -> Status:
@@ -200,7 +201,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             after = layout.at_time(clock, self._speeds)
             done = clock >= layout.end_time - EPSILON
             if dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
-                motion.speed = self._forwards(after) * (after - self._s) / dt
+                motion.set_speed(self._forwards(after) * (after - self._s) / dt)
             if done:
                 after += max(0.0, clock - layout.end_time) * self._timing.scale * abs(motion.speed)
         before, self._s = self._s, after
@@ -244,7 +245,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 self._run.keep(wanted, dt)
             else:
                 self._run.advance(wanted, dt)
-            motion.speed = way * self._run.rate
+            motion.set_speed(way * self._run.rate)
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
@@ -283,7 +284,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         count = max(2, math.ceil(self._layout.length / 2.0) + 1)
         points = np.array([self._layout.at(s)[:3] for s in np.linspace(self._s, self._layout.length, count).tolist()])
         goal = self.actor.goal
-        self.actor.goal = replace(goal or Goal(), path=points, lap=None)
+        self.actor.set_goal(replace(goal or Goal(), path=points, lap=None))
         here = self.actor.motion.pose
         return Status.SUCCESS if math.hypot(points[-1, 0] - here.x, points[-1, 1] - here.y) < 2.0 else Status.RUNNING
 

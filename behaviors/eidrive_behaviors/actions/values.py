@@ -25,9 +25,17 @@ class ValueAction(ActionBehaviour):
         return parent.parameter_ref if isinstance(parent, model.ParameterAction) else parent.variable_ref
 
     @property
-    def values(self) -> dict[str, str]:
-        """All values of this kind by name."""
-        return self.context.parameters if self.kind == "parameter" else self.context.variables
+    def value(self) -> str:
+        """Current value; empty without one."""
+        values = self.context.parameters if self.kind == "parameter" else self.context.variables
+        return values.get(self.ref, "")
+
+    def set_value(self, value: str) -> None:
+        """Set the value."""
+        if self.kind == "parameter":
+            self.context.set_parameter(self.ref, value)
+        else:
+            self.context.set_variable(self.ref, value)
 
 
 class SetAction(ValueAction):
@@ -37,7 +45,7 @@ class SetAction(ValueAction):
 
     def update(self) -> Status:
         """Set the value."""
-        self.values[self.ref] = self.action.value
+        self.set_value(self.action.value)
         return Status.SUCCESS
 
     def describe(self) -> str:
@@ -52,7 +60,7 @@ class ModifyAction(ValueAction):
 
     def update(self) -> Status:
         """Modify the value."""
-        self.values[self.ref] = modify_value(self, self.values.get(self.ref, ""), self.ref, self.action.rule)
+        self.set_value(modify_value(self, self.value, self.ref, self.action.rule))
         return Status.SUCCESS
 
     def describe(self) -> str:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
 from eidrive_scenario.api.common import Pose, wrap_angle
 
 
-def angle_in_world(context: RuntimeContext, entity: str, kind: model.AngleType) -> float:
+def angle_in_world(context: ConditionContext, entity: str, kind: model.AngleType) -> float:
     """Return heading, pitch or roll of an entity in the world [rad]."""
     return _component(context.pose(entity), kind)
 
 
 def reference_angle(
-    context: RuntimeContext, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None
+    context: ConditionContext, entity: str, kind: model.AngleType, system: model.CoordinateSystem | None
 ) -> float:
     """Return the reference angle of an AngleCondition [rad]: that of lane, road or trajectory at the entity.
 
@@ -49,7 +49,7 @@ class AngleWithin(QuantityCondition):
     element: model.AngleCondition | model.RelativeAngleCondition
     unit = "rad"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the absolute difference between angle and value, in [0, π] [rad]."""
         return abs(wrap_angle(self.angle(context, entity) - self.element.angle))
 
@@ -57,7 +57,7 @@ class AngleWithin(QuantityCondition):
         """Return the rule: at most the tolerance."""
         return model.Rule.LESS_OR_EQUAL, self.element.angle_tolerance
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the current angle."""
         return f"{entity}: {self.describe_for()}, it is {wrap_angle(self.angle(context, entity)):.3f} rad"
 
@@ -66,7 +66,7 @@ class AngleWithin(QuantityCondition):
         return f"{self.what()} {self.element.angle:g} ± {self.element.angle_tolerance:g} rad"
 
     @abstractmethod
-    def angle(self, context: RuntimeContext, entity: str) -> float:
+    def angle(self, context: ConditionContext, entity: str) -> float:
         """Return the angle [rad]; NaN if there is none now."""
 
 
@@ -79,7 +79,7 @@ class AngleCondition(AngleWithin):
         """Describe the angle."""
         return str(self.element.angle_type.value)
 
-    def angle(self, context: RuntimeContext, entity: str) -> float:
+    def angle(self, context: ConditionContext, entity: str) -> float:
         """Return the angle to the axes at the entity [rad]."""
         kind = self.element.angle_type
         return angle_in_world(context, entity, kind) - reference_angle(
@@ -96,7 +96,7 @@ class RelativeAngleCondition(AngleWithin):
         """Describe the angle and the other entity."""
         return f"{self.element.angle_type.value} to {self.element.entity_ref}"
 
-    def angle(self, context: RuntimeContext, entity: str) -> float:
+    def angle(self, context: ConditionContext, entity: str) -> float:
         """Return the difference of the angles [rad]."""
         if self.element.entity_ref not in context.view:
             return math.nan

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from eidrive_scenario.api.actions import EntityCondition, RuntimeContext, entity_box, facing, model
+from eidrive_scenario.api.actions import ConditionContext, EntityCondition, entity_box, facing, model
 from eidrive_scenario.api.common import LaneLocation, footprint
 
 
@@ -19,14 +19,14 @@ class RelativeClearanceCondition(EntityCondition):
 
     element: model.RelativeClearanceCondition
 
-    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def holds_for(self, context: ConditionContext, entity: str) -> bool:
         """Return True if the lanes exist and no entity is in the area."""
         here = context.location(entity)
         if here is None or context.roads is None:
             return False
         return self._range_exists(context, entity, here) and not self._entities_within(context, entity, here)
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the entities in the area."""
         here = context.location(entity)
         found = self._entities_within(context, entity, here) if here is not None else []
@@ -37,7 +37,7 @@ class RelativeClearanceCondition(EntityCondition):
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return f"clear {ahead:g} m ahead, {behind:g} m behind"
 
-    def _entities_within(self, context: RuntimeContext, entity: str, here: LaneLocation) -> list[str]:
+    def _entities_within(self, context: ConditionContext, entity: str, here: LaneLocation) -> list[str]:
         names = [ref.entity_ref for ref in self.element.entity_ref] or list(context.view.names)
         return [
             name
@@ -45,7 +45,7 @@ class RelativeClearanceCondition(EntityCondition):
             if name != entity and name in context.view and self._blocks(context, entity, here, name)
         ]
 
-    def _blocks(self, context: RuntimeContext, entity: str, here: LaneLocation, name: str) -> bool:
+    def _blocks(self, context: ConditionContext, entity: str, here: LaneLocation, name: str) -> bool:
         locations = self._locations(context, name)
         if not locations or not any(self._in_range(context, entity, here, other) for other in covered_lanes(locations)):
             return False
@@ -56,7 +56,7 @@ class RelativeClearanceCondition(EntityCondition):
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0
         return bool(along) and min(along) <= ahead and max(along) >= -behind
 
-    def _locations(self, context: RuntimeContext, name: str) -> list[LaneLocation]:
+    def _locations(self, context: ConditionContext, name: str) -> list[LaneLocation]:
         """Return locations of an entity: its reference point, and with `freeSpace` the corners of its box."""
         other = context.location(name)
         if other is None:
@@ -68,12 +68,12 @@ class RelativeClearanceCondition(EntityCondition):
         corners = (context.roads.locate_at(x, y, other) for x, y in outline)
         return [other, *(corner for corner in corners if corner is not None)]
 
-    def _range_exists(self, context: RuntimeContext, entity: str, here: LaneLocation) -> bool:
+    def _range_exists(self, context: ConditionContext, entity: str, here: LaneLocation) -> bool:
         assert context.roads is not None
         lanes = context.roads.lane_ids(here.road, here.s, drivable=True)
         return any(self._in_range(context, entity, here, here._replace(lane=lane)) for lane in lanes)
 
-    def _in_range(self, context: RuntimeContext, entity: str, here: LaneLocation, other: LaneLocation) -> bool:
+    def _in_range(self, context: ConditionContext, entity: str, here: LaneLocation, other: LaneLocation) -> bool:
         assert context.roads is not None
         runs = context.roads.orientation(here, other)
         if runs is None:

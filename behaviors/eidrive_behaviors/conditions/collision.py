@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.api.actions import EntityCondition, RuntimeContext, entity_box, model
+from eidrive_scenario.api.actions import ConditionContext, EntityCondition, entity_box, model
 from eidrive_scenario.api.common import overlap
 
 TYPES: dict[str, type[model.Element]] = {
@@ -22,11 +22,11 @@ class CollisionCondition(EntityCondition):
 
     element: model.CollisionCondition
 
-    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def holds_for(self, context: ConditionContext, entity: str) -> bool:
         """Return True if another entity is touched."""
         return bool(self._touched_entities(context, entity))
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the touched entities."""
         touched = self._touched_entities(context, entity)
         return f"{entity}: collides with {', '.join(touched)}" if touched else f"{entity}: touches no entity"
@@ -38,7 +38,7 @@ class CollisionCondition(EntityCondition):
         assert self.element.by_type is not None
         return f"collides with a {self.element.by_type.type.value}"
 
-    def _touched_entities(self, context: RuntimeContext, entity: str) -> list[str]:
+    def _touched_entities(self, context: ConditionContext, entity: str) -> list[str]:
         box = entity_box(context, entity)
         # Bodies that rebound within a step do not overlap at its end: the contact event counts too.
         begun: set[str] = set()
@@ -52,11 +52,11 @@ class CollisionCondition(EntityCondition):
         ]
         return named if self.element.by_type is None else [*named, *self._touched_traffic(context, box, begun)]
 
-    def _touched_traffic(self, context: RuntimeContext, box: Sequence[float], begun: set[str]) -> list[str]:
+    def _touched_traffic(self, context: ConditionContext, box: Sequence[float], begun: set[str]) -> list[str]:
         """Return the background traffic of the type that touches a box. It counts although it has no entities."""
         assert self.element.by_type is not None
         kind, view = self.element.by_type.type.value, context.view
-        rows = [view.rows[name] for name in context.traffic.names if name in view]
+        rows = [view.rows[name] for name in context.traffic_names if name in view]
         if not rows or kind not in ("vehicle", "pedestrian"):
             return []
         boxes = view.boxes[rows]
@@ -69,7 +69,7 @@ class CollisionCondition(EntityCondition):
             and (view.names[row] in begun or (close and overlap(box, view.boxes[row])))
         ]
 
-    def _candidates(self, context: RuntimeContext) -> list[str]:
+    def _candidates(self, context: ConditionContext) -> list[str]:
         if self.element.entity_ref is not None:
             names = [self.element.entity_ref.entity_ref]
         else:

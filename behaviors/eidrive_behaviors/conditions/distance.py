@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from eidrive_scenario.api.actions import (
+    ConditionContext,
     EntityAbsentError,
     QuantityCondition,
     ResolvedPosition,
-    RuntimeContext,
     distance,
     model,
     resolve_coordinate_system,
@@ -41,7 +41,7 @@ class GapCondition(QuantityCondition):
         self.frame = "road" if along else resolve_coordinate_system(element.coordinate_system)
         self.kind = "longitudinal" if along else resolve_distance_type(element.relative_distance_type)
 
-    def gap(self, context: RuntimeContext, entity: str, target: str | ResolvedPosition) -> float:
+    def gap(self, context: ConditionContext, entity: str, target: str | ResolvedPosition) -> float:
         """Return the signed distance [m]; NaN if there is none."""
         element = self.element
         try:
@@ -58,7 +58,7 @@ class GapCondition(QuantityCondition):
             return math.nan
 
 
-def current_place(context: RuntimeContext, position: model.Position, entity: str) -> ResolvedPosition | None:
+def current_place(context: ConditionContext, position: model.Position, entity: str) -> ResolvedPosition | None:
     """Return the current place of a position; None if it refers to an absent entity."""
     try:
         return resolve_position(position, context, entity)
@@ -76,7 +76,7 @@ class DistanceCondition(GapCondition):
         """Describe the compared quantity."""
         return f"distance to {type(self.element.position.chosen()).__name__}"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the absolute distance [m]."""
         place = current_place(context, self.element.position, entity)
         return math.nan if place is None else abs(self.gap(context, entity, place))
@@ -88,7 +88,7 @@ class RelativeDistanceCondition(GapCondition):
     element: model.RelativeDistanceCondition
     unit = "m"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the absolute distance [m]."""
         return abs(self.gap(context, entity, self.element.entity_ref))
 
@@ -109,7 +109,7 @@ class ReachPositionCondition(QuantityCondition):
     element: model.ReachPositionCondition
     unit = "m"
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the current distance."""
         gap = self.quantity(context, entity)
         return f"{entity}: {gap:.2f} m from the position, tolerance {self.element.tolerance:g} m"
@@ -118,7 +118,7 @@ class ReachPositionCondition(QuantityCondition):
         """Describe the tolerance."""
         return f"within {self.element.tolerance:g} m of {type(self.element.position.chosen()).__name__}"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the distance between reference point and position [m]; infinite while the position is undefined."""
         place = current_place(context, self.element.position, entity)
         if place is None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from eidrive_scenario.api.actions import (
     Condition,
+    ConditionContext,
     ElementState,
     ElementStateObserver,
     ElementTransition,
-    RuntimeContext,
     model,
 )
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
@@ -27,21 +27,21 @@ class StoryboardElementStateCondition(Condition):
     element: model.StoryboardElementStateCondition
     _observer: ElementStateObserver | None = None
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Find the element. Raise ScenarioError if the storyboard has no element of that name and type."""
         kind, name = self.element.storyboard_element_type.value, self.element.storyboard_element_ref
-        self._observer = context.progress.observe_element(kind, name)
+        self._observer = context.observe_element(kind, name)
         if self._observer is None:
             raise ScenarioError(
                 Diagnostic(
                     f"the storyboard has no {kind} named {name!r}",
-                    suggestion(name, context.progress.names(kind)),
+                    suggestion(name, context.element_names(kind)),
                     self.element.source,
                     self.element.line,
                 )
             )
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Return True if the element is in the state or passed through the transition."""
         if self._observer is None:
             return False
@@ -50,7 +50,7 @@ class StoryboardElementStateCondition(Condition):
             return self._observer.passed(TRANSITIONS[word])
         return self._observer.in_state(STATES[word])
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe element and state."""
         return self.describe()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
 from eidrive_scenario.api.common import WorldView as View
 
 
@@ -39,7 +39,7 @@ class SpeedCondition(QuantityCondition):
         """Describe the compared quantity."""
         return f"{_direction_prefix(self.element.direction)}speed"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the speed [m/s]."""
         if self.element.direction is None:
             return context.speed(entity)
@@ -56,7 +56,7 @@ class RelativeSpeedCondition(QuantityCondition):
         """Describe the compared quantity."""
         return f"{_direction_prefix(self.element.direction)}speed above that of {self.element.entity_ref}"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the speed difference [m/s]."""
         other = self.element.entity_ref
         if other not in context.view:
@@ -78,7 +78,7 @@ class AccelerationCondition(QuantityCondition):
         """Describe the compared quantity."""
         return f"{_direction_prefix(self.element.direction)}acceleration"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the acceleration [m/s²]."""
         vector = context.view.acceleration[context.view.row(entity)].tolist()
         return component_of(vector, context.pose(entity).h, self.element.direction)
@@ -90,7 +90,7 @@ class StandStillCondition(QuantityCondition):
     element: model.StandStillCondition
     unit = "s"
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the duration of the standstill."""
         return f"{entity}: {describe_elapsed(context, context.actors[entity].standing_since, 'standing', 'moving')}"
 
@@ -98,7 +98,7 @@ class StandStillCondition(QuantityCondition):
         """Describe the required duration."""
         return f"stands still for {self.element.duration:g} s"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the duration of the standstill [s]."""
         return elapsed_time(context, context.actors[entity].standing_since)
 
@@ -117,7 +117,7 @@ class TraveledDistanceCondition(QuantityCondition):
         """Describe the compared quantity."""
         return "traveled"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the covered distance [m]."""
         return context.actors[entity].traveled
 
@@ -126,11 +126,11 @@ class TraveledDistanceCondition(QuantityCondition):
         return model.Rule.GREATER_OR_EQUAL, self.element.value
 
 
-def elapsed_time(context: RuntimeContext, start: float | None) -> float:
+def elapsed_time(context: ConditionContext, start: float | None) -> float:
     """Return the time since a state began [s]; NaN if it does not hold."""
     return math.nan if start is None else context.time - start
 
 
-def describe_elapsed(context: RuntimeContext, start: float | None, what: str, otherwise: str) -> str:
+def describe_elapsed(context: ConditionContext, start: float | None, what: str, otherwise: str) -> str:
     """Describe the time since a state began, or `otherwise`."""
     return otherwise if start is None else f"{what} for {context.time - start:.2f} s"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_behaviors.conditions.motion import describe_elapsed, elapsed_time
-from eidrive_scenario.api.actions import QuantityCondition, RuntimeContext, model
+from eidrive_scenario.api.actions import ConditionContext, QuantityCondition, model
 
 
 class EndOfRoadCondition(QuantityCondition):
@@ -12,7 +12,7 @@ class EndOfRoadCondition(QuantityCondition):
     element: model.EndOfRoadCondition
     unit = "s"
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the current duration."""
         start = context.actors[entity].end_of_road_since
         return f"{entity}: {describe_elapsed(context, start, 'at the end of its road', 'on its way')}"
@@ -21,7 +21,7 @@ class EndOfRoadCondition(QuantityCondition):
         """Describe the required duration."""
         return f"at the end of its road for {self.element.duration:g} s"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the time at the end of the road [s]."""
         return elapsed_time(context, context.actors[entity].end_of_road_since)
 
@@ -36,12 +36,12 @@ class OffroadCondition(QuantityCondition):
     element: model.OffroadCondition
     unit = "s"
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Enable the off-road check of the entities, which runs without this condition do not need."""
         for name in self.entities:
-            context.actors[name].off_road_wanted = True
+            context.actors[name].track_off_road()
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """Describe the current duration."""
         start = context.actors[entity].off_road_since
         return f"{entity}: {describe_elapsed(context, start, 'off the road', 'on the road')}"
@@ -50,7 +50,7 @@ class OffroadCondition(QuantityCondition):
         """Describe the required duration."""
         return f"off the road for {self.element.duration:g} s"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the time off the road [s]."""
         return elapsed_time(context, context.actors[entity].off_road_since)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from eidrive_scenario.api.actions import Condition, RuntimeContext, model
+from eidrive_scenario.api.actions import Condition, ConditionContext, model
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 
@@ -12,18 +12,18 @@ class TrafficSignalCondition(Condition):
     instant = True
     element: model.TrafficSignalCondition
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Warn of an unknown signal name."""
         warning = context.signals.unknown(self.element.name, self.element)
         if warning is not None:
-            context.warnings.append(warning)
+            context.warn(warning)
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Return True if the signal has the state."""
         state = context.signals.state(self.element.name)
         return state is not None and _normalized(state) == _normalized(self.element.state)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current state."""
         return f"signal {self.element.name} shows {context.signals.state(self.element.name) or 'nothing'}"
 
@@ -38,7 +38,7 @@ class TrafficSignalControllerCondition(Condition):
     instant = True
     element: model.TrafficSignalControllerCondition
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Look the phase up. Raise ScenarioError if the controller does not have it."""
         element = self.element
         cycle = context.signals.cycles.get(element.traffic_signal_controller_ref)
@@ -54,11 +54,11 @@ class TrafficSignalControllerCondition(Condition):
                 )
             )
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Return True if the controller is in the phase."""
         return context.signals.phase(self.element.traffic_signal_controller_ref) == self.element.phase
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current phase."""
         name = self.element.traffic_signal_controller_ref
         return f"signal controller {name} is in {context.signals.phase(name) or 'no phase'}"

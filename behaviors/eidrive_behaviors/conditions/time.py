@@ -6,8 +6,8 @@ from datetime import datetime
 
 from eidrive_scenario.api.actions import (
     Condition,
+    ConditionContext,
     Measure,
-    RuntimeContext,
     describe_rule,
     model,
     relation,
@@ -21,11 +21,11 @@ class SimulationTimeCondition(Condition):
 
     element: model.SimulationTimeCondition
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Compare the time of this view."""
         return satisfies_rule(context.time, self.element.rule, self.element.value)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current time."""
         sign = relation(self.element.rule, self.holds(context))
         return f"simulation time {context.time:.2f} s {sign} {self.element.value:g} s"
@@ -34,7 +34,7 @@ class SimulationTimeCondition(Condition):
         """Describe rule and limit."""
         return f"simulation time {describe_rule(self.element.rule)} {self.element.value:g} s"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the time."""
         return (Measure("", context.time, self.element.rule, self.element.value, "s"),)
 
@@ -50,16 +50,16 @@ class TimeOfDayCondition(Condition):
     instant = True
     element: model.TimeOfDayCondition
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Warn if no environment of the scenario specifies a time of day."""
         scenario = context.scenario
         trees = (scenario.document, *scenario.entries.values())
         if not any(isinstance(below, model.TimeOfDay) for tree in trees for below in tree.walk()):
             what = "TimeOfDayCondition is never fulfilled: no environment of the scenario has a TimeOfDay"
             hint = "specify one in an EnvironmentAction in Init"
-            context.warnings.append(Diagnostic(what, hint, self.element.source, self.element.line))
+            context.warn(Diagnostic(what, hint, self.element.source, self.element.line))
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Compare the clock."""
         now = context.environment.clock(context.time)
         if now is None:
@@ -68,7 +68,7 @@ class TimeOfDayCondition(Condition):
             (now - _match_time_zone(self.element.date_time, now)).total_seconds(), self.element.rule, 0.0
         )
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current time."""
         now = context.environment.clock(context.time)
         shown = "unknown" if now is None else now.isoformat()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.conditions.distance import GapCondition, current_place
-from eidrive_scenario.api.actions import ResolvedPosition, RuntimeContext, closing_speed, model
+from eidrive_scenario.api.actions import ConditionContext, ResolvedPosition, closing_speed, model
 
 STANDING = 1e-6
 
@@ -20,7 +20,7 @@ class TimeHeadwayCondition(GapCondition):
         """Describe the compared quantity."""
         return f"time headway to {self.element.entity_ref}"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the headway [s]."""
         speed, gap = abs(context.speed(entity)), abs(self.gap(context, entity, self.element.entity_ref))
         return gap / speed if speed > STANDING else gap * math.inf if gap > 0.0 else gap
@@ -40,7 +40,7 @@ class TimeToCollisionCondition(GapCondition):
         other = self.element.time_to_collision_condition_target.entity_ref
         return f"time to collision with {'the position' if other is None else other.entity_ref}"
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the time to collision [s]."""
         to = self._target(context, entity)
         if to is None:
@@ -49,7 +49,7 @@ class TimeToCollisionCondition(GapCondition):
         closing = closing_speed(context, entity, to, frame=self.frame, kind=self.kind, algorithm=how)
         return abs(gap) / closing if closing > STANDING else math.nan
 
-    def _target(self, context: RuntimeContext, entity: str) -> str | ResolvedPosition | None:
+    def _target(self, context: ConditionContext, entity: str) -> str | ResolvedPosition | None:
         """Return the other entity or the place; None while it is absent."""
         target = self.element.time_to_collision_condition_target
         if target.entity_ref is not None:

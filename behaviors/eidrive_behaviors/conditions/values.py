@@ -6,8 +6,8 @@ import re
 
 from eidrive_scenario.api.actions import (
     Condition,
+    ConditionContext,
     Measure,
-    RuntimeContext,
     describe_rule,
     model,
     relation,
@@ -58,11 +58,11 @@ class ParameterCondition(Condition):
     instant = True
     element: model.ParameterCondition
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Compare the value."""
         return satisfies(context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current value."""
         value = context.parameters.get(self.element.parameter_ref)
         sign = relation(self.element.rule, self.holds(context))
@@ -72,7 +72,7 @@ class ParameterCondition(Condition):
         """Describe rule and limit."""
         return f"parameter {self.element.parameter_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the value."""
         return numeric_measures(
             context.parameters.get(self.element.parameter_ref), self.element.rule, self.element.value
@@ -85,11 +85,11 @@ class VariableCondition(Condition):
     instant = True
     element: model.VariableCondition
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Compare the value."""
         return satisfies(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current value."""
         value = context.variables.get(self.element.variable_ref)
         sign = relation(self.element.rule, self.holds(context))
@@ -99,7 +99,7 @@ class VariableCondition(Condition):
         """Describe rule and limit."""
         return f"variable {self.element.variable_ref} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the value."""
         return numeric_measures(context.variables.get(self.element.variable_ref), self.element.rule, self.element.value)
 
@@ -109,15 +109,15 @@ class UserDefinedValueCondition(Condition):
 
     element: model.UserDefinedValueCondition
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Register the request for the value."""
-        context.requested_user_values.setdefault(self.element.name, self.element)
+        context.request_user_value(self.element)
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """Compare the value."""
         return satisfies(context.user_values.get(self.element.name), self.element.rule, self.element.value)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """Describe the current value."""
         value = context.user_values.get(self.element.name)
         sign = relation(self.element.rule, self.holds(context))
@@ -127,6 +127,6 @@ class UserDefinedValueCondition(Condition):
         """Describe rule and limit."""
         return f"{self.element.name} {describe_rule(self.element.rule)} {self.element.value}"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Return the value."""
         return numeric_measures(context.user_values.get(self.element.name), self.element.rule, self.element.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.controllers.properties import number
-from eidrive_scenario.api.actions import Actor, ControllerModel, RuntimeContext, distance, entity_box, model
+from eidrive_scenario.api.actions import Actor, ControllerContext, ControllerModel, distance, entity_box, model
 
 CLOSEST = 3.0
 """Gap to a standing vehicle [m]."""
@@ -31,7 +31,7 @@ class AdaptiveCruise(ControllerModel):
     SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
     """
 
-    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
+    def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
         super().__init__(controller, context, actor)
         self.time_gap = number(controller, "timeGap", 1.5, least=0.0)
         self.lateral_range = number(controller, "lateralDist", 5.0, least=0.0)

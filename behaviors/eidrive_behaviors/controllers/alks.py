@@ -8,7 +8,7 @@ from eidrive_behaviors.controllers.properties import number
 from eidrive_behaviors.controllers.reference_driver import ReferenceDriver, ReferenceDriverSettings
 from eidrive_behaviors.controllers.road_ahead import LeadObject, RoadAhead
 from eidrive_behaviors.controllers.safety_models import EgoKinematics, Fsm, Regulation, Rss, SafetyModel
-from eidrive_scenario.api.actions import Actor, ControllerModel, RuntimeContext, model
+from eidrive_scenario.api.actions import Actor, ControllerContext, ControllerModel, model
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
 COMFORT = 2.0
@@ -34,7 +34,7 @@ class AlksDriver(ControllerModel):
     `alwaysTrigOnScenario`.
     """
 
-    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
+    def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
         super().__init__(controller, context, actor)
         self._controller = controller
         self.model = self._build_model()

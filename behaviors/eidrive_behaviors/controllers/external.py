@@ -20,10 +20,10 @@ class ExternalDriver(ControllerModel):
     def step(self) -> None:
         """Move to the pose that was set since the last step, else stand still."""
         name, motion = self.actor.name, self.actor.motion
-        given = self.context.external_poses.pop(name, None)
+        given = self.context.take_external_pose(name)
         if not (self.actor.longitudinal or self.actor.lateral):
             return
-        motion.speed = 0.0 if given is None else given.speed
+        motion.set_speed(0.0 if given is None else given.speed)
         if given is not None:
             motion.move_to(given.pose, land=self.context.roads is not None)
 

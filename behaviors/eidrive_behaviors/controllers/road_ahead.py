@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eidrive_scenario.api.actions import Actor, RuntimeContext, model
+from eidrive_scenario.api.actions import Actor, ControllerContext, model
 from eidrive_scenario.api.common import LaneLocation
 
 Span = tuple[float, float]
@@ -65,7 +65,7 @@ class RoadAhead:
     """
 
     def __init__(
-        self, context: RuntimeContext, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0
+        self, context: ControllerContext, actor: Actor, reach: float, *, tolerance: float = 0.0, later: float = 0.0
     ) -> None:
         self._context, self._actor, self._reach = context, actor, reach
         self._tolerance, self._later = tolerance, later

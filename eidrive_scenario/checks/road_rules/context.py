@@ -12,8 +12,9 @@ from eidrive_scenario.errors import InputError
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Position
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities, resolve_position
 from eidrive_scenario.world.view import WorldView
 

@@ -12,7 +12,7 @@ from py_trees.common import Status
 from eidrive_scenario.errors import Diagnostic, InvalidResult, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import ActionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.state.domains import Domain
 
@@ -41,7 +41,7 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def __init__(
         self,
         action: model.Element,
-        context: RuntimeContext,
+        context: ActionContext,
         *,
         actor: str | None = None,
         parent: model.Element | None = None,
@@ -105,9 +105,8 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
     def abort(self, who: EntityAbsentError) -> str:
         """Stop, as somebody whom the action is about is not in the world; why, in words. The run warns of it."""
         self.stop(Status.INVALID)
-        self.context.release(self)
         why = f"{who} is not in the world"
-        self.context.warnings += self.error(f"is not performed: {why}", "let it wait for the entity").diagnostics
+        self.context.warn(*self.error(f"is not performed: {why}", "let it wait for the entity").diagnostics)
         return why
 
     def check_decision(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import is_built_in
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
 from eidrive_scenario.tolerances import EPSILON
 
 WORDS = {
@@ -78,22 +78,22 @@ class Condition(ABC):
     def __init__(self, element: model.Element) -> None:
         self.element = element
 
-    def bind(self, context: RuntimeContext) -> None:  # noqa: B027 - most refer to nothing
+    def bind(self, context: ConditionContext) -> None:  # noqa: B027 - most refer to nothing
         """Look up what the element refers to, once, before the first tick. Raises ScenarioError."""
 
     @abstractmethod
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """True where the condition holds now."""
 
     @abstractmethod
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """The condition in words, with the values of now."""
 
     def describe(self) -> str:
         """The condition in words, without values."""
         return type(self.element).__name__
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """The quantities that it compares now, if it compares any."""
         return ()
 
@@ -127,17 +127,17 @@ class EntityCondition(Condition):
         self.fulfilled: tuple[str, ...] = ()
         """The entities that fulfilled it when it was last asked."""
 
-    def holds(self, context: RuntimeContext) -> bool:
+    def holds(self, context: ConditionContext) -> bool:
         """The rule over the entities; every one of them is asked each time, so that their histories stay whole."""
         holds_for, view = self._checked_holds_for if self.third_party else self.holds_for, context.view
         self.fulfilled = tuple([name for name in self.entities if name in view and holds_for(context, name)])
         return len(self.fulfilled) == len(self.entities) if self.rule == "all" else bool(self.fulfilled)
 
-    def _checked_holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def _checked_holds_for(self, context: ConditionContext, entity: str) -> bool:
         held: object = self.holds_for(context, entity)
         return held if held is True or held is False else truth(self, held)
 
-    def explain(self, context: RuntimeContext) -> str:
+    def explain(self, context: ConditionContext) -> str:
         """What is true of those that fulfill it, or of all."""
         names = self.fulfilled or self.entities
         return ", ".join(
@@ -149,12 +149,12 @@ class EntityCondition(Condition):
         joined = f" {'and' if self.rule == 'all' else 'or'} ".join(self.entities)
         return f"{joined}: {self.describe_for()}"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """The quantity of each entity that is in the world."""
         found = [(name, self.quantity(context, name)) for name in self.entities if name in context.view]
         return tuple(Measure(name, value, *self.threshold(), self.unit) for name, value in found if value is not None)
 
-    def quantity(self, context: RuntimeContext, entity: str) -> float | None:
+    def quantity(self, context: ConditionContext, entity: str) -> float | None:
         """What it compares for this entity, which is in the world; NaN where that is undefined now, None if nothing."""
         return None
 
@@ -164,11 +164,11 @@ class EntityCondition(Condition):
         return element.rule, element.value
 
     @abstractmethod
-    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def holds_for(self, context: ConditionContext, entity: str) -> bool:
         """True where the condition holds for this entity, which is in the world."""
 
     @abstractmethod
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """The condition in words for this entity, with the values of now."""
 
     def describe_for(self) -> str:
@@ -179,12 +179,12 @@ class EntityCondition(Condition):
 class QuantityCondition(EntityCondition):
     """A condition that compares a quantity of each entity with a limit."""
 
-    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def holds_for(self, context: ConditionContext, entity: str) -> bool:
         """Compare it."""
         rule, limit = self.threshold()
         return satisfies_rule(self.quantity(context, entity), rule, limit)
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """The quantity, the limit, and how they compare; on a falling edge that is not what the rule asks for."""
         rule, limit = self.threshold()
         quantity = self.quantity(context, entity)
@@ -203,5 +203,5 @@ class QuantityCondition(EntityCondition):
         return type(self.element).__name__
 
     @abstractmethod
-    def quantity(self, context: RuntimeContext, entity: str) -> float:
+    def quantity(self, context: ConditionContext, entity: str) -> float:
         """What it compares for this entity, which is in the world; NaN where that is undefined now."""

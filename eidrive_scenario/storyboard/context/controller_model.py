@@ -10,7 +10,7 @@ from typing import ClassVar, SupportsFloat
 from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, suggestion
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.registry import Registry, construct
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import ControllerContext
 from eidrive_scenario.storyboard.kinematics.actor import Actor, is_agent_controller
 
 
@@ -24,7 +24,7 @@ class ControllerModel(ABC):
     accepts_external_poses: ClassVar[bool] = False
     """True for one that moves the actor to poses from outside (`Simulation.set_pose`)."""
 
-    def __init__(self, controller: model.Controller, context: RuntimeContext, actor: Actor) -> None:
+    def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
         properties = controller.properties.property if controller.properties is not None else ()
         self.properties: Mapping[str, str] = {entry.name: entry.value for entry in properties}
         self.context = context
@@ -42,7 +42,7 @@ class ControllerModel(ABC):
         speed = self.compute_speed()
         if not isinstance(speed, SupportsFloat) or not math.isfinite(speed):
             raise InvalidResult(self, "speed", f"returned {speed!r} (expected a finite number)")
-        self.actor.motion.speed = speed
+        self.actor.motion.set_speed(speed)
 
     @abstractmethod
     def on_activate(self) -> None:
@@ -54,7 +54,7 @@ class ControllerModel(ABC):
 
 
 def build_controller_models(
-    actors: Mapping[str, Actor], context: RuntimeContext, wanted: Mapping[str, str], known: Registry
+    actors: Mapping[str, Actor], context: ControllerContext, wanted: Mapping[str, str], known: Registry
 ) -> list[ControllerModel]:
     """One per actor whose controller's name is `wanted`; the values name stand-ins.
 

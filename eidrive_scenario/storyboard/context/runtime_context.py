@@ -2,60 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Protocol, TypeVar
+from collections.abc import Mapping
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.requests import Override
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
+from eidrive_scenario.storyboard.context.preemption import DomainHolder, PendingAction, PreemptableAction
+from eidrive_scenario.storyboard.context.protocols import E, EntityAbsentError, PositionCache
 from eidrive_scenario.storyboard.kinematics.actor import Actor
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.state.background import BackgroundTrafficPort
-from eidrive_scenario.storyboard.state.commands import Commands
+from eidrive_scenario.storyboard.state.commands import Commands, CustomCommand
 from eidrive_scenario.storyboard.state.domains import Domain
-from eidrive_scenario.storyboard.state.element_states import ElementStates
+from eidrive_scenario.storyboard.state.element_states import ElementStateObserver, ElementStates
 from eidrive_scenario.storyboard.state.external_inputs import NONE, ExternalPose
 from eidrive_scenario.storyboard.state.signals import Signals
-from eidrive_scenario.traffic.spawning.generators import CentralObject
+from eidrive_scenario.traffic.background import BackgroundTraffic
+from eidrive_scenario.traffic.spawning.generators import CentralObject, TrafficGenerator
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 from eidrive_scenario.world.view import WorldView
-
-E = TypeVar("E", bound=model.Element)
-
-
-class EntityAbsentError(LookupError):
-    """An entity is asked for its place, and is not in the world."""
-
-
-class PreemptableAction(Protocol):
-    """Whoever holds a domain of an actor: it can be told that a younger action took it."""
-
-    def linked_behaviours(self, behaviour: DomainHolder) -> Sequence[DomainHolder]:
-        """The behaviours that lose their domains with this one, itself among them."""
-
-    def preempt(self, behaviour: DomainHolder, why: str) -> None:
-        """Let go of the domain."""
-
-
-class PendingAction(Protocol):
-    """Whoever waits for an entity until all is done at an instant."""
-
-    def abort(self) -> None:
-        """Nobody came."""
-
-
-class DomainHolder(Protocol):
-    """A behaviour that holds domains."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    @property
-    def resource(self) -> str:
-        """What of a domain it holds; empty for all of it."""
 
 
 class RuntimeContext:
@@ -119,12 +86,7 @@ class RuntimeContext:
         """Whether the step that goes on brings an action to its goal."""
         self.pending_actions: list[PendingAction] = []
         """Whose actions have started at this instant for somebody who is not in the world so far."""
-        self.static_positions: dict[int, tuple[model.Position, ResolvedPosition]] = {}
-        """What positions mean that do not move, by `id` of the position."""
-        self.position_depth = 0
-        """Number of positions along curves that are being resolved within each other."""
-        self.positions_within = 0
-        """Number of those that the outermost of them has led through."""
+        self.position_cache = PositionCache()
         self._holders: list[tuple[str, Domain, PreemptableAction, DomainHolder]] = []
 
     @property
@@ -151,7 +113,7 @@ class RuntimeContext:
             row = rows.get(name)
             if row is not None:
                 actor.observe(view, row)
-                if actor.off_road_wanted:
+                if actor.tracks_off_road:
                     actor.update_off_road(self.roads, view)
 
     def pose(self, name: str) -> Pose:
@@ -206,7 +168,7 @@ class RuntimeContext:
         for held, _, occupant, holder in list(self._holders):
             if held == name:
                 occupant.preempt(holder, f"{name} left the world")
-                self.release(holder)
+                self.release_domains(holder)
 
     def catalog_entry(self, reference: model.CatalogReference | None, kind: type[E], within: model.Element) -> E:
         """The entry that a catalog reference `within` an element means, with its parameters.
@@ -230,6 +192,80 @@ class RuntimeContext:
             )
         return entry
 
+    @property
+    def traffic_names(self) -> tuple[str, ...]:
+        """Names of the vehicles of background traffic."""
+        return self.traffic.names
+
+    @property
+    def background_traffic(self) -> BackgroundTraffic:
+        """Background traffic of the run; requires a road network."""
+        return self.traffic.traffic
+
+    def start_traffic(self, instance: TrafficGenerator) -> None:
+        """Start an instance of background traffic."""
+        self.traffic.start(instance)
+
+    def stop_traffic(self, name: str | None) -> None:
+        """Stop all instances of background traffic of this name; all instances without a name."""
+        self.traffic.stop(name)
+
+    def observe_element(self, kind: str, name: str) -> ElementStateObserver | None:
+        """Return an observer of a storyboard element; None if there is no element of this type and name."""
+        return self.progress.observe_element(kind, name)
+
+    def element_names(self, kind: str) -> list[str]:
+        """Return the names of all storyboard elements of a type."""
+        return self.progress.names(kind)
+
+    def request_user_value(self, element: model.UserDefinedValueCondition) -> None:
+        """Declare that a condition reads a user-defined value."""
+        self.requested_user_values.setdefault(element.name, element)
+
+    def take_external_pose(self, name: str) -> ExternalPose | None:
+        """Return and discard the pose that was set from outside for an entity; None without one."""
+        return self.external_poses.pop(name, None)
+
+    def warn(self, *diagnostics: Diagnostic) -> None:
+        """Add warnings to the result of the run, each once."""
+        self.warnings += [diagnostic for diagnostic in diagnostics if diagnostic not in self.warnings]
+
+    def request_command(self, command: CustomCommand) -> None:
+        """Request the execution of a custom command."""
+        self.commands.custom.append(command)
+
+    def set_parameter(self, name: str, value: str) -> None:
+        """Set the value of a parameter."""
+        self.parameters[name] = value
+
+    def set_variable(self, name: str, value: str) -> None:
+        """Set the value of a variable."""
+        self.variables[name] = value
+
+    def set_monitor(self, name: str, value: bool) -> None:
+        """Set the value of a monitor."""
+        self.monitors = {**self.monitors, name: value}
+
+    def set_environment(self, environment: Environment) -> None:
+        """Set time of day, weather and road condition."""
+        self.environment = self.commands.environment = environment
+
+    def set_signal_state(self, name: str, state: str) -> None:
+        """Set the state of a traffic signal."""
+        self.signals.set_state(name, state)
+
+    def set_signal_phase(self, controller: str, phase: str) -> None:
+        """Start a phase of a signal controller now."""
+        self.signals.set_phase(controller, phase, max(self.time, 0.0))
+
+    def set_override(self, name: str, override: Override) -> None:
+        """Hold a control of a driven actor at a value, or release it."""
+        held = self.overrides.setdefault(name, {})
+        if override.active:
+            held[override.control] = override
+        else:
+            held.pop(override.control, None)
+
     def appearance(self, name: str) -> Appearance:
         """How an actor looks."""
         return self.appearances.get(name) or Appearance()
@@ -250,10 +286,10 @@ class RuntimeContext:
         for held, other_domains, other, behaviour in list(self._holders):
             if held == actor and other_domains & domains and behaviour.resource == holder.resource:
                 for loser in other.linked_behaviours(behaviour):
-                    self.release(loser)
+                    self.release_domains(loser)
                     other.preempt(loser, f"{holder.name} took over")
         self._holders.append((actor, domains, occupant, holder))
 
-    def release(self, holder: DomainHolder) -> None:
+    def release_domains(self, holder: DomainHolder) -> None:
         """A behaviour controls nothing any more."""
         self._holders = [entry for entry in self._holders if entry[3] is not holder]

@@ -45,20 +45,17 @@ class Actor:
         self.present = False
         for controller in controllers:
             self.assign(controller)
-        self.lateral = self.longitudinal = self._has_ours
-        """Whether its own controller is active in the domain."""
-        self.goal: Goal | None = None
-        self.progress: TrajectoryProgress | None = None
-        """How far it is along the trajectory that it follows."""
-        self.trailer: str | None = None
-        """What it draws."""
+        self._lateral = self._longitudinal = self._has_ours
+        self._goal: Goal | None = None
+        self._progress: TrajectoryProgress | None = None
+        self._trailer: str | None = None
         self.traveled = 0.0
         """Distance covered in the world, jumps left out [m]."""
         self.standing_since: float | None = None
         self.end_of_road_since: float | None = None
         self.off_road_since: float | None = None
         """Kept up only where somebody wants it."""
-        self.off_road_wanted = False
+        self._tracks_off_road = False
         self._last: tuple[float, float] | None = None
         self._seen: ActorState | None = None
         self._found: LaneLocation | None = None
@@ -75,14 +72,56 @@ class Actor:
         self._has_ours = self._has_ours or is_agent_controller(controller)
 
     @property
+    def lateral(self) -> bool:
+        """Whether its own controller is active in the lateral domain."""
+        return self._lateral
+
+    @property
+    def longitudinal(self) -> bool:
+        """Whether its own controller is active in the longitudinal domain."""
+        return self._longitudinal
+
+    def activate_controller(self, lateral: bool | None, longitudinal: bool | None) -> None:
+        """Activate or deactivate its own controller in each domain; None leaves a domain unchanged."""
+        self._lateral = self._lateral if lateral is None else lateral
+        self._longitudinal = self._longitudinal if longitudinal is None else longitudinal
+
+    @property
+    def goal(self) -> Goal | None:
+        """Request to its agent while it is driven; None without one."""
+        return self._goal
+
+    def set_goal(self, goal: Goal) -> None:
+        """Set the request to its agent."""
+        self._goal = goal
+
+    @property
+    def progress(self) -> TrajectoryProgress | None:
+        """Progress along the trajectory that it follows; None without one."""
+        return self._progress
+
+    def set_progress(self, progress: TrajectoryProgress | None) -> None:
+        """Set the progress along the trajectory that it follows from now on; None without one."""
+        self._progress = progress
+
+    @property
+    def trailer(self) -> str | None:
+        """Name of its trailer; None without one."""
+        return self._trailer
+
+    def set_trailer(self, name: str | None) -> None:
+        """Connect a trailer; None disconnects it."""
+        self._trailer = name
+
+    @property
     def trajectory(self) -> TrajectoryCurve | None:
         """What it is following."""
-        return None if self.progress is None else self.progress.layout
+        return None if self._progress is None else self._progress.layout
 
     @property
     def driven(self) -> bool:
         """True where its own controller drives it."""
-        return self.lateral and self.longitudinal and self._has_ours
+        return self._lateral and self._longitudinal and self._has_ours
 
     def limits(self) -> tuple[float, float, float]:
         """Largest speed [m/s], acceleration and deceleration [m/s²]; infinite where the entity states none."""
@@ -101,7 +140,7 @@ class Actor:
         if self._last is not None and not self.motion.teleported:
             self.traveled += math.hypot(x - self._last[0], y - self._last[1])
         self._last = (x, y)
-        self.motion.teleported = False
+        self.motion.clear_teleported()
         if abs(speed) >= STANDSTILL:
             self.standing_since = None
         elif self.standing_since is None:
@@ -111,8 +150,16 @@ class Actor:
         elif self.end_of_road_since is None:
             self.end_of_road_since = view.time
         if self.driven:
-            self.motion.pose = pose_of(view, row)
-            self.motion.speed = speed
+            self.motion.set_observed_state(pose_of(view, row), speed)
+
+    @property
+    def tracks_off_road(self) -> bool:
+        """Whether a condition reads `off_road_since`."""
+        return self._tracks_off_road
+
+    def track_off_road(self) -> None:
+        """Update `off_road_since` in every tick from now on."""
+        self._tracks_off_road = True
 
     def update_off_road(self, roads: RoadNetwork | None, view: WorldView) -> None:
         """Keep up since when it is off the road with its reference point. Lanes `none` are no road."""

@@ -11,25 +11,14 @@ from typing import NamedTuple
 
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.storyboard.kinematics.motion_state import MotionState, ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route_lanes import RouteLanes
-from eidrive_scenario.tolerances import EPSILON
 from eidrive_scenario.world.actor import Placement
 
 ACROSS = math.cos(math.radians(50.0))
 """An actor that is placed pointing further away from its lane than 50° crosses the road instead of following it."""
-
-
 STEEPEST = math.sqrt(0.5)
 """Share of its speed that an actor goes sideways at most: as fast as forwards, at 45° to its lane."""
-APART = 0.01
-"""A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
-
-
-class ResolvedPosition(NamedTuple):
-    """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
-
-    pose: Pose
-    location: LaneLocation | None = None
 
 
 class LateralStep(NamedTuple):
@@ -50,58 +39,43 @@ class LateralStep(NamedTuple):
     rate: float | None = None
 
 
-class Motion:
-    """The state of one scripted actor: pose, speed along its heading, and its place on the road.
-
-    heading  angle to the driving direction of the lane [rad]; beyond ±90° the actor drives against it
-    """
+class Motion(MotionState):
+    """Motion of one scripted actor. Actions request it by methods; the state can only be read from outside."""
 
     def __init__(self, roads: RoadNetwork | None) -> None:
-        self.roads = roads
-        self.pose = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.location: LaneLocation | None = None
-        self.heading = 0.0
-        self.speed = 0.0
-        self._route: Route | None = None
+        super().__init__(roads)
         self._visit = 0
         self._route_lanes = RouteLanes(roads) if roads is not None else None
-        self.branch_selector: BranchSelector | None = None
-        """Picks a branch at forks that the route leaves open; None takes the straightest."""
-        self.end_of_road = False
         self._steering: LateralStep | None = None
         self._next_pose: Pose | None = None
         self._landing = False
         self._rail: Callable[[float], Pose] | None = None
         self._carried: float | None = None
-        self._lift = 0.0
         self._crosses = False
         self._teleport = False
-        self.teleported = False
-        """True from a teleport until the view that shows it."""
 
-    @property
-    def route(self) -> Route | None:
-        """The way it takes at forks."""
-        return self._route
+    def set_speed(self, speed: float) -> None:
+        """Set the speed along the heading [m/s], from the step that begins now on."""
+        self._speed = speed
 
-    @route.setter
-    def route(self, route: Route | None) -> None:
-        self._route, self._visit = route, 0
+    def set_route(self, route: Route | None, branch_selector: BranchSelector | None = None) -> None:
+        """Set the route. At junctions that it leaves open, `branch_selector` selects the branch."""
+        self._route, self._visit, self._branch_selector = route, 0, branch_selector
 
     def ahead(self, place: LaneLocation, distance: float) -> LaneLocation | None:
         """The place so many meters further along the lane [m], by the way that it takes; None where the lane ends."""
         assert self.roads is not None
-        return self.roads.advance(place, distance, route=self._route, choose=self.branch_selector, visit=self._visit)
+        return self.roads.advance(place, distance, route=self._route, choose=self._branch_selector, visit=self._visit)
 
     def teleport(self, place: ResolvedPosition) -> None:
         """Place it there at once; its speed stays. The next view shows it there, so the step that begins is used up."""
-        self.pose = place.pose
+        self._pose = place.pose
         self._adopt(place.location)
-        self._crosses = self.location is not None and abs(math.cos(self.heading)) < ACROSS
-        self.end_of_road = False
+        self._crosses = self._location is not None and abs(math.cos(self._heading)) < ACROSS
+        self._end_of_road = False
         if self._route_lanes is not None:
             self._route_lanes.forget()
-        self._teleport = self.teleported = True
+        self._teleport = self._teleported = True
 
     def initialize(self) -> None:
         """Come to rest at the place before the first view, which shows it there: the next step moves it."""
@@ -123,7 +97,7 @@ class Motion:
         """
         self._next_pose, self._rail = pose, rail
         self._landing = land
-        self.teleported = self.teleported or jump
+        self._teleported = self._teleported or jump
 
     def move_along_lane(self, distance: float) -> None:
         """Move by a distance along the lane or trajectory in this step, whatever speed and heading say [m]."""
@@ -131,18 +105,30 @@ class Motion:
 
     def set_reference_lane(self, lane: int) -> LaneLocation | None:
         """Express the place on the road by another lane of the same road; the answer has its offset."""
-        here = self.location
+        here = self._location
         if here is not None and self.roads is not None and here.lane != lane:
             ways = [self.roads.driving_direction(here.road, number) for number in (here.lane, lane)]
             if ways[0] != ways[1]:
-                self.heading = wrap_angle(self.heading + math.pi)
+                self._heading = wrap_angle(self._heading + math.pi)
             here = here._replace(lane=lane, offset=here.t - self.roads.location(here.road, lane, here.s).t)
-            self.location = here
+            self._location = here
         return here
+
+    def set_observed_state(self, pose: Pose, speed: float) -> None:
+        """Set pose and speed [m/s] of a driven vehicle, as the view shows them."""
+        self._pose, self._speed = pose, speed
+
+    def set_towed_state(self, pose: Pose, front: Motion) -> None:
+        """Set the pose of a trailer; its speed is that of the towing vehicle, whose teleport it shares."""
+        self._pose, self._speed, self._teleported = pose, front.speed, front.teleported
+
+    def clear_teleported(self) -> None:
+        """Clear `teleported`: a view shows the new pose."""
+        self._teleported = False
 
     def resume_from(self, pose: Pose, speed: float) -> None:
         """Go on from where another one brought the actor."""
-        self.pose, self.speed = pose, speed
+        self._pose, self._speed = pose, speed
         self.snap_to_lane()
 
     def snap_to_lane(self) -> None:
@@ -151,16 +137,11 @@ class Motion:
         One that is beside the road, and does not point along it, goes on in its heading.
         """
         self._crosses = False
-        hint = self.location
-        place = self.roads.locate_at(self.pose.x, self.pose.y, hint) if self.roads is not None else None
+        hint = self._location
+        place = self.roads.locate_at(self._pose.x, self._pose.y, hint) if self.roads is not None else None
         self._adopt(place)
-        if self.location is not None and self.roads is not None and abs(math.cos(self.heading)) < ACROSS:
-            self._crosses = not self.roads.on_road(self.location)
-
-    @property
-    def direction(self) -> int:
-        """+1 if it points along the driving direction of its lane, else -1."""
-        return 1 if math.cos(self.heading) >= 0.0 else -1
+        if self._location is not None and self.roads is not None and abs(math.cos(self._heading)) < ACROSS:
+            self._crosses = not self.roads.on_road(self._location)
 
     def step(self, dt: float) -> Placement:
         """Move for dt seconds by what was asked since the last step; where it then is."""
@@ -169,7 +150,7 @@ class Motion:
         carried, self._carried = self._carried, None
         if target is not None and carried is not None and self._rail is not None:
             target = self._rail(carried)
-        distance = self.speed * dt if carried is None else carried
+        distance = self._speed * dt if carried is None else carried
         if self._teleport:
             self._teleport = False
             return self.placement()
@@ -179,32 +160,32 @@ class Motion:
             else:
                 self._route_lanes.forget()
         if target is not None:
-            self.pose = target
-            self.location = None
-            self.end_of_road = False
+            self._pose = target
+            self._location = None
+            self._end_of_road = False
             if self._landing:
                 self.snap_to_lane()
                 if self.roads is None:
-                    self.speed = 0.0
+                    self._speed = 0.0
         elif distance == 0.0 and steering is None:
             pass
-        elif self.location is not None and (carried is not None or not self._crosses):
+        elif self._location is not None and (carried is not None or not self._crosses):
             self._along_lane(distance, steering, dt)
         else:
             self._freely(distance)
-        x, y, z, h, p, r = self.pose
+        x, y, z, h, p, r = self._pose
         across = distance == 0.0 or target is not None or carried is not None
-        return Placement(x, y, z, h, p, r, self.speed, target is not None and self.teleported, across)
+        return Placement(x, y, z, h, p, r, self._speed, target is not None and self._teleported, across)
 
     def placement(self) -> Placement:
         """Where it is now."""
-        x, y, z, h, p, r = self.pose
-        return Placement(x, y, z, h, p, r, self.speed, True)
+        x, y, z, h, p, r = self._pose
+        return Placement(x, y, z, h, p, r, self._speed, True)
 
     def _along_lane(self, distance: float, steering: LateralStep | None, dt: float) -> None:
         assert self.roads is not None
-        assert self.location is not None
-        here, left, total = self.location, 0.0, distance
+        assert self._location is not None
+        here, left, total = self._location, 0.0, distance
         way = self.roads.driving_direction(here.road, here.lane)
         if steering is not None:
             left = steering.offset - here.offset * way
@@ -217,35 +198,35 @@ class Motion:
             there = self.ahead(here, distance * self.direction)
             if there is None:
                 there = self._last_place(here, distance * self.direction)
-                if self.end_of_road:
-                    self.speed = 0.0
-                self.end_of_road = True
+                if self._end_of_road:
+                    self._speed = 0.0
+                self._end_of_road = True
             else:
-                self.end_of_road = False
+                self._end_of_road = False
             if self._route is not None and there.road != here.road:
                 self._visit = self._route.visit(there.road, self._visit)
             self._begin_lap(here, there)
             here = there
         if steering is not None:
-            self.heading = wrap_angle(
+            self._heading = wrap_angle(
                 (0.0 if self.direction > 0 else math.pi) + self._turn(steering, left, distance, total, dt)
             )
-        self.location = here
-        pose = self.pose_on(here, self.heading)
-        self.pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
+        self._location = here
+        pose = self.pose_on(here, self._heading)
+        self._pose = pose if self._lift == 0.0 else pose._replace(z=pose.z + self._lift)
 
     def _to_route(self, distance: float) -> LateralStep | None:
         """How to change to a lane that leads on along the route, where this one does not."""
         assert self._route is not None
         assert self._route_lanes is not None
-        if self.location is None or self.direction < 0 or self.roads is None:
+        if self._location is None or self.direction < 0 or self.roads is None:
             return None
-        found = self._route_lanes.step(self.location, distance, self._route, self._visit)
+        found = self._route_lanes.step(self._location, distance, self._route, self._visit)
         if found is None:
             return None
         lane, offset, done = found
         self.set_reference_lane(lane)
-        way = self.roads.driving_direction(self.location.road, lane)
+        way = self.roads.driving_direction(self._location.road, lane)
         return LateralStep(offset * way, heading=0.0 if done else None)
 
     def _begin_lap(self, before: LaneLocation, after: LaneLocation) -> None:
@@ -256,7 +237,7 @@ class Motion:
         way = self.roads.driving_direction(after.road, after.lane)
         reached = (after.s - lap.start.s) * way >= 0.0
         if reached and (before.road != after.road or (before.s - lap.start.s) * way < 0.0):
-            self.route = lap
+            self._route, self._visit = lap, 0
 
     def _turn(self, steering: LateralStep, left: float, distance: float, total: float, dt: float) -> float:
         """The angle to the lane where `distance` along it and `left` make up a step of `total` meters in dt seconds."""
@@ -270,49 +251,22 @@ class Motion:
             return 0.0
         return math.atan(left * self.direction / distance)
 
-    def pose_on(self, here: LaneLocation, heading: float) -> Pose:
-        """The pose at a place of the road with an angle to the driving direction there."""
-        assert self.roads is not None
-        pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
-        turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
-        x, y, z, h, p, r = pose.turned(turn)
-        return Pose(x, y, z, wrap_angle(h), p, r)
-
     def _last_place(self, here: LaneLocation, distance: float) -> LaneLocation:
         """Where the lane ends, in a section inside its road or at the road's end, within the distance [m]."""
         assert self.roads is not None
         last = self.roads.advance(
-            here, distance, route=self._route, choose=self.branch_selector, visit=self._visit, to_end=True
+            here, distance, route=self._route, choose=self._branch_selector, visit=self._visit, to_end=True
         )
         assert last is not None
         return last
 
     def _freely(self, distance: float) -> None:
-        x, y, z, h, p, r = self.pose
+        x, y, z, h, p, r = self._pose
         x, y = x + distance * math.cos(h), y + distance * math.sin(h)
         if self.roads is not None and distance != 0.0:
-            self.location = self.roads.locate_at(x, y, self.location)
-            if self.location is not None:
-                ground = self.roads.lane_pose_at(*self.location[:4])
+            self._location = self.roads.locate_at(x, y, self._location)
+            if self._location is not None:
+                ground = self.roads.lane_pose_at(*self._location[:4])
                 z, p, r = ground.z, *ground.turned(wrap_angle(h - ground.h))[4:]
-                self.heading = self._heading_at(self.location, h)
-        self.pose = Pose(x, y, z, h, p, r)
-
-    def _adopt(self, location: LaneLocation | None) -> None:
-        """Refer to a place on the road from now on, if that is where the actor stands (and not beyond a road's end)."""
-        self.location, self._lift = None, 0.0
-        if location is None or self.roads is None:
-            return
-        ground = self.roads.lane_pose_at(*location[:4])
-        if math.hypot(ground.x - self.pose.x, ground.y - self.pose.y) > APART:
-            return
-        self.location, self._lift = location, self.pose.z - ground.z
-        self.heading = self._heading_at(location, self.pose.h)
-
-    def _heading_at(self, location: LaneLocation, yaw: float) -> float:
-        assert self.roads is not None
-        lane = self.roads.lane_pose_at(*location[:4]).h
-        turn = wrap_angle(
-            yaw - lane if self.roads.driving_direction(location.road, location.lane) > 0 else yaw - lane - math.pi
-        )
-        return 0.0 if abs(turn) < EPSILON else turn
+                self._heading = self._heading_at(self._location, h)
+        self._pose = Pose(x, y, z, h, p, r)

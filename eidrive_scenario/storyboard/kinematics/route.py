@@ -18,7 +18,7 @@ from eidrive_scenario.roads import (
     fewest_junctions,
     random_costs,
 )
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 HERE = 0.01
 """Who is this near to the first waypoint of a closed route is on it [m]."""

@@ -7,8 +7,8 @@ import math
 from eidrive_scenario.geometry import box_distance
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
@@ -24,7 +24,7 @@ CHAINS: dict[model.RoutingAlgorithm | None, Chain] = {
 """The ways that an algorithm chooses, where it is not the shortest."""
 
 
-def entity_box(context: RuntimeContext, name: str) -> Box:
+def entity_box(context: ConditionContext, name: str) -> Box:
     """The bounding box of an actor where it stands now."""
     pose = context.pose(name)
     bounds = context.actors[name].entity.bounding_box
@@ -54,7 +54,7 @@ def resolve_coordinate_system(system: model.CoordinateSystem | None) -> str:
 
 
 def distance(
-    context: RuntimeContext,
+    context: ConditionContext,
     a: str,
     b: str | ResolvedPosition,
     *,
@@ -80,7 +80,7 @@ def distance(
     return _between(context, a, b, frame, kind, value)
 
 
-def same_way(context: RuntimeContext, a: str, b: str, frame: str) -> float:
+def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
     """Return +1.0 where actor `b` points the way that `a` does, -1.0 where it comes towards it or away from it.
 
     In the frames of lane and road that is along the road between them, else by their headings.
@@ -96,7 +96,7 @@ def same_way(context: RuntimeContext, a: str, b: str, frame: str) -> float:
 
 
 def closing_speed(
-    context: RuntimeContext,
+    context: ConditionContext,
     a: str,
     b: str | ResolvedPosition,
     *,
@@ -122,23 +122,25 @@ def closing_speed(
     return math.copysign(1.0, now) * (now - then) / INSTANT
 
 
-def _velocity(context: RuntimeContext, name: str) -> tuple[float, float, float]:
+def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float]:
     x, y, z = context.view.velocity[context.view.row(name)].tolist()
     return x, y, z
 
 
-def _moved(context: RuntimeContext, place: ResolvedPosition, velocity: tuple[float, float, float]) -> ResolvedPosition:
+def _moved(
+    context: ConditionContext, place: ResolvedPosition, velocity: tuple[float, float, float]
+) -> ResolvedPosition:
     """Where somebody is an instant later."""
     x, y = place.pose.x + velocity[0] * INSTANT, place.pose.y + velocity[1] * INSTANT
     location = context.roads.locate_at(x, y, place.location) if context.roads is not None else None
     return ResolvedPosition(place.pose._replace(x=x, y=y), location)
 
 
-def _place(context: RuntimeContext, target: str | ResolvedPosition) -> ResolvedPosition:
+def _place(context: ConditionContext, target: str | ResolvedPosition) -> ResolvedPosition:
     return ResolvedPosition(_pose(context, target), _location(context, target))
 
 
-def _straight(context: RuntimeContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
+def _straight(context: ConditionContext, a: str, b: str | ResolvedPosition, freespace: bool) -> float:
     if not freespace:
         return math.dist(context.pose(a)[:3], _pose(context, b)[:3])
     if isinstance(b, str):
@@ -148,7 +150,7 @@ def _straight(context: RuntimeContext, a: str, b: str | ResolvedPosition, freesp
 
 
 def _offsets(
-    context: RuntimeContext,
+    context: ConditionContext,
     a: str,
     mine: ResolvedPosition,
     b: str | ResolvedPosition,
@@ -197,7 +199,9 @@ def _along(progress: TrajectoryProgress, station: float, here: Pose, there: Pose
     return along * progress.way, (other_t - t) * progress.way
 
 
-def _between(context: RuntimeContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float) -> float:
+def _between(
+    context: ConditionContext, a: str, b: str | ResolvedPosition, frame: str, kind: str, value: float
+) -> float:
     """The gap along one axis: reference points `value` apart, less how far each box reaches towards the other."""
     axis = _axis(context, a, frame)
     mine = _reach(context, a, axis, frame, kind)
@@ -213,7 +217,7 @@ def _between(context: RuntimeContext, a: str, b: str | ResolvedPosition, frame: 
     return 0.0
 
 
-def _axis(context: RuntimeContext, name: str, frame: str, like: float | None = None) -> float:
+def _axis(context: ConditionContext, name: str, frame: str, like: float | None = None) -> float:
     """Heading of the longitudinal axis at an actor; turned round where it would point against `like`."""
     if frame == "world":
         return 0.0
@@ -228,7 +232,7 @@ def _axis(context: RuntimeContext, name: str, frame: str, like: float | None = N
     return heading
 
 
-def _reach(context: RuntimeContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
+def _reach(context: ConditionContext, name: str, axis: float, frame: str, kind: str) -> tuple[float, float]:
     """How far the box of an actor reaches from its reference point along an axis or the road: least and most [m]."""
     if frame in ("lane", "road") and context.roads is not None:
         here = context.location(name)
@@ -247,7 +251,7 @@ def _reach(context: RuntimeContext, name: str, axis: float, frame: str, kind: st
 
 
 def _reach_along(
-    context: RuntimeContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
+    context: ConditionContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
 ) -> tuple[float, float]:
     """The reach along a road that bends: from corner to corner of the box in road coordinates."""
     x, y, _, length, width, _, yaw = entity_box(context, name)
@@ -263,11 +267,11 @@ def _reach_along(
     return min(reached, default=0.0), max(reached, default=0.0)
 
 
-def _pose(context: RuntimeContext, target: str | ResolvedPosition) -> Pose:
+def _pose(context: ConditionContext, target: str | ResolvedPosition) -> Pose:
     return context.pose(target) if isinstance(target, str) else target.pose
 
 
-def _location(context: RuntimeContext, target: str | ResolvedPosition) -> LaneLocation | None:
+def _location(context: ConditionContext, target: str | ResolvedPosition) -> LaneLocation | None:
     if isinstance(target, str):
         return context.location(target)
     if target.location is None and context.roads is not None:

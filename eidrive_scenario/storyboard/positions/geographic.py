@@ -7,8 +7,8 @@ import math
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.orientations import oriented
 from eidrive_scenario.storyboard.positions.position_errors import roads_of
 
@@ -18,7 +18,7 @@ APART = 0.5
 """Roads whose surfaces differ by less are on one level [m]."""
 
 
-def geo_position(frame: model.GeoPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def geo_position(frame: model.GeoPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a GeoPosition by the road network's projection.
 
     Relative angles, and missing ones, refer to the lane there.
@@ -32,7 +32,7 @@ def geo_position(frame: model.GeoPosition, context: RuntimeContext, actor: str |
     return ResolvedPosition(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
 
-def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: RuntimeContext) -> tuple[float, float]:
+def plane_coordinates(frame: model.GeoPosition, roads: RoadNetwork, context: ConditionContext) -> tuple[float, float]:
     """x and y [m] of a GeoPosition. Raises ScenarioError if the road network does not say where it lies."""
     latitude, longitude = _angles(frame, context)
     try:
@@ -69,7 +69,7 @@ def _surface(roads: RoadNetwork, x: float, y: float, z: float) -> float | None:
     return None if here is None else roads.pose(here).z
 
 
-def _angles(frame: model.GeoPosition, context: RuntimeContext) -> tuple[float, float]:
+def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float, float]:
     """Latitude and longitude [rad]: since 1.2 in degrees, before that in radians.
 
     Older values beyond what radians can be are degrees that somebody wrote in their place.
@@ -84,7 +84,7 @@ def _angles(frame: model.GeoPosition, context: RuntimeContext) -> tuple[float, f
             told = (
                 f"GeoPosition has latitude {latitude:g}, longitude {longitude:g}: taken as degrees, as radians end at π"
             )
-            context.warnings.append(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
+            context.warn(Diagnostic(told, "use latitudeDeg and longitudeDeg", frame.source, frame.line))
     else:
         hint = "give latitudeDeg and longitudeDeg"
         raise ScenarioError(Diagnostic("GeoPosition lacks latitude or longitude", hint, frame.source, frame.line))

@@ -7,17 +7,17 @@ from typing import Any
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
 
 
-def roads_of(frame: model.Element, context: RuntimeContext) -> RoadNetwork:
+def roads_of(frame: model.Element, context: ConditionContext) -> RoadNetwork:
     """Return the road network. Raise ScenarioError if the scenario has none."""
     if context.roads is None:
         raise position_error(frame, "needs a road network", "name one in RoadNetwork/LogicFile, or use a WorldPosition")
     return context.roads
 
 
-def road_origin(frame: Any, context: RuntimeContext) -> LaneLocation:
+def road_origin(frame: Any, context: ConditionContext) -> LaneLocation:
     """Return the place on the road of the entity that `frame` refers to. Raise ScenarioError if it is on none."""
     here = context.location(frame.entity_ref)
     if here is None:

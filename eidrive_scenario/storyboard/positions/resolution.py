@@ -9,8 +9,8 @@ from typing import Any
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
 from eidrive_scenario.roads.model.location import PositionError
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext, PositionCache
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, sample_trajectory
 from eidrive_scenario.storyboard.positions.geographic import geo_position
@@ -42,20 +42,21 @@ MAX_POSITIONS = 2000
 """Maximum number of such positions that one position leads through."""
 
 
-def resolve_position(position: model.Position, context: RuntimeContext, actor: str | None = None) -> ResolvedPosition:
+def resolve_position(position: model.Position, context: ConditionContext, actor: str | None = None) -> ResolvedPosition:
     """The place that a position means now. `actor` is the entity that goes there; its route counts for some positions.
 
     Raises ScenarioError if the road network does not have it, Absent if it refers to an entity that is not in the
     world.
     """
-    held = context.static_positions.get(id(position))
+    cache = context.position_cache
+    held = cache.static.get(id(position))
     if held is not None and held[0] is position:
         return held[1]
     frame = position.chosen()
     nesting = isinstance(frame, NESTING)
     try:
         if nesting:
-            _enter(frame, context)
+            _enter(frame, cache)
         place = FRAMES[type(frame)](frame, context, actor)
     except PositionError as error:
         raise position_error(
@@ -63,17 +64,17 @@ def resolve_position(position: model.Position, context: RuntimeContext, actor: s
         ) from error
     finally:
         if nesting:
-            context.position_depth -= 1
+            cache.depth -= 1
     if _stands_still(frame, context):
-        context.static_positions[id(position)] = (position, place)
+        cache.static[id(position)] = (position, place)
     return place
 
 
-def _enter(frame: model.Element, context: RuntimeContext) -> None:
+def _enter(frame: model.Element, cache: PositionCache) -> None:
     """Count a position along a curve whose own points are positions. Raise ScenarioError if they multiply."""
-    context.positions_within = context.positions_within + 1 if context.position_depth else 0
-    context.position_depth += 1
-    if context.position_depth > MAX_DEPTH or context.positions_within > MAX_POSITIONS:
+    cache.nested = cache.nested + 1 if cache.depth else 0
+    cache.depth += 1
+    if cache.depth > MAX_DEPTH or cache.nested > MAX_POSITIONS:
         what = f"lies on curves of positions on curves, more than {MAX_DEPTH} deep or {MAX_POSITIONS} in total"
         raise position_error(frame, what, "name the places by roads and lanes")
 
@@ -83,7 +84,7 @@ def referenced_entities(position: model.Position) -> tuple[str, ...]:
     return tuple(name for below in position.walk() if (name := getattr(below, "entity_ref", None)) is not None)
 
 
-def _route(frame: model.RoutePosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     roads = roads_of(frame, context)
     within = frame.in_route_position.chosen()
     route = frame.route_ref.route or context.catalog_entry(frame.route_ref.catalog_reference, model.Route, frame)
@@ -102,7 +103,7 @@ def _route(frame: model.RoutePosition, context: RuntimeContext, actor: str | Non
     return in_lane(roads, here.road, lane, here.s, within.lane_offset or 0.0, frame.orientation)
 
 
-def _trajectory(frame: model.TrajectoryPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def _trajectory(frame: model.TrajectoryPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """s and t along and beside the curve; a relative heading counts from its tangent (1.3.1, TrajectoryPosition)."""
     layout = trajectory_of(frame, context, actor)
     at, tangent = layout.at(frame.s), layout.tangent(frame.s)
@@ -113,20 +114,20 @@ def _trajectory(frame: model.TrajectoryPosition, context: RuntimeContext, actor:
 
 
 def trajectory_of(
-    frame: model.TrajectoryPosition, context: RuntimeContext, actor: str | None = None
+    frame: model.TrajectoryPosition, context: ConditionContext, actor: str | None = None
 ) -> TrajectoryCurve:
     """Return the trajectory along which a position counts, as it lies now."""
     trajectory = _trajectory_in(frame, context)
     return sample_trajectory(trajectory, lambda position: resolve_position(position, context, actor).pose)
 
 
-def _trajectory_in(frame: model.TrajectoryPosition, context: RuntimeContext) -> model.Trajectory:
+def _trajectory_in(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:
     if frame.trajectory_ref.trajectory is not None:
         return frame.trajectory_ref.trajectory
     return context.catalog_entry(frame.trajectory_ref.catalog_reference, model.Trajectory, frame)
 
 
-def _stands_still(frame: model.Element, context: RuntimeContext) -> bool:
+def _stands_still(frame: model.Element, context: ConditionContext) -> bool:
     """Whether a position means the same place all the time."""
     if not isinstance(frame, model.TrajectoryPosition):
         return isinstance(frame, FIXED)
@@ -134,7 +135,7 @@ def _stands_still(frame: model.Element, context: RuntimeContext) -> bool:
     return all(_stands_still(one.chosen(), context) for one in inner)
 
 
-FRAMES: dict[type[model.Element], Callable[[Any, RuntimeContext, str | None], ResolvedPosition]] = {
+FRAMES: dict[type[model.Element], Callable[[Any, ConditionContext, str | None], ResolvedPosition]] = {
     model.WorldPosition: world_position,
     model.RelativeWorldPosition: relative_world_position,
     model.RelativeObjectPosition: relative_object_position,

@@ -7,20 +7,20 @@ import math
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, RoadNetwork, Route
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.orientations import oriented
 from eidrive_scenario.storyboard.positions.position_errors import position_error, road_origin, roads_of
 
 
-def road_position(frame: model.RoadPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def road_position(frame: model.RoadPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a RoadPosition. Raise ScenarioError if the road does not exist."""
     roads = roads_of(frame, context)
     return in_road(roads, frame.road_id, _on_road(frame, context, roads), frame.t, frame.orientation)
 
 
 def relative_road_position(
-    frame: model.RelativeRoadPosition, context: RuntimeContext, actor: str | None
+    frame: model.RelativeRoadPosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
     """Resolve a position that lies `ds` along the reference line from an entity and `dt` to its left."""
     roads, origin = roads_of(frame, context), road_origin(frame, context)
@@ -30,7 +30,7 @@ def relative_road_position(
     return in_road(roads, here.road, here.s, here.t + frame.dt, frame.orientation)
 
 
-def lane_position(frame: model.LanePosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def lane_position(frame: model.LanePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a LanePosition. Raise ScenarioError if the road or lane does not exist there."""
     roads = roads_of(frame, context)
     s = _on_road(frame, context, roads)
@@ -45,7 +45,7 @@ def lane_position(frame: model.LanePosition, context: RuntimeContext, actor: str
 
 
 def relative_lane_position(
-    frame: model.RelativeLanePosition, context: RuntimeContext, actor: str | None
+    frame: model.RelativeLanePosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
     """Resolve a position relative to the lane of an entity.
 
@@ -98,7 +98,7 @@ def count_lanes(lane: int, steps: int) -> int:
     return target
 
 
-def facing(context: RuntimeContext, name: str, here: LaneLocation) -> int:
+def facing(context: ConditionContext, name: str, here: LaneLocation) -> int:
     """+1 where an actor points along the driving direction of its lane, -1 where against it."""
     if context.roads is None:
         return 1
@@ -130,7 +130,7 @@ def in_road(
     return ResolvedPosition(oriented(orientation, surface if along else surface.turned(math.pi)), here)
 
 
-def _on_road(frame: model.RoadPosition | model.LanePosition, context: RuntimeContext, roads: RoadNetwork) -> float:
+def _on_road(frame: model.RoadPosition | model.LanePosition, context: ConditionContext, roads: RoadNetwork) -> float:
     """The position's s; one that lies beyond an end of its road means that end, with a warning."""
     road, s = frame.road_id, frame.s
     if road not in roads.roads:
@@ -141,8 +141,7 @@ def _on_road(frame: model.RoadPosition | model.LanePosition, context: RuntimeCon
     if abs(on_road - s) > 1e-3:
         message = f"{type(frame).__name__} says s = {s:g} on road {road!r}: its end is meant"
         diagnostic = Diagnostic(message, f"that road is {length:.2f} m long", frame.source, frame.line)
-        if diagnostic not in context.warnings:
-            context.warnings.append(diagnostic)
+        context.warn(diagnostic)
     return on_road
 
 

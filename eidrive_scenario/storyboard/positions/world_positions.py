@@ -8,15 +8,15 @@ from dataclasses import replace
 from eidrive_scenario.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.orientations import angles
 
 CARLA = "CARLA:"
 """How the description of a scenario in CARLA's axes begins."""
 
 
-def world_position(frame: model.WorldPosition, context: RuntimeContext, actor: str | None) -> ResolvedPosition:
+def world_position(frame: model.WorldPosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     """Resolve a WorldPosition; without z it lies on the road below it."""
     side = -1.0 if left_handed(context) else 1.0
     h, p, r = side * (frame.h or 0.0), side * (frame.p or 0.0), frame.r or 0.0
@@ -24,7 +24,7 @@ def world_position(frame: model.WorldPosition, context: RuntimeContext, actor: s
 
 
 def relative_world_position(
-    frame: model.RelativeWorldPosition, context: RuntimeContext, actor: str | None
+    frame: model.RelativeWorldPosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
     """Resolve a position relative to an entity, along the axes of the world."""
     origin, side = context.pose(frame.entity_ref), -1.0 if left_handed(context) else 1.0
@@ -34,7 +34,7 @@ def relative_world_position(
 
 
 def relative_object_position(
-    frame: model.RelativeObjectPosition, context: RuntimeContext, actor: str | None
+    frame: model.RelativeObjectPosition, context: ConditionContext, actor: str | None
 ) -> ResolvedPosition:
     """Resolve a position relative to an entity, along its heading."""
     origin, side = context.pose(frame.entity_ref), -1.0 if left_handed(context) else 1.0
@@ -47,7 +47,7 @@ def relative_object_position(
     )
 
 
-def left_handed(context: RuntimeContext) -> bool:
+def left_handed(context: ConditionContext) -> bool:
     """True for a scenario whose world has CARLA's axes: y to the right, headings clockwise, pitch nose up.
 
     ScenarioRunner reads a description that begins with `CARLA:` so. Roads and lanes have the standard's axes all the
@@ -63,7 +63,7 @@ def _turned(orientation: model.Orientation | None, side: float) -> model.Orienta
     return replace(orientation, h=side * (orientation.h or 0.0), p=side * (orientation.p or 0.0))
 
 
-def on_ground(context: RuntimeContext, pose: Pose, *, z_given: bool, near: str | None = None) -> ResolvedPosition:
+def on_ground(context: ConditionContext, pose: Pose, *, z_given: bool, near: str | None = None) -> ResolvedPosition:
     """The place of a pose in the world: on the road below it where there is one, first looked for `near` an actor."""
     if context.roads is None:
         return ResolvedPosition(pose)

@@ -7,7 +7,9 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from py_trees.common import Status
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.runtime_context import DomainHolder, EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.context.preemption import DomainHolder
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities
 from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
@@ -129,7 +131,7 @@ class ActionElement(StoryElement):
                 self._let_decide(behaviour)
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
-            self.context.release(behaviour)
+            self.context.release_domains(behaviour)
         if not self.running and not actors:
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
@@ -168,7 +170,7 @@ class ActionElement(StoryElement):
         """Stop all its behaviours."""
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
-            self.context.release(behaviour)
+            self.context.release_domains(behaviour)
         self.running, self._there, self._waiting = [], [], {}
         self._change(ElementTransition.STOP, ElementState.COMPLETE, why)
         self.status = Status.INVALID
@@ -214,18 +216,23 @@ class ActionElement(StoryElement):
                 self._waiting[behaviour] = behaviour, who
                 self.context.pending_actions.append(self)
             else:
-                self.preempt(behaviour, behaviour.abort(who))
+                self._abort_behaviour(behaviour, who)
 
     def abort(self) -> None:
         """Stop what waited in vain for somebody to enter the world at this instant."""
         waiting, self._waiting = self._waiting, {}
         for behaviour, who in waiting.values():
-            self.preempt(behaviour, behaviour.abort(who))
+            self._abort_behaviour(behaviour, who)
+
+    def _abort_behaviour(self, behaviour: ActionBehaviour, absent: EntityAbsentError) -> None:
+        why = behaviour.abort(absent)
+        self.context.release_domains(behaviour)
+        self.preempt(behaviour, why)
 
     def _let_go(self, done: Sequence[ActionBehaviour]) -> None:
         for behaviour in done:
             self.running.remove(behaviour)
-            self.context.release(behaviour)
+            self.context.release_domains(behaviour)
         if not self.running and self.state is ElementState.RUNNING:
             self._change(ElementTransition.END, ElementState.COMPLETE)
 

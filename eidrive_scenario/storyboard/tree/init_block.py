@@ -9,7 +9,9 @@ from py_trees.common import Status
 from py_trees.composites import Composite
 
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
-from eidrive_scenario.storyboard.context.runtime_context import DomainHolder, EntityAbsentError, RuntimeContext
+from eidrive_scenario.storyboard.context.preemption import DomainHolder
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 
 
 class InitBlock(Composite):
@@ -78,5 +80,5 @@ class InitBlock(Composite):
                 behaviour.abort(who)
             if behaviour.status is not Status.RUNNING:
                 self.running.remove(behaviour)
-                self.context.release(behaviour)
+                self.context.release_domains(behaviour)
         self.status = Status.RUNNING if self.running else Status.SUCCESS

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from eidrive_scenario.errors import Diagnostic, ScenarioError
 from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
-from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.context.protocols import ConditionContext
 
 E = TypeVar("E", bound=model.Element)
 
@@ -116,16 +116,16 @@ class AnyMemberCondition(EntityCondition):
         super().__init__(element, entities, rule)
         self.conditions = tuple(conditions)
 
-    def bind(self, context: RuntimeContext) -> None:
+    def bind(self, context: ConditionContext) -> None:
         """Bind them all."""
         for condition in self.conditions:
             condition.bind(context)
 
-    def holds_for(self, context: RuntimeContext, entity: str) -> bool:
+    def holds_for(self, context: ConditionContext, entity: str) -> bool:
         """Ask all, so that their histories stay whole."""
         return any([condition.holds_for(context, entity) for condition in self.conditions])
 
-    def explain_for(self, context: RuntimeContext, entity: str) -> str:
+    def explain_for(self, context: ConditionContext, entity: str) -> str:
         """What is true of the first member towards which it holds, or of all."""
         holding = [condition for condition in self.conditions if condition.holds_for(context, entity)]
         told = [condition.explain_for(context, entity) for condition in holding[:1] or self.conditions]
@@ -136,7 +136,7 @@ class AnyMemberCondition(EntityCondition):
         told = [condition.describe_for() for condition in self.conditions]
         return " or ".join(told) or f"{super().describe_for()} towards a selection without members"
 
-    def measures(self, context: RuntimeContext) -> tuple[Measure, ...]:
+    def measures(self, context: ConditionContext) -> tuple[Measure, ...]:
         """Those of all."""
         return tuple(measure for condition in self.conditions for measure in condition.measures(context))
 

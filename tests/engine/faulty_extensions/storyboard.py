@@ -41,7 +41,7 @@ class FaultyAction(ActionBehaviour):
             case "none":
                 return None
             case "nan":
-                self.context.actors[next(iter(self.context.actors))].motion.speed = math.nan
+                self.context.actors[next(iter(self.context.actors))].motion.set_speed(math.nan)
             case "raises":
                 raise LookupError("no such action")
             case "fails below 5" if self.context.actors["Ego"].motion.speed < 4.9:

@@ -10,7 +10,7 @@ import pytest
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.randomness import generator
 from eidrive_scenario.roads import RoadNetwork, fastest, fewest_junctions, random_costs
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route
 
 Text = Callable[..., str]

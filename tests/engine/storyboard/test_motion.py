@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 
 def on_lane(roads: Any, lane: Any, s: Any, *, heading: Any = 0.0, offset: Any = 0.0) -> Any:
@@ -23,7 +24,7 @@ def test_without_roads_it_goes_straight_on() -> None:
     motion = Motion(None)
     motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.5, math.pi / 2, 0.0, 0.0)))
     motion.initialize()
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     placement = motion.step(0.1)
     assert (placement.x, placement.y, placement.z) == pytest.approx((1.0, 3.0, 0.5))
 
@@ -31,7 +32,7 @@ def test_without_roads_it_goes_straight_on() -> None:
 def test_the_next_view_shows_a_teleported_actor_where_it_was_put() -> None:
     motion = Motion(None)
     motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0)))
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     first, second = motion.step(0.1), motion.step(0.1)
     assert (first.x, first.teleport) == (1.0, True)
     assert (second.x, second.teleport) == (2.0, False)
@@ -50,7 +51,7 @@ def test_it_follows_its_lane_where_it_points(
     street: Any, lane: Any, heading: Any, speed: Any, x: Any, yaw: Any
 ) -> None:
     motion = on_lane(street, lane, 100.0, heading=heading)
-    motion.speed = speed
+    motion.set_speed(speed)
     placement = motion.step(0.1)
     assert placement.x == pytest.approx(x)
     assert math.cos(placement.yaw - yaw) == pytest.approx(1.0)
@@ -60,7 +61,7 @@ def test_it_follows_its_lane_where_it_points(
 def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend: Any) -> None:
     """Lane -1 is a circle of 52 m: 10 m are 10/52 rad of it."""
     motion = on_lane(bend, -1, 0.0)
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     for _ in range(10):
         placement = motion.step(0.1)
     angle = 10.0 / 52.0
@@ -72,7 +73,7 @@ def test_in_a_bend_speed_is_that_of_the_actor_and_not_of_the_reference_line(bend
 
 def test_it_stops_where_the_road_ends(street: Any) -> None:
     motion = on_lane(street, -1, 199.5)
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     placement = motion.step(0.1)
     assert placement.x == 200.0
     assert motion.end_of_road
@@ -104,7 +105,7 @@ def test_step_beyond_the_end_of_a_lane_stops_there(
       <planView><geometry s="0" x="0" y="0" hdg="0" length="200"><line/></geometry></planView>
       <lanes>{sections}</lanes></road></OpenDRIVE>"""
     motion = on_lane(RoadNetwork.parse(text), lane, start)
-    motion.speed = speed
+    motion.set_speed(speed)
     assert motion.step(0.1).x == pytest.approx(end)
     assert motion.end_of_road
     placement = motion.step(0.1)
@@ -115,7 +116,7 @@ def test_step_beyond_the_end_of_a_lane_stops_there(
 def test_steering_moves_left_of_the_lane_and_takes_its_share_of_the_way(street: Any, lane: Any, y: Any) -> None:
     """0.6 m to the left and 0.8 m along make the 1 m that the speed covers."""
     motion = on_lane(street, lane, 100.0)
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     motion.set_lateral_step(LateralStep(0.6))
     placement = motion.step(0.1)
     sign = -math.copysign(1.0, lane)
@@ -128,13 +129,13 @@ def test_a_place_may_be_expressed_by_the_oncoming_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     assert motion.set_reference_lane(1).offset == pytest.approx(-4.0)
     assert motion.direction == -1
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     assert motion.step(0.1).x == pytest.approx(101.0)
 
 
 def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
     motion = on_lane(street, -1, 100.0, heading=math.pi / 2)
-    motion.speed = 2.0
+    motion.set_speed(2.0)
     for _ in range(10):
         placement = motion.step(0.1)
     assert (placement.x, placement.y) == pytest.approx((100.0, 0.0), abs=1e-9)
@@ -142,7 +143,7 @@ def test_who_points_across_the_road_walks_across_it(street: Any) -> None:
 
 def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     motion.move_to(Pose(120.0, -6.5, 0.0, 0.0, 0.0, 0.0), land=True)
     assert motion.step(0.1).x == 120.0
     placement = motion.step(0.1)
@@ -152,7 +153,7 @@ def test_after_a_free_pose_it_looks_for_its_lane(street: Any) -> None:
 
 def test_who_is_carried_along_moves_by_that_distance_in_one_step(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
-    motion.speed = 10.0
+    motion.set_speed(10.0)
     motion.move_along_lane(4.0)
     assert motion.step(0.1).x == pytest.approx(104.0)
     assert motion.step(0.1).x == pytest.approx(105.0)

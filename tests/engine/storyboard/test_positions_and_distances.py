@@ -11,8 +11,9 @@ import pytest
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError, RuntimeContext
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.positions.distances import closing_speed, distance
 from eidrive_scenario.storyboard.positions.resolution import resolve_position
 from eidrive_scenario.storyboard.positions.road_positions import count_lanes

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import Pose
-from eidrive_scenario.storyboard.context.runtime_context import EntityAbsentError
-from eidrive_scenario.storyboard.kinematics.motion import ResolvedPosition
+from eidrive_scenario.storyboard.context.protocols import EntityAbsentError
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 
 def with_car(view: Any, name: str) -> Any:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion, ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.motion import LateralStep, Motion
+from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 TURN = 20.0 * math.pi
 
@@ -76,8 +77,8 @@ def on_its_way(fork: RoadNetwork, start: int, s: float, destination: str) -> Mot
     here = fork.location("a", start, s)
     motion.teleport(ResolvedPosition(fork.pose(here), here))
     motion.initialize()
-    motion.speed = 20.0
-    motion.route = fork.route(here, fork.location(destination, -1, 90.0))
+    motion.set_speed(20.0)
+    motion.set_route(fork.route(here, fork.location(destination, -1, 90.0)))
     return motion
 
 

@@ -50,12 +50,12 @@ def test_in_a_long_turn_it_rolls_on_the_circle_of_its_bar(axles: tuple[tuple[flo
     truck = vehicle((0.0, 0.0), trailer_hitch=model.TrailerHitch(dx=0.0))
     front, back = Actor("Truck", truck, (), None), Actor("Trailer", trailer, (), None)
     radius, step = 20.0, 0.0005
-    back.motion.pose = Pose(20.0, -REACH, 0.0, math.pi / 2, 0.0, 0.0)
+    back.motion.set_observed_state(Pose(20.0, -REACH, 0.0, math.pi / 2, 0.0, 0.0), 1.0)
     for count in range(round(2.5 * math.pi / step)):
         angle = count * step
         x, y = radius * math.cos(angle), radius * math.sin(angle)
-        front.motion.pose = Pose(x, y, 0.0, angle + math.pi / 2, 0.0, 0.0)
-        back.motion.pose = pose_behind(front, back)
+        front.motion.set_observed_state(Pose(x, y, 0.0, angle + math.pi / 2, 0.0, 0.0), 1.0)
+        back.motion.set_towed_state(pose_behind(front, back), front.motion)
     length = bar(trailer, REACH)
     pose = back.motion.pose
     at = front.motion.pose.x - length * math.cos(pose.h), front.motion.pose.y - length * math.sin(pose.h)

@@ -1,0 +1,108 @@
+"""State of a scripted actor: pose, speed, and its place on the road."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from eidrive_scenario.geometry import wrap_angle
+from eidrive_scenario.roads import BranchSelector, LaneLocation, Pose, RoadNetwork, Route
+from eidrive_scenario.tolerances import EPSILON
+
+APART = 0.01
+"""A place on the road stands for a pose if it is not further away than this, seen from above [m]."""
+
+
+class ResolvedPosition(NamedTuple):
+    """Where to put an actor: the pose, and the lane it stands on (None: on none, it moves freely)."""
+
+    pose: Pose
+    location: LaneLocation | None = None
+
+
+class MotionState:
+    """State of one scripted actor, read-only from outside."""
+
+    def __init__(self, roads: RoadNetwork | None) -> None:
+        self.roads = roads
+        self._pose = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._location: LaneLocation | None = None
+        self._heading = 0.0
+        self._speed = 0.0
+        self._route: Route | None = None
+        self._branch_selector: BranchSelector | None = None
+        self._end_of_road = False
+        self._teleported = False
+        self._lift = 0.0
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of the reference point."""
+        return self._pose
+
+    @property
+    def location(self) -> LaneLocation | None:
+        """Lane location that the actor follows; None outside of roads and during free motion."""
+        return self._location
+
+    @property
+    def heading(self) -> float:
+        """Angle to the driving direction of the lane [rad]; beyond ±90° the actor drives against it."""
+        return self._heading
+
+    @property
+    def speed(self) -> float:
+        """Speed along the heading [m/s]."""
+        return self._speed
+
+    @property
+    def route(self) -> Route | None:
+        """Route that selects the branches at junctions."""
+        return self._route
+
+    @property
+    def branch_selector(self) -> BranchSelector | None:
+        """Selects the branch at junctions that the route leaves open; None selects the straightest branch."""
+        return self._branch_selector
+
+    @property
+    def end_of_road(self) -> bool:
+        """Whether the actor has reached the end of its road."""
+        return self._end_of_road
+
+    @property
+    def teleported(self) -> bool:
+        """True from a teleport until the view that shows it."""
+        return self._teleported
+
+    @property
+    def direction(self) -> int:
+        """+1 if it points along the driving direction of its lane, else -1."""
+        return 1 if math.cos(self._heading) >= 0.0 else -1
+
+    def pose_on(self, here: LaneLocation, heading: float) -> Pose:
+        """The pose at a place of the road with an angle to the driving direction there."""
+        assert self.roads is not None
+        pose = self.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
+        turn = heading if self.roads.driving_direction(here.road, here.lane) > 0 else heading + math.pi
+        x, y, z, h, p, r = pose.turned(turn)
+        return Pose(x, y, z, wrap_angle(h), p, r)
+
+    def _adopt(self, location: LaneLocation | None) -> None:
+        """Refer to a place on the road from now on, if that is where the actor stands (and not beyond a road's end)."""
+        self._location, self._lift = None, 0.0
+        if location is None or self.roads is None:
+            return
+        ground = self.roads.lane_pose_at(*location[:4])
+        if math.hypot(ground.x - self._pose.x, ground.y - self._pose.y) > APART:
+            return
+        self._location, self._lift = location, self._pose.z - ground.z
+        self._heading = self._heading_at(location, self._pose.h)
+
+    def _heading_at(self, location: LaneLocation, yaw: float) -> float:
+        assert self.roads is not None
+        lane = self.roads.lane_pose_at(*location[:4]).h
+        turn = wrap_angle(
+            yaw - lane if self.roads.driving_direction(location.road, location.lane) > 0 else yaw - lane - math.pi
+        )
+        return 0.0 if abs(turn) < EPSILON else turn
