@@ -28,7 +28,7 @@ from eidrive_scenario.errors import EidriveError
 from eidrive_scenario.library import definition
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.randomness import generator
-from eidrive_scenario.recording.text.csv_writer import neutralized
+from eidrive_scenario.recording.text.csv_writer import neutralize_formula
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -192,7 +192,7 @@ def main() -> None:
             writer = csv.DictWriter(stream, list(dict.fromkeys(key for row in table for key in row)))
             writer.writeheader()
             for row in table:
-                texts = {key: neutralized(value) for key, value in row.items() if isinstance(value, str)}
+                texts = {key: neutralize_formula(value) for key, value in row.items() if isinstance(value, str)}
                 writer.writerow({**row, **texts})
 
 

@@ -24,7 +24,7 @@ def run_distribution(path: Path, play: Play, *, seed: int, most: int | None, par
 
     A run whose parameters the scenario's constraints rule out is left out, as the standard wants. A run with a wrong
     value does not keep the others from being played, unless it is the first.
-    Raises InputError if the distribution is wrong, its first run is, or no run is left.
+    Raise InputError if the distribution is wrong, its first run is, or no run is left.
     """
     unfolding = load_distribution(path, seed=seed)
     _refuse_varied(unfolding, parameters)

@@ -15,7 +15,7 @@ def check_output_paths(written: Mapping[str, str | Path | None], read: Iterable[
     written  files by the option that names them; None where the option is not given
     read     files, or anything else that an option may be, such as the name of a profile
 
-    Raises SettingError.
+    Raise SettingError.
     """
     inputs = {os.path.realpath(place) for place in read if place is not None and os.path.isfile(place)}
     taken: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Evaluation of runs: criteria, verdicts, metrics over frames."""
+"""Evaluation of runs: criteria, verdicts and metrics over frames."""
 
 from eidrive_scenario.evaluation.criterion import (
     Criterion,

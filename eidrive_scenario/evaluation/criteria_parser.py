@@ -1,18 +1,21 @@
-"""Criteria as scenario files state them.
+"""Parser of criteria in scenario files.
 
-- ours: `CustomCommandAction type="eidrive.criterion"` with a YAML flow mapping, one criterion or several:
+- `CustomCommandAction type="eidrive.criterion"` with a YAML flow mapping, one criterion or several:
   `min_distance: {of: Ego, to: Incoming, at_least: 1.5}`
-- ScenarioRunner's: ParameterConditions named `criteria_…` in the Storyboard's StopTrigger, about the ego vehicle
-- scenario_simulator_v2's: CustomCommandActions of the types `exitSuccess` and `exitFailure`
+- ScenarioRunner: ParameterConditions named `criteria_…` in the StopTrigger of the Storyboard, about the ego vehicle
+- scenario_simulator_v2: CustomCommandActions of the types `exitSuccess` and `exitFailure`
+
+A command is parsed once, before the run. `build_criteria` then creates new criteria at each execution of the command.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, suggestion
-from eidrive_scenario.evaluation.criterion import Criterion, Verdict
+from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Condition, Vehicle
 from eidrive_scenario.openscenario.values.parameters import Scope
@@ -21,12 +24,30 @@ from eidrive_scenario.registry import construct, registry
 from eidrive_scenario.settings import key_lines, load_yaml, parse_settings
 
 EXITS = {"exitSuccess": True, "exitFailure": False}
-"""Types of scenario_simulator_v2's commands, and whether the run passes with them."""
+"""Verdict of each exit command of scenario_simulator_v2: True for passed."""
 
 PREFIX = "criteria_"
-"""How the name of a condition begins that ScenarioRunner reads as a criterion."""
+"""Prefix of the names of conditions that ScenarioRunner evaluates as criteria."""
 
 _EXAMPLE = "min_distance: {of: Ego, to: Incoming, at_least: 1.5}"
+
+
+@dataclass(frozen=True)
+class CriterionDeclaration:
+    """Declared criterion: its registered name, its class and its checked settings."""
+
+    kind: str
+    criterion_type: type[Criterion]
+    settings: CriterionSettings
+
+    def build(self) -> Criterion:
+        """Return a new criterion. Raise InvalidResult if its name is not a non-empty text."""
+        criterion: Criterion = construct(self.criterion_type, self.settings)
+        name: object = getattr(criterion, "name", self.kind)
+        if not isinstance(name, str) or not name:
+            raise InvalidResult(criterion, "name", f"is {name!r} (expected a text)")
+        criterion.name = name
+        return criterion
 
 
 def parse_criteria(
@@ -36,55 +57,64 @@ def parse_criteria(
     line: int | None = None,
     entities: Collection[str] | None = None,
     monitors: Collection[str] | None = None,
-    taken: Collection[str] = (),
     scope: Scope | None = None,
-) -> list[Criterion]:
-    """The criteria that a command's text declares, in its order.
+) -> tuple[CriterionDeclaration, ...]:
+    """Return the criteria that the text of a command declares, in its order.
 
-    entities  names of the scenario's entities, to check the actors against
-    monitors  names of the scenario's monitors, to check those against that are read
-    taken     names of criteria that the run already has; a criterion that would repeat one gets a number after it
+    entities  names of the entities of the scenario; None: the actors of the criteria are not checked
+    monitors  names of the monitors of the scenario; None: the monitors of the criteria are not checked
     scope     parameters to which settings refer as `$name` or `${expression}`
 
-    Raises SettingError with the file and line of every mistake.
+    Raise SettingError with file and line of every error.
     """
     data = load_yaml(text, source=source, line=line)
     entries = [data] if isinstance(data, dict) else data
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        raise SettingError(Diagnostic(f"{text.strip()!r} declares no criterion", f"write {_EXAMPLE}", source, line))
-    names = set(taken)
-    criteria = []
+        message = f"eidrive.criterion: no criterion is declared (got {text.strip()!r})"
+        raise SettingError(Diagnostic(message, f"write {_EXAMPLE}", source, line))
+    declarations = []
     diagnostics: list[Diagnostic] = []
     for kind, settings, lines in _items(entries, text, line):
         here = lines.get("", line)
         try:
             settings = resolve_references(settings, scope, source=source, line=here, lines=lines)
-            criterion = _build(kind, settings, source, here, lines)
+            declaration = _declare(kind, settings, source, here, lines)
+            criterion = declaration.build()
             _check_known(criterion, criterion.subjects, "entity", entities, source, here)
             _check_known(criterion, criterion.monitors, "monitor", monitors, source, here)
         except SettingError as error:
             diagnostics.extend(error.diagnostics)
             continue
+        declarations.append(declaration)
+    if diagnostics:
+        raise SettingError(diagnostics)
+    return tuple(declarations)
+
+
+def build_criteria(declarations: Iterable[CriterionDeclaration], taken: Collection[str] = ()) -> list[Criterion]:
+    """Return new criteria. A number is appended to a name that another criterion or `taken` already has."""
+    names = set(taken)
+    criteria = []
+    for declaration in declarations:
+        criterion = declaration.build()
         criterion.name = _free_name(criterion.name, names)
         names.add(criterion.name)
         criteria.append(criterion)
-    if diagnostics:
-        raise SettingError(diagnostics)
     return criteria
 
 
 def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterator[tuple[str, Any, Mapping[str, int]]]:
-    """Each criterion's kind and settings, with the lines of its settings and under the empty name its own."""
+    """Yield kind and settings of each criterion, and the lines of its settings; the empty key has its own line."""
     known = key_lines(text, 1 if line is None else line)
     several = "0" in known
     paths = {
-        f"{place}.{kind}" if several else str(kind): (str(kind), settings)
-        for place, entry in enumerate(entries)
+        f"{index}.{kind}" if several else str(kind): (str(kind), settings)
+        for index, entry in enumerate(entries)
         for kind, settings in entry.items()
     }
     lines: dict[str, dict[str, int]] = {path: {"": known[path]} if path in known else {} for path in paths}
     for key, number in known.items():
-        for dot in (place for place, sign in enumerate(key) if sign == "."):
+        for dot in (position for position, character in enumerate(key) if character == "."):
             if key[:dot] in lines:
                 lines[key[:dot]][key[dot + 1 :]] = number
                 break
@@ -92,7 +122,7 @@ def _items(entries: list[dict[Any, Any]], text: str, line: int | None) -> Iterat
         yield kind, settings, lines[path]
 
 
-def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> Criterion:
+def _declare(kind: str, settings: Any, source: str, line: int | None, lines: Mapping[str, int]) -> CriterionDeclaration:
     known = registry("criteria")
     if kind not in known:
         raise SettingError(Diagnostic(f"unknown criterion {kind!r}", suggestion(kind, known), source, line))
@@ -101,20 +131,16 @@ def _build(kind: str, settings: Any, source: str, line: int | None, lines: Mappi
     if not isinstance(settings, dict):
         fields = criterion_type.settings_type.model_fields.items()
         hint = f"write {kind}: {{…}} with the settings {', '.join(field.alias or name for name, field in fields)}"
-        raise SettingError(Diagnostic(f"{kind} is given {settings!r}", hint, source, line))
+        message = f"criterion {kind!r}: settings are not a mapping (got {settings!r})"
+        raise SettingError(Diagnostic(message, hint, source, line))
     parsed = parse_settings(criterion_type.settings_type, settings, source=source, line=line, lines=lines)
-    criterion: Criterion = construct(criterion_type, parsed)
-    name: object = getattr(criterion, "name", kind)
-    if not isinstance(name, str) or not name:
-        raise InvalidResult(criterion, "name", f"is {name!r} (expected a text)")
-    criterion.name = name
-    return criterion
+    return CriterionDeclaration(kind, criterion_type, parsed)
 
 
 def _check_known(
     criterion: Criterion,
     names: Collection[str],
-    what: str,
+    kind: str,
     known: Collection[str] | None,
     source: str,
     line: int | None,
@@ -124,8 +150,8 @@ def _check_known(
         raise SettingError(
             [
                 Diagnostic(
-                    f"{criterion.name} looks at {name!r}, which is no {what} of this scenario",
-                    suggestion(name, known) if known else "it declares none",
+                    f"criterion {criterion.name!r}: unknown {kind} {name!r}",
+                    suggestion(name, known) if known else f"the scenario declares no {kind}",
                     source,
                     line,
                 )
@@ -143,7 +169,7 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 
 
 class Command(Protocol):
-    """A CustomCommandAction that the storyboard has just carried out."""
+    """CustomCommandAction that the storyboard has executed."""
 
     @property
     def type(self) -> str: ...
@@ -152,22 +178,22 @@ class Command(Protocol):
 
 
 def exit_verdict(command: Command, time: float | None = None) -> Verdict:
-    """The verdict of an `exitSuccess` or `exitFailure` command, given at `time` [s].
+    """Return the verdict of an `exitSuccess` or `exitFailure` command at `time` [s].
 
-    Raises KeyError for a command of another type.
+    Raise KeyError for a command of another type.
     """
     passed = EXITS[command.type]
     when = "" if time is None else f" at {time:.2f} s"
     text = command.content.strip()
-    reason = f"the scenario called {command.type}{when}" + (f": {text}" if text else "")
+    reason = f"the scenario executed {command.type}{when}" + (f": {text}" if text else "")
     return Verdict(command.type, passed, None, None, "", None if passed else time, reason, fatal=True)
 
 
 def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> list[Criterion]:
-    """The criteria that a file written for ScenarioRunner asks for, about its ego vehicle.
+    """Return the criteria about the ego vehicle that a file for ScenarioRunner specifies.
 
-    Those that this engine does not have are left out and named by `unsupported_criteria`. Raises SettingError where the
-    condition's value is wrong or no entity is the ego vehicle.
+    Unsupported criteria are omitted and reported by `unsupported_criteria`. Raise SettingError if the value of a
+    condition is invalid or no entity is the ego vehicle.
     """
     criteria: list[Criterion] = []
     for condition in _criterion_conditions(scenario):
@@ -176,18 +202,18 @@ def stop_trigger_criteria(scenario: Scenario, taken: Collection[str] = ()) -> li
             continue
         kind, settings_of = translated
         settings = {"of": _ego(scenario, condition), **settings_of(_value(condition))}
-        criterion = _build(kind, settings, condition.source, condition.line, {})
+        criterion = _declare(kind, settings, condition.source, condition.line, {}).build()
         criterion.name = _free_name(criterion.name, {*taken, *(other.name for other in criteria)})
         criteria.append(criterion)
     return criteria
 
 
 def unsupported_criteria(scenario: Scenario) -> list[Diagnostic]:
-    """ScenarioRunner's criteria in this file that this engine does not judge: warnings, as the run goes on."""
+    """Return warnings about criteria of ScenarioRunner that this engine does not support."""
     return [
         Diagnostic(
-            f"criterion {condition.name.removeprefix(PREFIX)!r} is not judged",
-            f"this engine reads {', '.join(sorted(_TRANSLATIONS))}",
+            f"criterion {condition.name.removeprefix(PREFIX)!r} is not evaluated",
+            f"supported criteria: {', '.join(sorted(_TRANSLATIONS))}",
             condition.source,
             condition.line,
         )
@@ -212,7 +238,7 @@ def _value(condition: Condition) -> str:
 
 
 def _ego(scenario: Scenario, condition: Condition) -> str:
-    """The vehicle with the property `type = ego_vehicle`, as ScenarioRunner has it; else the one named so."""
+    """Return the vehicle with the property `type = ego_vehicle` of ScenarioRunner, else the one named as an ego."""
     for name, entity in scenario.entities.items():
         properties = entity.properties if isinstance(entity, Vehicle) else None
         for entry in properties.property if properties is not None else ():
@@ -223,7 +249,7 @@ def _ego(scenario: Scenario, condition: Condition) -> str:
             return name
     raise SettingError(
         Diagnostic(
-            f"{condition.name} is about the ego vehicle, and no entity is one",
+            f"condition {condition.name!r}: the scenario has no ego vehicle",
             'give a Vehicle the property type="ego_vehicle"',
             condition.source,
             condition.line,
@@ -243,4 +269,4 @@ _TRANSLATIONS: Mapping[str, tuple[str, Callable[[str], dict[str, Any]]]] = {
     "DrivenDistanceTest": ("driven_distance", lambda value: {"at_least": _number(value)}),
     "MaxVelocityTest": ("max_speed", lambda value: {"at_most": _number(value)}),
 }
-"""ScenarioRunner's class, our criterion, and what becomes of the condition's value (SI units on both sides)."""
+"""Criterion and its settings from the value of the condition, by class of ScenarioRunner (SI units on both sides)."""

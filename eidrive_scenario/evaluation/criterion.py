@@ -1,4 +1,4 @@
-"""A criterion passes or fails a run: a fold over frames, the same code live and over a recording."""
+"""Base class of criteria, which pass or fail a run. The same code evaluates live frames and recorded frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from eidrive_scenario.settings import Settings
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a criterion found. `value` and `limit` are in `unit`; `first_violation` is a time [s]."""
+    """Result of a criterion. `value` and `limit` are in `unit`; `first_violation` is a time [s]."""
 
     name: str
     passed: bool
@@ -28,33 +28,33 @@ class Verdict:
     first_violation: float | None
     reason: str
     fatal: bool = False
-    """True where the failure shall end the run: it is final, and not that something has yet to appear or happen."""
+    """True if the failure ends the run. The failure must be final: no later event can fulfill the criterion."""
 
 
 class CriterionSettings(Settings):
-    """What every criterion may be told; a criterion's own settings add to it."""
+    """Settings of every criterion. A criterion extends them with its own settings."""
 
     name: Annotated[str, Field(min_length=1)] | None = None
-    """What the verdict is called; the criterion's registered name where None."""
+    """Name of the verdict; None for the registered name of the criterion."""
     fatal: bool = False
-    """End the run as soon as this criterion has failed for good."""
+    """Whether a final failure of this criterion ends the run."""
 
 
 class Criterion(ABC):
-    """Observes every frame of a run once, in order, then answers.
+    """Observer of every frame of a run, in order and once each, that returns a verdict.
 
     A class is registered in the entry points `eidrive_scenario.criteria` and built as `cls(settings)`, with `settings`
-    an instance of its `settings_type`. An actor that it looks at and that never appeared is a failed verdict with the
-    reason `actor_never_present`, never a pass.
+    an instance of its `settings_type`. If an evaluated actor was never present, the verdict is failed, with the reason
+    `actor_never_present`.
     """
 
     settings_type: ClassVar[type[CriterionSettings]] = CriterionSettings
     name: str
     fatal: bool = False
     subjects: tuple[str, ...] = ()
-    """The actors that it cannot do without; whoever knows the scenario's entities checks them before the run."""
+    """Names of the required actors, checked against the entities of the scenario before the run."""
     monitors: tuple[str, ...] = ()
-    """The MonitorDeclarations that it reads, checked in the same way."""
+    """Names of the evaluated MonitorDeclarations, checked before the run."""
 
     def __init__(self, settings: CriterionSettings) -> None:
         if settings.name is not None:
@@ -63,26 +63,26 @@ class Criterion(ABC):
 
     @abstractmethod
     def observe(self, frame: Frame) -> None:
-        """Take one frame into account."""
+        """Process one frame."""
 
     @abstractmethod
     def verdict(self) -> Verdict:
-        """The verdict over all frames so far; may be asked at any time."""
+        """Return the verdict over all frames so far. It may be called at any time."""
 
     def metrics(self) -> Mapping[str, float]:
-        """Numbers worth keeping beside the verdict, by a name that starts with the criterion's."""
+        """Return additional numbers, by names that start with the name of the criterion."""
         return {}
 
 
 def actor_never_present(names: Iterable[str]) -> str:
-    """The reason of a verdict about actors that were never in the world."""
+    """Return the reason of a verdict about actors that were never present."""
     names = sorted(names)
     verb = "was" if len(names) == 1 else "were"
-    return f"{' and '.join(names)} {verb} never in the world, so nothing was measured"
+    return f"{' and '.join(names)} {verb} never present, so nothing was measured"
 
 
 def checked_verdict(criterion: Criterion) -> Verdict:
-    """Return the verdict of a criterion. Raise InvalidResult if it is none, or if its numbers are undefined."""
+    """Return the verdict of a criterion. Raise InvalidResult if it is not a Verdict or its numbers are undefined."""
     verdict: object = criterion.verdict()
     if not isinstance(verdict, Verdict):
         what = "None" if verdict is None else f"an object of type {type(verdict).__name__}"
@@ -100,7 +100,7 @@ def checked_verdict(criterion: Criterion) -> Verdict:
 
 
 def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
-    """Return the metrics of a criterion. Raise InvalidResult if they are no numbers by name."""
+    """Return the metrics of a criterion. Raise InvalidResult if they are not numbers by name."""
     metrics: object = criterion.metrics()
     if not isinstance(metrics, Mapping):
         raise InvalidResult(criterion, "metrics", f"returned {metrics!r} (expected numbers by name)")
@@ -111,7 +111,7 @@ def checked_metrics(criterion: Criterion) -> Mapping[str, float]:
 
 
 def evaluate_criteria(frames: Iterable[Frame], criteria: Sequence[Criterion]) -> tuple[Verdict, ...]:
-    """The verdicts of `criteria` over `frames`, say of a recording."""
+    """Return the verdicts of `criteria` over `frames`, for example of a recording."""
     for frame in frames:
         for criterion in criteria:
             criterion.observe(frame)

@@ -1,4 +1,4 @@
-"""False tracks in closed loop: objects that a planner is given and that do not exist, and brakings for them."""
+"""False tracks in closed loop: objects in the input of a planner that do not exist, and brakings for them."""
 
 from __future__ import annotations
 
@@ -12,49 +12,48 @@ from eidrive_scenario.world.view import WorldView
 Point = tuple[float, float]
 
 GATE = 2.0
-"""An object is true if its center lies in the body of another actor, seen from above, or at most this far beside it
-[m]."""
+"""Maximum horizontal distance of the center of a true object from the body of another actor [m]."""
 SAME = 4.0
-"""False objects of successive ticks at most this far apart are one false track [m]: a speed of 80 m/s at 0.05 s."""
+"""Maximum distance of false objects of successive ticks that form one false track [m]; 80 m/s at a step of 0.05 s."""
 
 
 @dataclass
 class _Station:
-    """Counts of one station so far."""
+    """Counters of one station."""
 
     false: list[Point] = field(default_factory=list)
-    """Places of the false tracks in the last tick."""
+    """Positions of the false tracks in the last tick [m]."""
     tracks: int = 0
     braking: bool = False
-    """Whether it braked in the last tick."""
+    """Whether the station braked in the last tick."""
     brakings: int = 0
     without_cause: int = 0
 
 
 class FalseTracks:
-    """Counts false tracks and brakings without a cause of every station with a planner; a fold over frames.
+    """Counter of false tracks and of brakings without a cause, for every station with a planner.
 
-    false track      a maximal series of ticks in which the planner is given an object that exists with at least
-                     `min_existence` of its station, without a true actor within GATE of it. Objects of successive ticks
-                     within SAME of each other continue one track. The own body is no true object.
-    braking          a maximal series of ticks in which `Plan.braking` is set
-    without a cause  all objects that the planner states as its reason (`Plan.objects`) in the first tick of the braking
-                     are false. A braking for which no object is stated has a cause.
+    false track      maximal series of ticks in which the planner receives an object without a true actor within GATE.
+                     Its probability of existence is at least `min_existence` of the station. Objects of successive
+                     ticks within SAME of each other continue one track. The ego body is not a true object.
+    braking          maximal series of ticks in which `Plan.braking` is set
+    without a cause  all objects that the planner states as reason (`Plan.objects`) in the first tick of the braking
+                     are false. A braking without stated objects has a cause.
 
-    The truth is used here and in criteria only; no planner learns of it.
+    Ground truth is used only here and in criteria, never by a planner.
     """
 
     def __init__(self) -> None:
         self._stations: dict[str, _Station] = {}
         self._start = self._end = math.nan
 
-    def observe(self, frame: Frame, least: Mapping[str, float]) -> None:
-        """Count what happened in one frame; `least` is `min_existence` of the stations that plan, by name."""
+    def observe(self, frame: Frame, min_existence: Mapping[str, float]) -> None:
+        """Process one frame. `min_existence` maps stations with a planner to their probability threshold."""
         view = frame.view
         if self._start != self._start:
             self._start = view.time
         self._end = view.time
-        for name, limit in least.items():
+        for name, limit in min_existence.items():
             step = frame.steps.get(name)
             if step is None or step.plan is None:
                 continue
@@ -67,11 +66,11 @@ class FalseTracks:
                 existence = step.fused.confidence.tolist()
                 rows = [row for row in rows if existence[row] >= limit]
             if rows or station.false:
-                places = [(boxes[row][0], boxes[row][1]) for row in rows]
+                points = [(boxes[row][0], boxes[row][1]) for row in rows]
                 station.tracks += sum(
-                    all(math.dist(place, before) > SAME for before in station.false) for place in places
+                    all(math.dist(point, before) > SAME for before in station.false) for point in points
                 )
-                station.false = places
+                station.false = points
             braking = step.plan.braking is not None
             if braking and not station.braking:
                 station.brakings += 1
@@ -80,7 +79,7 @@ class FalseTracks:
             station.braking = braking
 
     def metrics(self) -> dict[str, float]:
-        """For each station: `false_tracks.NAME.per_minute`, `.brakings`, `.brakings_without_cause`."""
+        """Return `false_tracks.NAME.per_minute`, `.brakings` and `.brakings_without_cause` of each station."""
         found: dict[str, float] = {}
         minutes = (self._end - self._start) / 60.0
         for name, station in self._stations.items():
@@ -91,7 +90,7 @@ class FalseTracks:
 
 
 def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> Sequence[int]:
-    """The rows of the objects without a true actor within GATE."""
+    """Return the rows of objects without a true actor within GATE."""
     bodies = view.plain_boxes
     found = []
     for row, box in enumerate(boxes):
@@ -107,7 +106,7 @@ def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int) -> S
 
 
 def _beside(x: float, y: float, body: Sequence[float]) -> bool:
-    """Whether a point is in the outline of a body (7,) or at most GATE beside it."""
+    """True if a point is inside the outline of a body (7,) or at most GATE outside it."""
     cos, sin = math.cos(body[6]), math.sin(body[6])
     dx, dy = x - body[0], y - body[1]
     ahead = max(abs(cos * dx + sin * dy) - body[3] / 2.0, 0.0)

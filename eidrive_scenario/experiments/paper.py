@@ -121,7 +121,7 @@ class Table:
     cells: tuple[Cell, ...]
 
     def cell(self, scenario: str, arm: str) -> Cell:
-        """The cell of that arm. Raises KeyError if there is none."""
+        """The cell of that arm. Raise KeyError if there is none."""
         for cell in self.cells:
             if cell.scenario == scenario and cell.arm.name == arm:
                 return cell
@@ -134,7 +134,7 @@ class Table:
 
 
 def tabulate(runs: Sequence[tuple[Job, RunResult]], rule: ModelVariant) -> Table:
-    """The table under one rule. Raises SimulationError where a run lacks one of the metrics."""
+    """The table under one rule. Raise SimulationError where a run lacks one of the metrics."""
     cells = []
     for scenario in dict.fromkeys(job.scenario for job, _ in runs):
         for arm in ARMS:

@@ -97,7 +97,7 @@ def run_folder(place: Path, settings: ResolvedSettings, *, own: bool) -> Iterato
     own  True: a folder below `place`, named after the settings. A number is appended while another run with the same
          settings is going on, or where the name holds anything else. False: `place` itself
 
-    Wrong input leaves nothing. Raises SettingError if the folder cannot be written, or if `place` itself is in use or
+    Wrong input leaves nothing. Raise SettingError if the folder cannot be written, or if `place` itself is in use or
     holds the result of other settings.
     """
     folder = _claim_below(place, settings) if own else _claim(place, settings)

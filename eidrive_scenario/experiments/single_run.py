@@ -72,7 +72,7 @@ def run_and_save(
     A run that breaks or is interrupted leaves `recording.partial.mcap` and a `.partial` table: what there is of them.
     Its exception has notes with that recording and with the command that repeats the run.
 
-    Parameters in `settings` win over those of the distribution. Raises InputError for a wrong scenario, setting or
+    Parameters in `settings` win over those of the distribution. Raise InputError for a wrong scenario, setting or
     place to write; ConstraintError for a run that the constraints of parameters rule out.
     """
     settings = settings or RunSettings()

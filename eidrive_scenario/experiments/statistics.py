@@ -27,7 +27,7 @@ class Summary:
 
 
 def summarize(values: Sequence[float]) -> Summary:
-    """The summary of at least one finite value. Raises ValueError otherwise."""
+    """The summary of at least one finite value. Raise ValueError otherwise."""
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or not len(sample) or not np.isfinite(sample).all():
         raise ValueError(f"expected a list of finite numbers, not {values!r}")
@@ -60,7 +60,7 @@ class Proportion:
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Proportion:
     """A share with its score interval (Wilson 1927), which behaves at 0 of n and n of n where mean ± sd does not.
 
-    Raises ValueError where `successes` is not within 0 … `trials`, or there is no trial.
+    Raise ValueError where `successes` is not within 0 … `trials`, or there is no trial.
     """
     if trials < 1 or not 0 <= successes <= trials:
         raise ValueError(f"{successes} of {trials} is no share")
@@ -100,7 +100,7 @@ def paired_difference(
 ) -> PairedDifference:
     """Compare two arms run with the same seeds, given in the same order (percentile bootstrap over the pairs).
 
-    Raises ValueError where the two do not pair up.
+    Raise ValueError where the two do not pair up.
     """
     if len(first) != len(second) or not first:
         raise ValueError(f"{len(first)} and {len(second)} values do not pair up")
@@ -133,7 +133,7 @@ class PairedOutcomes:
 def paired_outcomes(first: Sequence[bool], second: Sequence[bool]) -> PairedOutcomes:
     """Do two arms pass equally often? Only the pairs that disagree tell (McNemar 1947, exact binomial form).
 
-    Raises ValueError where the two do not pair up.
+    Raise ValueError where the two do not pair up.
     """
     if len(first) != len(second) or not first:
         raise ValueError(f"{len(first)} and {len(second)} outcomes do not pair up")

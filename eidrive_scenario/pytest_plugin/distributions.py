@@ -26,7 +26,7 @@ class DistributionFile(pytest.File):
     """A `.xosc` file that unfolds into concrete runs of a scenario."""
 
     def collect(self) -> Iterable[ScenarioItem]:
-        """One item per run, channel and seed. Raises CollectError if the distribution is wrong."""
+        """One item per run, channel and seed. Raise CollectError if the distribution is wrong."""
         from eidrive_scenario.openscenario import load_distribution
 
         try:

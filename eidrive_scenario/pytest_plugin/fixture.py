@@ -65,7 +65,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]:
-    """Channels and number of seeds. Raises ValueError for what the marker does not take."""
+    """Channels and number of seeds. Raise ValueError for what the marker does not take."""
     if not marker.args or not all(isinstance(pattern, str | Path) for pattern in marker.args):
         raise ValueError('the marker scenario needs a pattern, such as scenario("coop/*.xosc")')
     for keyword in marker.kwargs:
@@ -85,7 +85,7 @@ def _read_marker(marker: pytest.Mark) -> tuple[Sequence[str] | None, int | None]
 def _matches(pattern: str | Path, metafunc: pytest.Metafunc) -> list[Path]:
     """Scenarios beside the test file, else below the root, else in the library; a pattern without suffix is a name.
 
-    Raises ValueError if there is none.
+    Raise ValueError if there is none.
     """
     glob = str(pattern) if str(pattern).endswith(".xosc") else f"{pattern}.xosc"
     if not Path(glob).is_absolute():

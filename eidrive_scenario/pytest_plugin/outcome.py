@@ -47,7 +47,7 @@ def run_variant(item: pytest.Item, source: Source, arm: RunVariant, **overrides:
     """Run a scenario as the options ask, the arm says and `overrides` (fields of RunSettings) insist.
 
     What it leaves behind lies where the scenario's file does, or without one where that of the test does.
-    Raises InputError.
+    Raise InputError.
     """
     file = source if isinstance(source, Path) else item.path.with_suffix("") / f"{item.name.replace('/', '-')}.xosc"
     return _run_and_report(item.config, file, source, arm, overrides, command=pytest_command(item))

@@ -1,4 +1,4 @@
-"""Frames, trace hashes and recordings of runs."""
+"""Frames, trace hashes, recordings and text output of runs."""
 
 from eidrive_scenario.recording.camera_images import CameraImageWriter
 from eidrive_scenario.recording.frame import Frame

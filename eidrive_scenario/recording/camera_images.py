@@ -1,4 +1,4 @@
-"""The pictures of a run's cameras as files, with what was found drawn in."""
+"""Image files of the cameras of a run, with the detections drawn in."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from eidrive_scenario.sensing.readings import CameraReading
 Image = NDArray[np.uint8]
 
 QUALITY = 90
-"""Of the JPEG files, in percent."""
+"""Quality of the JPEG files [percent]."""
 _COLORS = {
     "car": (80, 220, 255),
     "van": (80, 220, 255),
@@ -31,17 +31,18 @@ _COLORS = {
     "bicycle": (160, 255, 90),
     "pedestrian": (255, 110, 110),
 }
-"""Red, green, blue."""
+"""Color of each class: red, green, blue."""
 _OTHER = (255, 255, 255)
+"""Color of all other classes."""
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Of a box, between the corners as `box_corners` gives them."""
+"""Edges of a box: pairs of corner indices in the order of `box_corners`."""
 
 
 class CameraImageWriter:
-    """Writes each picture that a station takes to FOLDER/STATION/CAMERA-TICK.jpg.
+    """Writer of each camera image of a station to FOLDER/STATION/CAMERA-TICK.jpg.
 
-    What the station's detector found in the picture is drawn in as it found it, with class and score; of a detector
-    that does not look at pictures, what the station takes to be there is drawn as boxes in space.
+    Detections of an image detector are drawn with class and score. For a detector without image detections, the 3D
+    detections of the station are projected into the image.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -49,36 +50,36 @@ class CameraImageWriter:
         self._stations: Stations | None = None
 
     def watch(self, stations: Stations) -> None:
-        """Whose pictures to keep."""
+        """Select the stations whose images are written."""
         self._stations = stations
 
     def observe(self, frame: Frame) -> None:
-        """Write the pictures of this tick. Raises SettingError if that cannot be done."""
+        """Write the images of this tick. Raise SettingError if a file cannot be written."""
         if self._stations is None:
             return
         for station, readings in self._stations.readings.items():
-            found = self._stations.detector(station).image_detections
+            detections = self._stations.detector(station).image_detections
             for camera, reading in readings.cameras.items():
-                if camera in found:
-                    picture = drawn(reading.rgb, found[camera])
+                if camera in detections:
+                    image = draw_image_detections(reading.rgb, detections[camera])
                 else:
-                    picture = drawn_in_space(reading, frame.steps[station].detections)
+                    image = draw_projected_boxes(reading, frame.steps[station].detections)
                 name = f"{quote(camera, safe=' ')}-{frame.view.tick:06d}.jpg"
-                self._write(self._folder / quote(station, safe=" ") / name, picture)
+                self._write(self._folder / quote(station, safe=" ") / name, image)
 
     def close(self) -> None:
-        """Nothing is left to write."""
+        """Do nothing: each image is written at once."""
 
-    def _write(self, path: Path, picture: Image) -> None:
-        _, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    def _write(self, path: Path, image: Image) -> None:
+        _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         with create(path) as stream:
             stream.write(data.tobytes())
 
 
-def drawn(picture: Image, found: ImageDetections) -> Image:
-    """The picture (H, W, 3) with boxes, classes and scores."""
-    canvas = picture.copy()
-    for box, score, name in zip(found.boxes, found.scores.tolist(), found.classes, strict=True):
+def draw_image_detections(image: Image, detections: ImageDetections) -> Image:
+    """Return a copy of the image (H, W, 3) with boxes, classes and scores."""
+    canvas = image.copy()
+    for box, score, name in zip(detections.boxes, detections.scores.tolist(), detections.classes, strict=True):
         left, top, right, bottom = np.rint(box).astype(int).tolist()
         color = _COLORS.get(name, _OTHER)
         cv2.rectangle(canvas, (left, top), (right - 1, bottom - 1), color, 1)
@@ -86,16 +87,17 @@ def drawn(picture: Image, found: ImageDetections) -> Image:
     return canvas
 
 
-def drawn_in_space(reading: CameraReading, found: Detections) -> Image:
-    """The picture with boxes of the world, but for those that reach behind the camera."""
+def draw_projected_boxes(reading: CameraReading, detections: Detections) -> Image:
+    """Return a copy of the image with projected 3D boxes, without boxes that reach behind the camera."""
     canvas = reading.rgb.copy()
     height, width = canvas.shape[:2]
-    for corners, name, score in zip(box_corners(found.boxes), found.classes, found.scores.tolist(), strict=True):
-        places, _ = pixels(corners, reading)
-        if not np.isfinite(places).all() or (np.abs(places) > 10 * max(width, height)).any():
+    boxes, scores = box_corners(detections.boxes), detections.scores.tolist()
+    for corners, name, score in zip(boxes, detections.classes, scores, strict=True):
+        projected, _ = pixels(corners, reading)
+        if not np.isfinite(projected).all() or (np.abs(projected) > 10 * max(width, height)).any():
             continue
         color = _COLORS.get(name, _OTHER)
-        points = np.rint(places).astype(int).tolist()
+        points = np.rint(projected).astype(int).tolist()
         for first, last in _EDGES:
             cv2.line(canvas, points[first], points[last], color, 1, cv2.LINE_AA)
         _label(canvas, f"{name} {score:.2f}", min(x for x, _ in points), min(y for _, y in points), color)
@@ -103,7 +105,7 @@ def drawn_in_space(reading: CameraReading, found: Detections) -> Image:
 
 
 def _label(canvas: Image, text: str, left: int, top: int, color: tuple[int, int, int]) -> None:
-    """Text above a place, or below where there is no room, dark behind."""
+    """Draw a text with a dark outline above a point, or below it at the upper image border."""
     font, size = cv2.FONT_HERSHEY_SIMPLEX, max(0.35, canvas.shape[1] / 1800.0)
     (wide, high), _ = cv2.getTextSize(text, font, size, 1)
     left = min(max(left, 0), max(canvas.shape[1] - wide, 0))

@@ -1,8 +1,8 @@
-"""Frozen dataclasses to JSON and back without loss, driven by the types of their fields.
+"""Lossless JSON encoding of frozen dataclasses, derived from their field types.
 
-Numbers keep all 64 bits (Python writes the shortest decimal that reads back the same). What JSON has no number for is
-written as in protobuf's JSON mapping: "NaN", "Infinity", "-Infinity". Arrays are nested lists; an empty one is
-{"shape": [0, 7]}, as its shape would be lost.
+Numbers keep all 64 bits: Python writes the shortest decimal that reads back the same. Non-finite numbers are written as
+in protobuf's JSON mapping: "NaN", "Infinity", "-Infinity". Arrays are nested lists. An empty array is
+{"shape": [0, 7]}, because a nested list would lose its shape.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NUMBER = {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity
 
 @dataclass(frozen=True)
 class Codec:
-    """How one type is written, read again, and described by a JSON schema."""
+    """Encoder, decoder and JSON schema of one type."""
 
     encode: Callable[[Any], Json]
     decode: Callable[[Json], Any]
@@ -33,9 +33,9 @@ class Codec:
 
 @cache
 def codec(kind: Any) -> Codec:
-    """The codec of a type: a scalar, an enum, an array, a tuple, a mapping, an optional one, or a dataclass of these.
+    """Return the codec of a type: scalar, enum, array, tuple, mapping, optional type, or a dataclass of these.
 
-    Raises TypeError for any other type, when it is asked for, not when a run writes.
+    Raise TypeError for any other type, before anything is encoded.
     """
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is float:
@@ -58,7 +58,7 @@ def codec(kind: Any) -> Codec:
         return _mapping(codec(arguments[1]))
     if is_dataclass(kind) and isinstance(kind, type):
         return _record(kind)
-    raise TypeError(f"no way to write {kind!r} as JSON")
+    raise TypeError(f"{kind!r}: no JSON encoding is defined for this type")
 
 
 def _same(value: Any) -> Any:
@@ -86,7 +86,7 @@ def _array(dtype: np.dtype[Any]) -> Codec:
 
 
 def _empty(shape: Json, dtype: np.dtype[Any]) -> Any:
-    """An array without entries. Raises ValueError for any other shape, as its entries would be made up."""
+    """Return an empty array. Raise ValueError for any other shape, because its entries are not stored."""
     if not isinstance(shape, list) or 0 not in shape:
         raise ValueError(f"{str(shape)[:80]} is not the shape of an empty array")
     return np.empty(shape, dtype)

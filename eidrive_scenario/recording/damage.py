@@ -1,36 +1,37 @@
-"""Damage of a recording, in words: each kind once, with its first places and its count."""
+"""Report of the damage of a recording: each kind once, with its first locations and its count."""
 
 from __future__ import annotations
 
 _SHOWN = 3
-"""Places that are named of each kind of damage."""
-_MOST_KINDS = 50
+"""Number of locations that are listed for each kind of damage."""
+_MAX_KINDS = 50
+"""Maximum number of kinds of damage that are listed separately."""
 
 
 class DamageReport:
-    """Collects damage while a file is read; its size does not grow with the damage."""
+    """Collector of damage that is found while a file is read. Its size does not grow with the damage."""
 
     def __init__(self) -> None:
-        self._places: dict[str, list[str]] = {}
+        self._locations: dict[str, list[str]] = {}
         self._counts: dict[str, int] = {}
 
-    def add(self, what: str, place: str = "") -> None:
-        """Note one damage: its kind, and where it is."""
-        if what not in self._counts and len(self._counts) >= _MOST_KINDS:
-            what = "further damage"
-        self._counts[what] = self._counts.get(what, 0) + 1
-        places = self._places.setdefault(what, [])
-        if place and len(places) < _SHOWN:
-            places.append(place)
+    def add(self, kind: str, location: str = "") -> None:
+        """Add one case of damage of this kind, with its location in the file."""
+        if kind not in self._counts and len(self._counts) >= _MAX_KINDS:
+            kind = "further damage"
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        locations = self._locations.setdefault(kind, [])
+        if location and len(locations) < _SHOWN:
+            locations.append(location)
 
     def __bool__(self) -> bool:
         return bool(self._counts)
 
     def lines(self) -> tuple[str, ...]:
-        """One line for each kind of damage."""
-        return tuple(self._line(what, count) for what, count in self._counts.items())
+        """Return one line for each kind of damage."""
+        return tuple(self._line(kind, count) for kind, count in self._counts.items())
 
-    def _line(self, what: str, count: int) -> str:
-        places = self._places[what]
-        more = f" and {count - len(places)} more" if places and count > len(places) else ""
-        return f"{what}: {', '.join(places)}{more}" if places else what
+    def _line(self, kind: str, count: int) -> str:
+        locations = self._locations[kind]
+        more = f" and {count - len(locations)} more" if locations and count > len(locations) else ""
+        return f"{kind}: {', '.join(locations)}{more}" if locations else kind

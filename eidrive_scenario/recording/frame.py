@@ -1,4 +1,4 @@
-"""All that happened in one tick."""
+"""Frame: the state and the events of one tick."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from eidrive_scenario.world.view import WorldView
 @fast_frozen
 @dataclass(frozen=True)
 class Frame:
-    """The truth, what each station did, what the storyboard did, and what became of the messages said before.
+    """Ground truth, steps of the stations, storyboard transitions and message outcomes of one tick.
 
-    links        fates of messages that became known in the last tick, in the order of the channel; where it keeps them
-                 in arrays (LinkEvents), events are made at the first look
-    signals      what each traffic signal shows, by its id; those that nobody has set are missing
-    appearances  lights, animations and visibility of the actors where they differ from the usual
-    environment  time of day, weather and road; None until the scenario says something of them
-    monitors     the scenario's monitors by name
+    steps        step of each station, by name
+    links        message outcomes that became known in the last tick, in the order of the channel. Array-based channels
+                 provide a LinkEvents, which creates events on first access
+    signals      state of each traffic signal by id, without signals whose state was never set
+    appearances  lights, animations and visibility of the actors that differ from the default
+    environment  time of day, weather and road condition; None until the scenario sets an environment
+    monitors     values of the scenario's monitors by name
     """
 
     view: WorldView

@@ -1,4 +1,4 @@
-"""Whether a frame that was read fits together, as a frame of a run does."""
+"""Consistency check of a decoded frame."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _COLUMNS = {
     "size": 3,
     "offset": 3,
 }
-"""Columns of the arrays of a view; 0 for one number per actor."""
+"""Number of columns of each array of a view; 0 for one number per actor."""
 
 
 def check_frame(frame: Frame) -> None:
-    """Raise ValueError if the time is not a number or the arrays of the view do not have a row for each actor."""
+    """Raise ValueError if the time is not finite or an array of the view does not have one row per actor."""
     view = frame.view
     if not math.isfinite(view.time):
-        raise ValueError(f"the time is {view.time}")
+        raise ValueError(f"time is not finite (got {view.time})")
     count = len(view.names)
     if len(view.categories) != count or len(set(view.names)) != count:
-        raise ValueError("the names of the actors do not fit")
+        raise ValueError("names and categories of the actors are inconsistent")
     for name, columns in _COLUMNS.items():
         shape = getattr(view, name).shape
         if shape != ((count, columns) if columns else (count,)):
-            raise ValueError(f"{name} has shape {shape} for {count} actors")
+            raise ValueError(f"{name} has an invalid shape (got {shape} for {count} actors)")

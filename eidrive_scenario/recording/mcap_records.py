@@ -1,6 +1,6 @@
-"""The records of an MCAP file, read from an untrusted source: bounded in size, checked, and found again after damage.
+"""Reader of MCAP records from untrusted sources: bounded in size, checked, with resynchronization after damage.
 
-The layout is that of the MCAP specification, version 0 (https://mcap.dev/spec).
+The layout follows the MCAP specification, version 0 (https://mcap.dev/spec).
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ from eidrive_scenario.recording.damage import DamageReport
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, STATISTICS, METADATA, DATA_END = 2, 3, 4, 5, 6, 9, 11, 12, 15
 LARGEST_RECORD = 320 * 2**20
-"""Maximum size of a record [bytes]; an attached road has up to 256 MiB."""
+"""Maximum size of a record [bytes]. An attached road file may have 256 MiB."""
 LARGEST_CHUNK = 128 * 2**20
-"""Maximum size of a chunk without compression [bytes]; the recorder closes one at the first frame beyond 256 KiB."""
+"""Maximum uncompressed size of a chunk [bytes]. The recorder closes a chunk at the first frame beyond 256 KiB."""
 LARGEST_CONTENT = 8 * 2**30
-"""Maximum size of all chunks of a file without compression [bytes]."""
-MOST_RECORDS = 2_000_000
+"""Maximum uncompressed size of all chunks of a file [bytes]."""
+MAX_RECORDS = 2_000_000
+"""Maximum number of records that are read."""
 _SMALL_CHUNK = 4 * 2**20
-"""Size up to which a chunk may be compressed to any degree [bytes]."""
-_MOST_COMPRESSED = 300
-"""Maximum compression of a larger chunk, which holds a single frame; those of scenario 1 are compressed 27-fold."""
+"""Uncompressed size up to which the compression ratio of a chunk is not limited [bytes]."""
+_MAX_COMPRESSION_RATIO = 300
+"""Maximum compression ratio of a larger chunk, which contains a single frame. Chunks of scenario 1 have a ratio of
+27."""
 _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
@@ -42,7 +44,7 @@ _BLOCK = 1 << 20
 
 
 class Record(NamedTuple):
-    """A record outside of chunks, and where it begins in the file."""
+    """Record outside of chunks, with its offset in the file [bytes]."""
 
     opcode: int
     offset: int
@@ -50,7 +52,7 @@ class Record(NamedTuple):
 
 
 class Message(NamedTuple):
-    """A message of a chunk."""
+    """Message record of a chunk."""
 
     channel: int
     sequence: int
@@ -59,9 +61,9 @@ class Message(NamedTuple):
 
 
 class McapFile:
-    """A file of records. Whatever is wrong with it is added to the report; what can be read is given.
+    """MCAP file whose readable records are returned and whose damage is added to a report.
 
-    Raises InputError if the file cannot be opened, is not a regular file, or is not MCAP.
+    Raise InputError if the file cannot be opened, is not a regular file, or is not MCAP.
     """
 
     def __init__(self, path: Path, damage: DamageReport) -> None:
@@ -94,15 +96,15 @@ class McapFile:
         os.close(self._descriptor)
 
     def read(self, offset: int, length: int) -> bytes:
-        """Bytes of the file; fewer at its end."""
+        """Return `length` bytes of the file, or fewer at its end."""
         return os.pread(self._descriptor, length, offset) if length > 0 else b""
 
     def records(self) -> Iterator[Record]:
-        """All records outside of chunks, in the order of the file; the checksums of the file are checked on the way."""
+        """Yield all records outside of chunks in file order, and check the checksums of the file."""
         sums = _FileSums(self._damage)
         sums.add(MAGIC)
         offset = len(MAGIC)
-        for _ in range(MOST_RECORDS):
+        for _ in range(MAX_RECORDS):
             head = self.read(offset, _HEAD.size)
             if len(head) < _HEAD.size:
                 self._damage.add("the end of the file is missing")
@@ -111,9 +113,9 @@ class McapFile:
             if opcode not in _KNOWN or offset + _HEAD.size + length > self._size:
                 found = self._next_chunk(offset + 1)
                 if found is None:
-                    self._damage.add("no record can be read up to the end of the file", f"from byte {offset} on")
+                    self._damage.add("the rest of the file contains no readable record", f"from byte {offset} on")
                     return
-                self._damage.add("bytes are no record", f"{offset} to {found}")
+                self._damage.add("bytes do not form a record", f"{offset} to {found}")
                 sums.broken = True
                 offset = found
                 continue
@@ -122,17 +124,17 @@ class McapFile:
                 sums.broken = True
             else:
                 body = self.read(offset + _HEAD.size, length)
-                sums.take(opcode, offset, head, body)
+                sums.add_record(opcode, head, body)
                 yield Record(opcode, offset, body)
             offset += _HEAD.size + length
             if opcode == FOOTER:
                 if self.read(offset, len(MAGIC) + 1) != MAGIC:
                     self._damage.add("the file does not end with its last record", f"byte {offset}")
                 return
-        self._damage.add(f"the file has more than {MOST_RECORDS} records")
+        self._damage.add(f"the file has more than {MAX_RECORDS} records")
 
     def record_at(self, offset: int) -> Record:
-        """The record that `records` found at this offset."""
+        """Return the record that `records` found at this offset."""
         opcode, length = _HEAD.unpack(self.read(offset, _HEAD.size))
         return Record(opcode, offset, self.read(offset + _HEAD.size, min(length, LARGEST_RECORD)))
 
@@ -146,12 +148,12 @@ class McapFile:
                 return None
             text = held + block
             base = offset - len(held)
-            place = text.find(_ZSTD)
-            while place >= 0:
-                candidate = base + place - before
+            position = text.find(_ZSTD)
+            while position >= 0:
+                candidate = base + position - before
                 if candidate >= start and self._is_chunk(candidate):
                     return candidate
-                place = text.find(_ZSTD, place + 1)
+                position = text.find(_ZSTD, position + 1)
             held = text[-(len(_ZSTD) - 1) :]
             offset += len(block)
 
@@ -166,7 +168,7 @@ class McapFile:
 
 
 class _FileSums:
-    """The checksums of the data section and of the summary."""
+    """Checksums of the data section and of the summary section."""
 
     def __init__(self, damage: DamageReport) -> None:
         self._damage = damage
@@ -174,12 +176,12 @@ class _FileSums:
         self._ended = False
         self._summary = 0
         self.broken = False
-        """Whether the sums cannot be right, as bytes were left out."""
+        """Whether bytes were skipped, so that the checksums cannot match."""
 
     def add(self, data: bytes) -> None:
         self._sum = zlib.crc32(data, self._sum)
 
-    def take(self, opcode: int, offset: int, head: bytes, body: bytes) -> None:
+    def add_record(self, opcode: int, head: bytes, body: bytes) -> None:
         if opcode == DATA_END:
             self._check("the data section does not match its checksum", self._sum, body[-4:])
             self._ended = True
@@ -194,77 +196,77 @@ class _FileSums:
             self.add(head)
             self.add(body)
 
-    def _check(self, what: str, found: int, stored: bytes) -> None:
-        if self.broken or stored != struct.pack("<I", found):
-            self._damage.add(what)
+    def _check(self, damage: str, computed: int, stored: bytes) -> None:
+        if self.broken or stored != struct.pack("<I", computed):
+            self._damage.add(damage)
 
 
 def chunk_messages(record: Record, damage: DamageReport) -> list[Message]:
-    """The messages in a chunk, as far as they can be read."""
-    place = f"byte {record.offset}"
+    """Return the readable messages of a chunk."""
+    location = f"byte {record.offset}"
     try:
         _, _, size, checksum = _CHUNK_HEAD.unpack_from(record.body)
         compression, start = _text(record.body, _CHUNK_HEAD.size)
         (length,) = struct.unpack_from("<Q", record.body, start)
     except (struct.error, UnicodeDecodeError, ValueError):
-        damage.add("a chunk cannot be read", place)
+        damage.add("a chunk cannot be read", location)
         return []
     packed = record.body[start + 8 : start + 8 + length]
-    if size > LARGEST_CHUNK or size > max(_SMALL_CHUNK, _MOST_COMPRESSED * len(packed)):
-        damage.add("a chunk is too large, or compressed more than frames are", place)
+    if size > LARGEST_CHUNK or size > max(_SMALL_CHUNK, _MAX_COMPRESSION_RATIO * len(packed)):
+        damage.add("a chunk is too large, or its compression ratio is too high", location)
         return []
     if len(packed) != length or compression not in ("", "zstd"):
-        damage.add("a chunk cannot be read", place)
+        damage.add("a chunk cannot be read", location)
         return []
     try:
-        data = packed if compression == "" else _unpacked(packed, size)
+        data = packed if compression == "" else _decompress(packed, size)
     except (zstandard.ZstdError, MemoryError):
-        damage.add("a chunk cannot be decompressed", place)
+        damage.add("a chunk cannot be decompressed", location)
         return []
     if len(data) != size or zlib.crc32(data) != checksum:
-        damage.add("a chunk does not match its checksum", place)
-    return list(_messages(data, damage, place))
+        damage.add("a chunk does not match its checksum", location)
+    return list(_messages(data, damage, location))
 
 
-def _unpacked(packed: bytes, size: int) -> bytes:
-    """At most `size` and one bytes, whatever the data claim."""
+def _decompress(packed: bytes, size: int) -> bytes:
+    """Return at most `size` + 1 bytes, whatever size the data state."""
     reader = zstandard.ZstdDecompressor(max_window_size=LARGEST_CHUNK).stream_reader(packed)
     return bytes(reader.read(size + 1))
 
 
-def _messages(data: bytes, damage: DamageReport, place: str) -> Iterator[Message]:
+def _messages(data: bytes, damage: DamageReport, location: str) -> Iterator[Message]:
     offset = 0
     while offset < len(data):
         try:
             opcode, length = _HEAD.unpack_from(data, offset)
         except struct.error:
-            damage.add("a chunk ends within a record", place)
+            damage.add("a chunk ends within a record", location)
             return
         offset += _HEAD.size
         if length > len(data) - offset:
-            damage.add("a chunk ends within a record", place)
+            damage.add("a chunk ends within a record", location)
             return
         if opcode == MESSAGE:
             if length < _MESSAGE_HEAD.size:
-                damage.add("a message cannot be read", place)
+                damage.add("a message cannot be read", location)
             else:
                 yield message_of(data[offset : offset + length])
         offset += length
 
 
 def message_of(body: bytes) -> Message:
-    """A message record. Raises struct.error if it is too short."""
+    """Parse a message record. Raise struct.error if it is too short."""
     channel, sequence, log_time, _ = _MESSAGE_HEAD.unpack_from(body)
     return Message(channel, sequence, log_time, body[_MESSAGE_HEAD.size :])
 
 
 def metadata_of(body: bytes) -> tuple[str, dict[str, str]]:
-    """Name and entries of a metadata record. Raises ValueError or struct.error if it cannot be read."""
+    """Return name and entries of a metadata record. Raise ValueError or struct.error if it cannot be read."""
     name, offset = _text(body, 0)
     (length,) = struct.unpack_from("<I", body, offset)
     offset += 4
     if offset + length != len(body):
-        raise ValueError("the lengths do not agree")
+        raise ValueError("length fields of the record are inconsistent")
     entries = {}
     while offset < len(body):
         key, offset = _text(body, offset)
@@ -273,25 +275,25 @@ def metadata_of(body: bytes) -> tuple[str, dict[str, str]]:
 
 
 def attachment_of(body: bytes) -> tuple[str, bytes, bool]:
-    """Name and content of an attachment, and whether they match their checksum. Raises ValueError or struct.error."""
+    """Return name and content of an attachment, and whether the checksum matches. Raise ValueError or struct.error."""
     name, offset = _text(body, 16)
     _, offset = _text(body, offset)
     (length,) = struct.unpack_from("<Q", body, offset)
     offset += 8
     if offset + length + 4 != len(body):
-        raise ValueError("the lengths do not agree")
+        raise ValueError("length fields of the record are inconsistent")
     return name, body[offset:-4], body[-4:] == struct.pack("<I", zlib.crc32(memoryview(body)[:-4]))
 
 
 def statistics_of(body: bytes) -> int:
-    """The number of messages that the summary states. Raises struct.error."""
+    """Return the number of messages according to the statistics record. Raise struct.error if it is too short."""
     return int(struct.unpack_from("<Q", body)[0])
 
 
 def _text(body: bytes, offset: int) -> tuple[str, int]:
-    """A text with its length before it, and where it ends."""
+    """Return a length-prefixed string and the offset of its end."""
     (length,) = struct.unpack_from("<I", body, offset)
     offset += 4
     if offset + length > len(body):
-        raise ValueError("a text is longer than its record")
+        raise ValueError("string length exceeds the record")
     return body[offset : offset + length].decode(), offset + length

@@ -1,4 +1,4 @@
-"""Writing a run as an MCAP file: every frame without loss, and all that is needed to show it or judge it again."""
+"""Recorder of a run as an MCAP file: all frames without loss, and all inputs for replay and evaluation."""
 
 from __future__ import annotations
 
@@ -18,25 +18,24 @@ from eidrive_scenario.resolved_settings import package_versions
 
 TOPIC = "/frame"
 FORMAT = "2"
-"""Version of the recording's layout, in its metadata."""
+"""Version of the recording format, stored in the metadata."""
 _CHUNK = 256 * 2**10
-"""Size of a chunk before compression [bytes]."""
+"""Uncompressed size at which a chunk is written [bytes]."""
 _SPAN = 1_000_000_000
-"""Simulated time after which a chunk is written whatever its size [ns]."""
+"""Simulated time after which a chunk of any size is written [ns]."""
 RUN = "run"
 """Name of the metadata record that describes the run."""
 
 
 class Recorder:
-    """Writes an MCAP file: JSON messages with a JSON schema on the topic `/frame`, compressed with Zstandard.
+    """Observer that writes an MCAP file: JSON messages with a JSON schema on `/frame`, compressed with Zstandard.
 
-    metadata     what was run: scenario, seed, settings; versions of the packages are added
-    attachments  files to carry along by name, say the scenario and its road
+    metadata     scenario, seed and settings of the run; package versions are added
+    attachments  attached files by name, for example the scenario and its road file
 
-    A chunk is written after every second of simulated time, or 256 KiB: a killed process loses at most one.
+    A chunk is written after every second of simulated time or 256 KiB. A killed process loses at most one chunk.
 
-    Times in the file are simulated ones, so equal runs give equal files. Raises SettingError if the file cannot be
-    written.
+    Timestamps are simulated times, so equal runs give equal files. Raise SettingError if the file cannot be written.
     """
 
     def __init__(
@@ -46,9 +45,9 @@ class Recorder:
         self._seal = Seal()
         self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._writer.start(profile="", library="eidrive-scenario")
-        told = {"format": FORMAT, **package_versions(), **metadata}
-        self._writer.add_metadata(RUN, told)
-        self._seal.add_metadata(told)
+        entries = {"format": FORMAT, **package_versions(), **metadata}
+        self._writer.add_metadata(RUN, entries)
+        self._seal.add_metadata(entries)
         for name, data in (attachments or {}).items():
             self._writer.add_attachment(0, 0, name, "application/octet-stream", data)
             self._seal.add_attachment(name, data)
@@ -59,7 +58,7 @@ class Recorder:
         self._channel = self._writer.register_channel(TOPIC, "json", schema_id)
 
     def observe(self, frame: Frame) -> None:
-        """Append one frame. Raise SimulationError if the file is closed: a second run needs a second recorder."""
+        """Append one frame. Raise SimulationError if the file is closed: each run needs its own recorder."""
         if self._file.closed:
             raise SimulationError(f"{self._file.name}: the recording is closed; a second run needs a second Recorder")
         text = json.dumps(self._codec.encode(frame), separators=(",", ":"), ensure_ascii=False, allow_nan=False)
@@ -71,7 +70,7 @@ class Recorder:
             self._due = instant + _SPAN
 
     def close(self) -> None:
-        """Finish the file; a second call does nothing."""
+        """Finish the file. A second call has no effect."""
         if self._file.closed:
             return
         with self._file:

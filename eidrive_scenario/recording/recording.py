@@ -1,4 +1,4 @@
-"""Reading a recording: its frames without loss, and whether they are those that were recorded."""
+"""Reader of recordings: frames without loss, and detection of damage."""
 
 from __future__ import annotations
 
@@ -20,26 +20,27 @@ from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.recording.seal import NAME as SEAL
 from eidrive_scenario.recording.seal import Seal
 
-MOST_FRAMES = 1_000_000
+MAX_FRAMES = 1_000_000
 """Maximum number of frames that are read."""
 LARGEST_FRAME = 64 * 2**20
 """Maximum size of a frame [bytes]."""
-_MOST_VALUES = 4_000_000
+_MAX_VALUES = 4_000_000
 """Maximum number of values in a frame."""
 _LARGEST_ATTACHMENTS = 320 * 2**20
-"""Maximum size of all attachments together [bytes]."""
+"""Maximum total size of all attachments [bytes]."""
 _LARGEST_METADATA = 32 * 2**20
+"""Maximum size of a metadata record [bytes]."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded run, read lazily: its frames come from the file each time they are asked for.
+    """Recorded run with lazy access: each call of `frames` reads the file.
 
-    frame_count  number of frames that the file holds
-    damage       what differs from the file as it was written, a line for each kind; empty for an undamaged file, whose
-                 frames are those that were recorded, to the last bit
+    frame_count  number of frames in the file
+    damage       differences from the file as it was written, one line for each kind; empty for an undamaged file, whose
+                 frames equal the recorded ones bit for bit
     """
 
     path: Path
@@ -52,22 +53,22 @@ class Recording:
 
     @property
     def scenario(self) -> str:
-        """The name of the scenario, or an empty text where the file does not say."""
+        """Name of the scenario; empty if the metadata omit it."""
         return self.metadata.get("scenario", "")
 
     @property
     def seed(self) -> int:
-        """The seed of the run; 0 where a damaged file does not say."""
+        """Seed of the run; 0 if the metadata of a damaged file omit it."""
         try:
             return int(self.metadata.get("seed", "0"))
         except ValueError:
             return 0
 
     def frames(self, skipped: Callable[[str], None] | None = None) -> Iterator[Frame]:
-        """The frames in order, equal to those recorded to the last bit if the recording is undamaged.
+        """Yield the frames in order, bit for bit equal to the recorded ones if the recording is undamaged.
 
-        Of a damaged recording, frames that cannot be read are left out. `skipped` is called with the reason of each.
-        Raises InputError if a frame of an undamaged recording cannot be read by this version.
+        Unreadable frames of a damaged recording are skipped, and `skipped` is called with the reason for each.
+        Raise InputError if this version cannot read a frame of an undamaged recording.
         """
         decode = codec(Frame).decode
         last = -1
@@ -75,9 +76,9 @@ class Recording:
             for offset in self._blocks:
                 for message in _messages(file.record_at(offset)):
                     if message.sequence <= last:
-                        continue  # a second copy
+                        continue  # duplicate
                     try:
-                        frame = _decoded(message.data, decode)
+                        frame = _decode_frame(message.data, decode)
                     except ValueError as error:
                         self._skip(message.sequence, error, skipped)
                         continue
@@ -85,7 +86,7 @@ class Recording:
                     yield frame
 
     def _skip(self, tick: int, error: ValueError, skipped: Callable[[str], None] | None) -> None:
-        reason = f"frame {tick} does not read: {error}"
+        reason = f"frame {tick} cannot be decoded: {error}"
         if not self.damage:
             hint = f"read it with the version that wrote it ({self.metadata.get('eidrive-scenario', 'unknown')})"
             raise InputError(Diagnostic(reason, hint, str(self.path))) from error
@@ -94,10 +95,10 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Open a recording, given by its file or by the folder of its run, or one with a single run below.
+    """Open a recording, given as its file, the folder of its run, or a folder that contains a single run.
 
     The whole file is checked. If it is damaged, `damage` of the recording describes it, and a warning is logged.
-    Raises InputError if it is not there or not a recording of this package.
+    Raise InputError if the file does not exist or is not a recording of this package.
     """
     recording = open_recording(recording_in(Path(path)))
     if recording.damage:
@@ -106,18 +107,18 @@ def read_recording(path: str | Path) -> Recording:
 
 
 def open_recording(path: Path) -> Recording:
-    """As `read_recording`, of a file, without the warning."""
+    """Open a recording as `read_recording` does, given as its file and without the warning."""
     reading = _Reading()
     with mcap.McapFile(path, reading.damage) as file:
         for record in file.records():
-            reading.take(record)
+            reading.add(record)
             if reading.is_full:
                 break
     return reading.finish(path)
 
 
 class _Reading:
-    """One pass over a file: what it holds, and whether that is what was written."""
+    """State of one pass over a file: content and damage."""
 
     def __init__(self) -> None:
         self.damage = DamageReport()
@@ -131,26 +132,26 @@ class _Reading:
         self._stated: int | None = None
         self.is_full = False
 
-    def take(self, record: mcap.Record) -> None:
-        """Take a record in; one that cannot be read is damage."""
+    def add(self, record: mcap.Record) -> None:
+        """Process a record. An unreadable record is reported as damage."""
         try:
-            self._take(record)
+            self._add(record)
         except (ValueError, struct.error):
             self.damage.add("a record cannot be read", f"byte {record.offset}")
 
-    def _take(self, record: mcap.Record) -> None:
+    def _add(self, record: mcap.Record) -> None:
         if record.opcode == mcap.METADATA:
-            self._take_metadata(record)
+            self._add_metadata(record)
         elif record.opcode == mcap.ATTACHMENT:
-            self._take_attachment(record)
+            self._add_attachment(record)
         elif record.opcode in (mcap.CHUNK, mcap.MESSAGE):
-            self._take_frames(record)
+            self._add_frames(record)
         elif record.opcode == mcap.STATISTICS:
             self._stated = mcap.statistics_of(record.body)
 
-    def _take_metadata(self, record: mcap.Record) -> None:
+    def _add_metadata(self, record: mcap.Record) -> None:
         if len(record.body) > _LARGEST_METADATA:
-            raise ValueError("too large")
+            raise ValueError(f"metadata record is too large (got {len(record.body)} bytes)")
         name, entries = mcap.metadata_of(record.body)
         if name == RUN and not self._metadata:
             self._metadata = entries
@@ -158,12 +159,12 @@ class _Reading:
         elif name == SEAL and self._stored is None:
             self._stored = entries
         else:
-            self.damage.add("a metadata record is doubled or unknown", f"byte {record.offset}")
+            self.damage.add("a metadata record is duplicated or unknown", f"byte {record.offset}")
 
-    def _take_attachment(self, record: mcap.Record) -> None:
+    def _add_attachment(self, record: mcap.Record) -> None:
         name, data, intact = mcap.attachment_of(record.body)
         if name in self._attachments:
-            self.damage.add("an attachment is doubled", repr(name[:80]))
+            self.damage.add("an attachment is duplicated", repr(name[:80]))
             return
         if len(data) + sum(map(len, self._attachments.values())) > _LARGEST_ATTACHMENTS:
             self.damage.add(f"the attachments are larger than {_LARGEST_ATTACHMENTS // 2**20} MiB")
@@ -173,11 +174,11 @@ class _Reading:
         self._attachments[name] = data
         self._seal.add_attachment(name, data)
 
-    def _take_frames(self, record: mcap.Record) -> None:
+    def _add_frames(self, record: mcap.Record) -> None:
         messages = _messages(record, self.damage)
         self._content += sum(len(message.data) for message in messages)
-        if self._content > mcap.LARGEST_CONTENT or self._seal.frames + len(messages) > MOST_FRAMES:
-            self.damage.add("there are more frames than are read")
+        if self._content > mcap.LARGEST_CONTENT or self._seal.frames + len(messages) > MAX_FRAMES:
+            self.damage.add("the recording exceeds the maximum number or size of frames")
             self.is_full = True
             return
         for message in messages:
@@ -187,11 +188,12 @@ class _Reading:
             self._blocks.append((messages[0].sequence, record.offset))
 
     def finish(self, path: Path) -> Recording:
-        """The recording. Raises InputError if this is none of this package and layout."""
+        """Return the recording. Raise InputError if package or format differ."""
         found = self._metadata.get("format")
         if found != FORMAT and (found is not None or not self._seal.frames):
-            what = "not a recording of eidrive" if found is None else f"a recording of layout {found[:20]!r}"
-            raise InputError(Diagnostic(what, "give a recording that this version of eidrive wrote", str(path)))
+            got = "no format" if found is None else f"format {found[:20]!r}"
+            message = f"not a recording of this version of eidrive (got {got}; expected format {FORMAT!r})"
+            raise InputError(Diagnostic(message, "give a recording that this version wrote", str(path)))
         self._check_seal()
         return Recording(
             path,
@@ -206,19 +208,19 @@ class _Reading:
         frames = self._seal.frames
         self._ticks.finish()
         if not self._metadata:
-            self.damage.add("the description of the run is missing")
+            self.damage.add("the metadata of the run are missing")
         if self._stored is None and self._stated not in (None, frames):
-            self.damage.add(f"{frames} of {self._stated} recorded frames are there")
+            self.damage.add(f"{frames} of {self._stated} recorded frames are present")
         if self._stored is None:
-            self.damage.add("the seal at the end is missing: the run did not end, or the file was cut short")
+            self.damage.add("the seal at the end is missing: the run did not end, or the file was truncated")
         elif self._stored.get("frames") != str(frames):
-            self.damage.add(f"{frames} of {self._stored.get('frames', '')[:20]} recorded frames are there")
+            self.damage.add(f"{frames} of {self._stored.get('frames', '')[:20]} recorded frames are present")
         elif self._stored != self._seal.entries():
-            self.damage.add("frames, settings or attachments are not those that were recorded")
+            self.damage.add("frames, settings or attachments differ from the recorded ones")
 
 
 class _Ticks:
-    """Order and gaps of the ticks."""
+    """Check of order and gaps of the ticks."""
 
     def __init__(self, damage: DamageReport) -> None:
         self._damage = damage
@@ -229,21 +231,21 @@ class _Ticks:
     def add(self, tick: int) -> None:
         if self._last is not None and tick <= self._last:
             self._ordered = False
-            self._damage.add("frames are doubled or out of order", f"tick {tick} after {self._last}")
+            self._damage.add("frames are duplicated or out of order", f"tick {tick} after {self._last}")
         elif self._last is not None and tick > self._last + 1 and len(self._gaps) < 1000:
             first, last = self._last + 1, tick - 1
             self._gaps.append(f"{first}" if first == last else f"{first} to {last}")
         self._last = tick
 
     def finish(self) -> None:
-        """Gaps count only where something else is wrong: a recorder may have been given every second frame."""
+        """Report gaps only beside other damage: an undamaged recording may hold every second frame."""
         if self._damage and self._ordered:
             for gap in self._gaps:
                 self._damage.add("ticks are missing", gap)
 
 
 def _messages(record: mcap.Record, damage: DamageReport | None = None) -> list[mcap.Message]:
-    """The frames in a record, those that are larger than any frame left out."""
+    """Return the frames of a record without frames beyond the maximum size."""
     damage = DamageReport() if damage is None else damage
     found = [mcap.message_of(record.body)] if record.opcode == mcap.MESSAGE else mcap.chunk_messages(record, damage)
     kept = [message for message in found if len(message.data) <= LARGEST_FRAME]
@@ -252,10 +254,10 @@ def _messages(record: mcap.Record, damage: DamageReport | None = None) -> list[m
     return kept
 
 
-def _decoded(data: bytes, decode: Callable[[object], Frame]) -> Frame:
-    """A frame. Raises ValueError whatever is wrong with its text."""
+def _decode_frame(data: bytes, decode: Callable[[object], Frame]) -> Frame:
+    """Decode a frame. Raise ValueError for every kind of invalid content."""
     try:
-        frame = decode(load_json(data, _MOST_VALUES))
+        frame = decode(load_json(data, _MAX_VALUES))
         check_frame(frame)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         raise ValueError(f"{type(error).__name__}: {error}"[:200]) from None

@@ -1,4 +1,4 @@
-"""Finding and reading what runs have left: results and recordings."""
+"""Search and reading of the files of earlier runs: results and recordings."""
 
 from __future__ import annotations
 
@@ -13,87 +13,88 @@ from eidrive_scenario.files.bounded import read_regular_file
 from eidrive_scenario.files.bounded_json import load_json
 
 RECORDING, RESULT, IMAGES = "recording.mcap", "result.json", "images"
-"""Names of the files in a run's folder."""
+"""Names of the files in the folder of a run."""
 _LARGEST = 256 * 2**20
 """Maximum size of a result [bytes]."""
-_DEEPEST = 40
-"""Maximum nesting of a result."""
+_MAX_DEPTH = 40
+"""Maximum nesting depth of a result."""
 
 
-def recording_in(place: Path) -> Path:
-    """The recording in a run's folder, or the only one below it; a file as it is.
+def recording_in(location: Path) -> Path:
+    """Return the recording of a run folder, or the only recording below it; a file is returned unchanged.
 
-    Where a run did not end, it is the partial recording. Raises InputError if there is none, or more than one.
+    If a run did not end, its partial recording is returned. Raise InputError if there is no recording, or several.
     """
-    if not os.path.isdir(place):
-        return place
-    for found in ([place / RECORDING, partial_path(place / RECORDING)], _recordings_below(place)):
+    if not os.path.isdir(location):
+        return location
+    for found in ([location / RECORDING, partial_path(location / RECORDING)], _recordings_below(location)):
         paths = [path for path in found if path.is_file()]
-        if len(paths) == 1 or (paths and paths[0].parent == place):
+        if len(paths) == 1 or (paths and paths[0].parent == location):
             return paths[0]
         if paths:
-            listed = ", ".join(str(path.parent.relative_to(place)) for path in paths[:5])
+            listed = ", ".join(str(path.parent.relative_to(location)) for path in paths[:5])
             more = f" and {len(paths) - 5} more" if len(paths) > 5 else ""
-            what = f"{len(paths)} recordings are below this folder"
-            raise InputError(Diagnostic(what, f"give one of its folders: {listed}{more}", str(place)))
-    raise InputError(Diagnostic(f"no {RECORDING} in this folder", "eidrive run … --out DIR records", str(place)))
+            message = f"{len(paths)} recordings are below this folder"
+            raise InputError(Diagnostic(message, f"give one of its folders: {listed}{more}", str(location)))
+    message = f"no {RECORDING} in this folder"
+    raise InputError(Diagnostic(message, "eidrive run … --out DIR writes a recording", str(location)))
 
 
-def _recordings_below(place: Path) -> list[Path]:
-    """The recording of each folder; a partial one where there is no other."""
+def _recordings_below(folder: Path) -> list[Path]:
+    """Return the recording of each folder; a partial one only without a complete one."""
     found: dict[Path, Path] = {}
-    for path in sorted([*place.rglob(partial_path(Path(RECORDING)).name), *place.rglob(RECORDING)]):
+    for path in sorted([*folder.rglob(partial_path(Path(RECORDING)).name), *folder.rglob(RECORDING)]):
         if path.name == RECORDING or path.parent not in found:
             found[path.parent] = path
     return list(found.values())
 
 
 def is_partial(recording: Path) -> bool:
-    """Whether a recording's name says that its run did not end."""
+    """True if the name of the recording marks a run that did not end."""
     return recording.stem.endswith(PARTIAL)
 
 
 def result_of(recording: Path) -> dict[str, Any] | None:
-    """The result of the run whose recording this is, or None if there is none beside it.
+    """Return the result of the run of this recording, or None without a result in its folder.
 
-    Raises InputError for a file that is not a result.
+    Raise InputError for a file that is not a result.
     """
     beside = recording.with_name(RESULT)
     return read_result(beside) if recording.name == RECORDING and beside.exists() else None
 
 
-def read_results(places: Sequence[Path]) -> list[dict[str, Any]]:
-    """The results in these files and folders, and in folders below, in order of their paths; each file once.
+def read_results(locations: Sequence[Path]) -> list[dict[str, Any]]:
+    """Return the results in these files and folders, including subfolders, in path order, each file once.
 
-    Raises InputError for a file that is not a result.
+    Raise InputError for a file that is not a result.
     """
-    return [read_result(path) for path in result_paths(places)]
+    return [read_result(path) for path in result_paths(locations)]
 
 
-def result_paths(places: Sequence[Path]) -> Iterator[Path]:
-    """The files of the results in these files and folders, and in folders below; each file once."""
+def result_paths(locations: Sequence[Path]) -> Iterator[Path]:
+    """Yield the result files in these files and folders, including subfolders, each file once."""
     taken = set()
-    for place in places:
-        for path in sorted(place.rglob(RESULT)) if os.path.isdir(place) else [place]:
+    for location in locations:
+        for path in sorted(location.rglob(RESULT)) if os.path.isdir(location) else [location]:
             real = os.path.realpath(path)
             if real not in taken:
                 taken.add(real)
                 yield path
 
 
-def unfinished_runs(places: Sequence[Path]) -> Iterator[Path]:
-    """The partial recordings in these folders, and in folders below, that have no result beside them."""
-    for place in places:
-        for path in sorted(place.rglob(partial_path(Path(RECORDING)).name)) if os.path.isdir(place) else ():
+def unfinished_runs(locations: Sequence[Path]) -> Iterator[Path]:
+    """Yield the partial recordings without a result in these folders, including subfolders."""
+    for location in locations:
+        for path in sorted(location.rglob(partial_path(Path(RECORDING)).name)) if os.path.isdir(location) else ():
             if not path.with_name(RESULT).exists():
                 yield path
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """A result, as JSON values. Raises InputError if the file is not one."""
+    """Read a result as JSON values. Raise InputError if the file is not a result."""
     try:
         data = read_regular_file(path, _LARGEST)
-        result = load_json(data, max_depth=_DEEPEST)
+        result = load_json(data, max_depth=_MAX_DEPTH)
     except OSError as error:
         raise InputError(Diagnostic(f"cannot read: {error.strerror}", f"give a {RESULT}", str(path))) from error
     except ValueError as error:

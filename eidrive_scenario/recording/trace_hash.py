@@ -1,4 +1,4 @@
-"""A fingerprint of a run: equal where two runs did the same, bit by bit."""
+"""Trace hash: a fingerprint that is equal for runs that are bit for bit equal."""
 
 from __future__ import annotations
 
@@ -17,48 +17,48 @@ from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.environment import Environment
 
-_AROUND: Mapping[str, Codec] = {
+_SCENE_FIELDS: Mapping[str, Codec] = {
     "signals": codec(Mapping[str, str]),
     "appearances": codec(Mapping[str, Appearance]),
     "environment": codec(Environment),
     "monitors": codec(Mapping[str, bool]),
 }
-"""What a frame says beside the actors; it enters where it changes, and so not at all where nobody says anything."""
+"""Frame fields beside the actors, hashed only when they change: a field that is never set has no effect."""
 
-_FATE = struct.Struct("<3Q4d")
-"""How the fate of a message enters: sender, receiver and outcome with reason as words of 64 bits; number, sent, arrives
-[s], infinity where lost, and size [bytes]."""
+_OUTCOME = struct.Struct("<3Q4d")
+"""Layout of a message outcome: sender, receiver, and outcome with reason as 64-bit words; number, time sent and time of
+arrival [s] (infinity for a lost message), and size [bytes]."""
 _TIME = struct.Struct("<d")
 _FLOAT = np.dtype("<f8")
 _FEW = 16
-"""So many fates are faster one by one."""
+"""Maximum number of outcomes that are hashed individually, which is faster than by columns."""
 
 
 class TraceHash:
-    """SHA-256 over every frame's actors, poses, velocities, contacts, state changes and fates of messages.
+    """SHA-256 over actors, poses, velocities, contacts, state changes and message outcomes of all frames.
 
-    What signals, appearances, environment and monitors change to enters too.
+    Changes of signals, appearances, environment and monitors are hashed as well.
 
-    Floats enter with their 64 bits, little-endian, so a difference in the last place shows. The hash is the same in
-    every process with the same scenario, seed, settings and installed versions on one kind of machine. Other processor
-    families and builds of libm, numpy or bullet may round differently; across those compare metrics, not hashes.
+    Floats are hashed with all 64 bits, little-endian, so a difference in the last bit changes the hash. The hash is the
+    same in every process with the same scenario, seed, settings and installed versions on one kind of machine. Other
+    processor families and builds of libm, numpy or bullet may round differently: compare metrics there, not hashes.
     """
 
     def __init__(self) -> None:
         self._sha = hashlib.sha256()
         self._names: tuple[str, ...] = ()
-        self._named = _packed(())
-        """The names of the last view, and how they enter."""
-        self._around: dict[str, object] = dict.fromkeys(_AROUND)
+        self._packed_names = _packed(())
+        """Names of the last view in packed form."""
+        self._scene: dict[str, object] = dict.fromkeys(_SCENE_FIELDS)
         self._words: dict[tuple[str, ...], int] = {}
 
     def observe(self, frame: Frame) -> None:
-        """Take one frame in."""
+        """Add one frame."""
         view = frame.view
         if view.names is not self._names:
-            self._names, self._named = view.names, _packed(view.names)
+            self._names, self._packed_names = view.names, _packed(view.names)
         poses = view.kinematics.astype(_FLOAT, copy=False).tobytes()
-        self._sha.update(b"".join([self._named, _TIME.pack(view.time), poses]))
+        self._sha.update(b"".join([self._packed_names, _TIME.pack(view.time), poses]))
         for contact in view.contacts:
             self._texts("contact", contact.first, contact.second)
             self._floats(*contact.position, contact.impact_speed)
@@ -69,32 +69,33 @@ class TraceHash:
         if frame.links:
             self._sha.update(_LINKS)
             self._floats(len(frame.links))
-            self._fates(frame.links)
-        for name, how in _AROUND.items():
-            before, now = self._around[name], getattr(frame, name)
+            self._add_outcomes(frame.links)
+        for name, field_codec in _SCENE_FIELDS.items():
+            before, now = self._scene[name], getattr(frame, name)
             if now is not before and now != before and (now or before):
-                self._texts(name, json.dumps(how.encode(now), sort_keys=True))
-            self._around[name] = now
+                self._texts(name, json.dumps(field_codec.encode(now), sort_keys=True))
+            self._scene[name] = now
 
     def hexdigest(self) -> str:
-        """64 hexadecimal digits over the frames so far."""
+        """Return 64 hexadecimal digits over the frames so far."""
         return self._sha.hexdigest()
 
     def close(self) -> None:
-        """Nothing to finish; observers have it."""
+        """Do nothing: required by the observer protocol."""
 
-    def _fates(self, links: Sequence[LinkEvent]) -> None:
-        """The same bytes for the same events, be they objects or columns."""
+    def _add_outcomes(self, links: Sequence[LinkEvent]) -> None:
+        """Add outcomes; objects and columns of equal events give equal bytes."""
         if not isinstance(links, LinkEvents) or len(links) <= _FEW:
-            self._sha.update(b"".join([self._fate(link) for link in links]))
+            self._sha.update(self._rows(links))
             return
         for part in links.parts:
-            self._sha.update(
-                self._columns(part) if isinstance(part, OutcomeBlock) else b"".join([self._fate(link) for link in part])
-            )
+            self._sha.update(self._columns(part) if isinstance(part, OutcomeBlock) else self._rows(part))
 
-    def _fate(self, link: LinkEvent) -> bytes:
-        return _FATE.pack(
+    def _rows(self, links: Sequence[LinkEvent]) -> bytes:
+        return b"".join([self._row(link) for link in links])
+
+    def _row(self, link: LinkEvent) -> bytes:
+        return _OUTCOME.pack(
             self._word(link.sender),
             self._word(link.receiver),
             self._word(link.outcome, link.reason),
@@ -105,18 +106,18 @@ class TraceHash:
         )
 
     def _columns(self, block: OutcomeBlock) -> bytes:
-        fates = block.columns()
-        names = np.array([self._word(name) for name in fates.names], dtype="<u8")
-        outcomes = np.array([self._word(*outcome) for outcome in fates.outcomes], dtype="<u8")
+        table = block.columns()
+        names = np.array([self._word(name) for name in table.names], dtype="<u8")
+        outcomes = np.array([self._word(*outcome) for outcome in table.outcomes], dtype="<u8")
         words = np.empty((len(block), 7), dtype="<u8")
         numbers = words.view("<f8")
-        words[:, 0], words[:, 1] = names[fates.senders], names[fates.receivers]
-        words[:, 2] = outcomes[fates.outcome]
-        numbers[:, 3], numbers[:, 4], numbers[:, 5], numbers[:, 6] = fates.number, fates.sent, fates.arrives, fates.size
+        words[:, 0], words[:, 1] = names[table.senders], names[table.receivers]
+        words[:, 2] = outcomes[table.outcome]
+        numbers[:, 3], numbers[:, 4], numbers[:, 5], numbers[:, 6] = table.number, table.sent, table.arrives, table.size
         return words.tobytes()
 
     def _word(self, *texts: str) -> int:
-        """Texts in 64 bits, the same in every process."""
+        """Return a 64-bit digest of texts, equal in every process."""
         word = self._words.get(texts)
         if word is None:
             digest = hashlib.sha256(_packed(texts)).digest()
@@ -131,7 +132,7 @@ class TraceHash:
 
 
 def _packed(texts: Sequence[str]) -> bytes:
-    """Texts with their lengths before them, so that ('ab', 'c') differs from ('a', 'bc')."""
+    """Return length-prefixed texts, so that ('ab', 'c') differs from ('a', 'bc')."""
     encoded = [text.encode() for text in texts]
     return struct.pack(f"<{len(encoded) + 1}I", len(encoded), *map(len, encoded)) + b"".join(encoded)
 

@@ -31,7 +31,7 @@ def render_page(template: str, **values: Any) -> str:
 def write_page(out: Path, template: str, **values: Any) -> Path:
     """Render a template into the file `out`, whose folder is made if it is missing. Returns `out`.
 
-    Raises SettingError if it cannot be written.
+    Raise SettingError if it cannot be written.
     """
     with create(out) as stream:
         stream.write(render_page(template, **values).encode(errors="replace"))

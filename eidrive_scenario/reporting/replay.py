@@ -80,7 +80,7 @@ def make_replay(
     result_file  file of the result, which errors name
     complete     whether the run has ended; a page of one that has not says so
 
-    A damaged recording is shown as far as it can be read, and its page lists the damage. Raises InputError if no frame
+    A damaged recording is shown as far as it can be read, and its page lists the damage. Raise InputError if no frame
     can be read, or the result is not one.
     """
     report = DamageReport()
@@ -125,7 +125,7 @@ def _recorded_roads(recording: Recording, report: DamageReport) -> RoadDrawing:
     try:
         return recorded_roads(recording)
     except (InputError, ArithmeticError, LookupError, TypeError, ValueError, MemoryError, RecursionError) as error:
-        report.add("the roads are not drawn", _described(error))
+        report.add("roads are not drawn", _described(error))
         return RoadDrawing()
 
 

@@ -1,27 +1,49 @@
-"""Our CustomCommandActions, read once before the run, so that a mistake in a late event is told at once."""
+"""Check of this project's CustomCommandActions before a run, so that errors in late events are reported at once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
 from eidrive_scenario.errors import Diagnostic, InputError, ScenarioError, suggestion
-from eidrive_scenario.evaluation.criteria_parser import parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import CriterionDeclaration, parse_criteria
 from eidrive_scenario.library import library_path
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.variation import COMMAND as VARIATION
 from eidrive_scenario.openscenario.variation import drawn_parameters
+from eidrive_scenario.storyboard.state.commands import CustomCommand
 from eidrive_scenario.v2x.profile import load_profile
 
 PREFIX = "eidrive."
 CHANNEL = "eidrive.channel"
 CRITERION = "eidrive.criterion"
 
+CommandKey = tuple[str, str, int | None, int]
+DeclaredCriteria = Mapping[CommandKey, tuple[CriterionDeclaration, ...]]
+"""Parsed criteria by the command that declares them."""
 
-def check_commands(scenario: Scenario) -> None:
-    """Read every command of ours in the scenario. Raises ScenarioError with all that is wrong in them."""
+
+def command_key(command: CustomCommandAction | CustomCommand) -> CommandKey:
+    """Return the identity of a command. The parameters in scope may differ for equal texts on one line."""
+    return command.content, command.source, command.line, id(command.scope)
+
+
+def check_commands(scenario: Scenario) -> DeclaredCriteria:
+    """Parse all commands of this project and return the declared criteria. Raise ScenarioError with all diagnostics."""
     declared = scenario.document.monitor_declarations
     monitors = [one.name for one in declared.monitor_declaration] if declared is not None else []
+    criteria: dict[CommandKey, tuple[CriterionDeclaration, ...]] = {}
+
+    def read_criteria(command: CustomCommandAction) -> None:
+        criteria[command_key(command)] = parse_criteria(
+            command.content,
+            source=command.source,
+            line=command.line,
+            entities=scenario.entities,
+            monitors=monitors,
+            scope=command.scope,
+        )
+
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
         CHANNEL: lambda command: load_profile(
             command.content,
@@ -30,14 +52,7 @@ def check_commands(scenario: Scenario) -> None:
             line=command.line,
             scope=command.scope,
         ),
-        CRITERION: lambda command: parse_criteria(
-            command.content,
-            source=command.source,
-            line=command.line,
-            entities=scenario.entities,
-            monitors=monitors,
-            scope=command.scope,
-        ),
+        CRITERION: read_criteria,
         VARIATION: lambda _: drawn_parameters(scenario, 0),
     }
     diagnostics: list[Diagnostic] = []
@@ -46,8 +61,8 @@ def check_commands(scenario: Scenario) -> None:
             continue
         reader = readers.get(command.type)
         if reader is None:
-            what = f"unknown command type {command.type!r}"
-            diagnostics.append(Diagnostic(what, suggestion(command.type, readers), command.source, command.line))
+            message = f"unknown command type {command.type!r}"
+            diagnostics.append(Diagnostic(message, suggestion(command.type, readers), command.source, command.line))
             continue
         try:
             reader(command)
@@ -55,3 +70,4 @@ def check_commands(scenario: Scenario) -> None:
             diagnostics += error.diagnostics
     if diagnostics:
         raise ScenarioError(list(dict.fromkeys(diagnostics)))
+    return criteria

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step_checks import short_channel_delay
-from eidrive_scenario.evaluation.criteria_parser import EXITS, exit_verdict, parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import EXITS, build_criteria, exit_verdict, parse_criteria
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.simulation.commands import CHANNEL, CRITERION, PREFIX
+from eidrive_scenario.simulation.commands import CHANNEL, CRITERION, PREFIX, DeclaredCriteria, command_key
 from eidrive_scenario.simulation.run import RunSettings
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 
 class CustomCommands:
-    """Executes the commands of one run.
+    """Executor of the commands of one run.
 
-    criteria  of the run; a command adds to them
-    warnings  of the run; a command without effect adds to them
+    declared  criteria that the commands of the scenario declare, parsed before the run
+    criteria  criteria of the run, extended by commands
+    warnings  warnings of the run, extended by commands without effect
     exit      verdict of the command that ends the run; None before it
     """
 
@@ -25,18 +26,20 @@ class CustomCommands:
         scenario: Scenario,
         stations: Stations,
         settings: RunSettings,
+        declared: DeclaredCriteria,
         criteria: list[Criterion],
         warnings: list[str],
     ) -> None:
         self._scenario = scenario
         self._stations = stations
         self._settings = settings
+        self._declared = declared
         self._criteria = criteria
         self._warnings = warnings
         self.exit: Verdict | None = None
 
     def execute(self, command: CustomCommand, time: float) -> None:
-        """Execute a command at `time` [s]. One of another tool is recorded and has no effect, which is a warning."""
+        """Execute a command at `time` [s]. A command of another tool is recorded, has no effect and adds a warning."""
         if command.type == CHANNEL:
             self._select_channel(command)
         elif command.type == CRITERION:
@@ -55,11 +58,13 @@ class CustomCommands:
             self._warnings += map(str, short_channel_delay(profile, dt, command.source, command.line))
 
     def _add_criteria(self, command: CustomCommand) -> None:
-        self._criteria += parse_criteria(
-            command.content,
-            source=command.source,
-            line=command.line,
-            entities=self._scenario.entities,
-            taken=[criterion.name for criterion in self._criteria],
-            scope=command.scope,
-        )
+        declarations = self._declared.get(command_key(command))
+        if declarations is None:  # a command that an action of an extension has created
+            declarations = parse_criteria(
+                command.content,
+                source=command.source,
+                line=command.line,
+                entities=self._scenario.entities,
+                scope=command.scope,
+            )
+        self._criteria += build_criteria(declarations, [criterion.name for criterion in self._criteria])

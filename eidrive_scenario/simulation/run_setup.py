@@ -14,7 +14,7 @@ from eidrive_scenario.evaluation.criterion import Criterion
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source
 from eidrive_scenario.openscenario.loading import load_for_run
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.commands import check_commands
+from eidrive_scenario.simulation.commands import DeclaredCriteria, check_commands
 from eidrive_scenario.simulation.run import RunSettings
 from eidrive_scenario.storyboard.storyboard import Storyboard
 from eidrive_scenario.world import World
@@ -25,9 +25,10 @@ from eidrive_scenario.world.weather import Weather, load_weather
 class RunSetup:
     """All parts of a run before its first tick.
 
-    criteria  those of the StopTrigger; the others are added by commands of the storyboard
-    weather   the option, which overrides the scenario; None where the scenario decides
-    warnings  that are known before the run
+    criteria           criteria of the StopTrigger; commands of the storyboard add the others
+    declared_criteria  criteria that commands of the storyboard declare
+    weather            weather option, which overrides the scenario; None for the weather of the scenario
+    warnings           warnings that are known before the run
     """
 
     scenario: Scenario
@@ -35,6 +36,7 @@ class RunSetup:
     storyboard: Storyboard
     stations: Stations
     criteria: tuple[Criterion, ...]
+    declared_criteria: DeclaredCriteria
     weather: Weather | None
     world: World
     warnings: tuple[str, ...]
@@ -48,9 +50,10 @@ def set_up_run(
     scenario = load_for_run(source, seed, settings.parameters, together)
     roads = RoadNetwork.load(scenario.road_file) if scenario.road_file else None
     criteria: tuple[Criterion, ...] = ()
+    declared: DeclaredCriteria = {}
     weather: Weather | None = None
     with together:
-        check_commands(scenario)
+        declared = check_commands(scenario)
     with together:
         storyboard = Storyboard(scenario, roads, dt=settings.dt, seed=seed, controllers=settings.controllers)
     with together:
@@ -75,7 +78,7 @@ def set_up_run(
     world = World(roads, dt=settings.dt, entities=storyboard.road_objects)
     if weather is not None:
         world.set_weather(weather)
-    return RunSetup(scenario, roads, storyboard, stations, criteria, weather, world, warnings)
+    return RunSetup(scenario, roads, storyboard, stations, criteria, declared, weather, world, warnings)
 
 
 def _warnings(

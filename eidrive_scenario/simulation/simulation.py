@@ -87,7 +87,9 @@ class Simulation:
         self._trace = TraceHash()
         self._false_tracks = FalseTracks()
         self._motionless = MotionlessStations(possible_drivers(self.scenario, self.stations.settings))
-        self._commands = CustomCommands(self.scenario, self.stations, self.settings, self.criteria, self._warnings)
+        self._commands = CustomCommands(
+            self.scenario, self.stations, self.settings, setup.declared_criteria, self.criteria, self._warnings
+        )
         self._user_values = dict(self.settings.user_values)
         self._external_poses: dict[str, ExternalPose] = {}
         self._environment: Environment | None = None

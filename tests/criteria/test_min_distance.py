@@ -71,7 +71,7 @@ def test_boxes_that_overlap_are_at_zero(frame: Any, car: Any) -> None:
 def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=1.0)])
     assert (verdict.passed, verdict.value) == (False, None)
-    assert verdict.reason == "Incoming was never in the world, so nothing was measured"
+    assert verdict.reason == "Incoming was never present, so nothing was measured"
 
 
 def test_two_that_never_meet_in_the_world_fail_it(frame: Any, car: Any) -> None:

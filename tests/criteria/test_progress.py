@@ -79,5 +79,5 @@ def test_max_speed_counts_backwards_too(frame: Any, car: Any) -> None:
 def test_an_actor_that_never_appears_fails_them(frame: Any, car: Any, criterion: Criterion) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Bus": car(0)})], [criterion])
     assert (verdict.passed, verdict.value) == (False, None)
-    assert verdict.reason == "Ego was never in the world, so nothing was measured"
+    assert verdict.reason == "Ego was never present, so nothing was measured"
     assert criterion.metrics() == {}

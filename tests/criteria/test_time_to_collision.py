@@ -56,4 +56,4 @@ def test_no_collision_course_is_no_violation(frame: Any, car: Any) -> None:
 def test_an_actor_that_never_appears_fails_it(frame: Any, car: Any) -> None:
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)})], [criterion(at_least=2)])
     assert not verdict.passed
-    assert verdict.reason.startswith("Lead was never in the world")
+    assert verdict.reason.startswith("Lead was never present")

@@ -1,1 +1,1 @@
-"""Text output: run log, CSV, explanations of triggers."""
+"""Text output of runs: log, CSV table, explanations of triggers."""

@@ -1,4 +1,4 @@
-"""What became of one condition over a run, in words."""
+"""Text description of the history of a condition over a run."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ _CHANGES = {"rising": "became true", "falling": "became false", "risingOrFalling
 
 
 def describe_history(history: ConditionHistory) -> Iterator[str]:
-    """When it was true, how near it came, and what its edge and delay made of that."""
+    """Yield the intervals in which the condition was true, its closest values, and the effect of edge and delay."""
     if not history.asked:
-        yield "never asked"
+        yield "never evaluated"
         return
     yield _truth(history)
     if not history.true.count:
@@ -47,19 +47,19 @@ def _span(span: tuple[float, float], end: float) -> str:
 
 
 def _nearest(history: ConditionHistory) -> Iterator[str]:
-    """For each entity how near its quantity came; a condition without a quantity as it was in the end."""
+    """Yield the closest value of each entity, or the last state of a condition without a quantity."""
     for name, nearest in history.nearest.items():
         measure = nearest.measure
-        of = f"{name}: " if name else ""
+        subject = f"{name}: " if name else ""
         unit = f" {measure.unit}" if measure.unit else ""
-        yield f"{of}came nearest with {_number(measure.value)}{unit}, at {nearest.time:.2f} s"
+        yield f"{subject}closest value {_number(measure.value)}{unit}, at {nearest.time:.2f} s"
     for name in sorted(history.undefined - history.nearest.keys()):
         yield f"{f'{name}: ' if name else ''}undefined or infinite at all evaluations"
     condition = history.monitor.condition
     if isinstance(condition, EntityCondition):
         for name in condition.entities:
             if name not in history.nearest and name not in history.undefined and not history.words:
-                yield f"{name}: not in the world"
+                yield f"{name}: absent"
     if history.words and history.words != condition.describe():
         yield f"at the last evaluation {history.words}"
 
@@ -72,23 +72,21 @@ def _edge(history: ConditionHistory) -> str:
     edge = history.monitor.edge
     if history.edges.count:
         return f"{_CHANGES[edge]} {_moments(history.edges)}"
-    nothing = f"so {edge!r} yields nothing"
+    effect = f"so edge {edge!r} never occurred"
     if edge == "rising":
-        return f"it was true at the first evaluation already and never became true after that, {nothing}"
-    return f"it never {'became false' if edge == 'falling' else 'changed'}, {nothing}"
+        return f"true at the first evaluation, never became true afterwards, {effect}"
+    return f"never {'became false' if edge == 'falling' else 'changed'}, {effect}"
 
 
 def _delay(history: ConditionHistory) -> str:
     delay = history.monitor.delay
     if history.counted.count:
-        return f"counted as true {delay:g} s later, {_moments(history.counted)}"
-    came = history.true if history.monitor.edge == "none" else history.edges
-    if not came.count:
-        return f"its delay of {delay:g} s plays no part"
-    due = came.first[0] + delay
-    return (
-        f"would have counted {delay:g} s later, at {due:.2f} s; its last evaluation was at {history.last_asked:.2f} s"
-    )
+        return f"fulfilled after its delay of {delay:g} s, {_moments(history.counted)}"
+    undelayed = history.true if history.monitor.edge == "none" else history.edges
+    if not undelayed.count:
+        return f"delay of {delay:g} s without effect"
+    due = undelayed.first[0] + delay
+    return f"due after its delay of {delay:g} s, at {due:.2f} s; last evaluated at {history.last_asked:.2f} s"
 
 
 def _moments(times: TrueIntervals) -> str:

@@ -1,4 +1,4 @@
-"""The motion of all actors as a table that any tool reads."""
+"""CSV table with the motion of all actors."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ COLUMNS = ("time", "name", "x", "y", "z", "h", "p", "r", "speed")
 
 
 _FORMULA = tuple("=+-@\t\r\n\uff1d\uff0b\uff0d\uff20")
-"""First characters by which a spreadsheet takes a cell for a formula; the last four are the full-width forms."""
+"""First characters that mark a cell as a formula in a spreadsheet; the last four are the full-width forms."""
 _SEPARATORS = frozenset(',;|"\t\r\n')
-"""Characters that end a cell in some spreadsheet, unless it is quoted."""
+"""Characters that end an unquoted cell in a spreadsheet."""
 
 
-def neutralized(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: one that begins like a formula gets an apostrophe in front.
+def neutralize_formula(text: str) -> str:
+    """Return a text that no spreadsheet evaluates as a formula.
 
-    So does one that begins with an apostrophe, so that `text_of_csv` can remove it without a doubt.
+    A text that begins like a formula or with an apostrophe gets an apostrophe as prefix, so `text_of_csv` is the exact
+    inverse.
     """
     return f"'{text}" if text.startswith((*_FORMULA, "'")) else text
 
 
 def csv_text(text: str) -> str:
-    """A text from a scenario as a field of a CSV file: neutralized, and quoted where that is needed."""
-    safe = neutralized(text)
+    """Return a text from a scenario as a CSV field: without formulas, and quoted if necessary."""
+    safe = neutralize_formula(text)
     if text != text.strip() or not _SEPARATORS.isdisjoint(text):
         doubled = safe.replace('"', '""')
         return f'"{doubled}"'
@@ -35,15 +36,16 @@ def csv_text(text: str) -> str:
 
 
 def text_of_csv(field: str) -> str:
-    """The text of a field as a CSV reader gives it, without the apostrophe that `neutralized` has put in front."""
+    """Return the original text of a field of a CSV reader, without the prefix of `neutralize_formula`."""
     return field.removeprefix("'")
 
 
 class CsvWriter:
-    """Writes `time,name,x,y,z,h,p,r,speed`, one row per actor and tick.
+    """Observer that writes `time,name,x,y,z,h,p,r,speed`, one row per actor and tick.
 
-    Position of OpenSCENARIO's reference point [m], its heading, pitch and roll [rad], speed along the heading [m/s],
-    each with six decimals. Names are written by `csv_text`. Raises SettingError if the file cannot be written.
+    The columns are the position of the OpenSCENARIO reference point [m], its heading, pitch and roll [rad], and the
+    speed along the heading [m/s], with six decimals each. Names are written by `csv_text`. Raise SettingError if the
+    file cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -52,7 +54,7 @@ class CsvWriter:
         self._file.write(",".join(COLUMNS) + "\n")
 
     def observe(self, frame: Frame) -> None:
-        """One row for each actor of this frame."""
+        """Write one row for each actor of this frame."""
         view = frame.view
         columns = (view.position.tolist(), view.yaw.tolist(), view.pitch.tolist(), view.roll.tolist())
         rows = []
@@ -65,5 +67,5 @@ class CsvWriter:
         self._file.write("".join(rows))
 
     def close(self) -> None:
-        """Finish the file."""
+        """Close the file."""
         self._file.close()

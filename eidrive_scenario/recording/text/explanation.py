@@ -1,4 +1,4 @@
-"""Why an element of the storyboard started in a run, or why it did not."""
+"""Explanation of the start, or the missing start, of a storyboard element."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _SHOWN = 5
 
 
 class Explanation:
-    """An observer of one run that explains one element: an event or an act by its name, or with those above it.
+    """Observer of one run that explains one element: an event or an act, given by its name or a suffix of its path.
 
-    "storyboard" asks why the run stopped by the storyboard's stop trigger, or why not.
+    The name "storyboard" selects the stop trigger of the storyboard.
     """
 
     def __init__(self, reference: str) -> None:
@@ -30,7 +30,7 @@ class Explanation:
         self._subjects: list[_Subject] = []
 
     def watch(self, storyboard: Storyboard) -> None:
-        """Look on as its triggers are asked. Raises SettingError if the storyboard has no such element."""
+        """Record the evaluations of the triggers. Raise SettingError if the storyboard has no such element."""
         if self.reference == STORYBOARD:
             self._subjects = [_Subject(storyboard.root, None, storyboard.root.stop_leaf)]
             return
@@ -47,54 +47,54 @@ class Explanation:
             )
 
     def observe(self, frame: Frame) -> None:
-        """Note what became of the element."""
+        """Record the state changes of the element."""
         for subject in self._subjects:
             subject.observe(frame)
 
     def close(self) -> None:
-        """Nothing is left open."""
+        """Do nothing: required by the observer protocol."""
 
     def lines(self) -> list[str]:
-        """What there is to say, line by line."""
+        """Return the explanation line by line."""
         return [line for subject in self._subjects for line in subject.lines()]
 
 
 def _named(element: StoryElement, act: StoryElement | None) -> Iterator[tuple[StoryElement, StoryElement | None]]:
-    """All acts and events, each with the act around it."""
+    """Yield all acts and events, each with its enclosing act."""
     if isinstance(element, ActElement | EventElement):
         yield element, act
-    inside = element if isinstance(element, ActElement) else act
+    inner = element if isinstance(element, ActElement) else act
     for child in element.elements:
-        yield from _named(child, inside)
+        yield from _named(child, inner)
 
 
 class _Subject:
-    """One element, the act around it, and what its trigger saw."""
+    """Explained element with its enclosing act and the history of its trigger."""
 
     def __init__(self, element: StoryElement, act: StoryElement | None, leaf: WaitForTrigger | None) -> None:
         self._element = element
-        self._around = _Subject(act, None, act.start_leaf) if act is not None else None
+        self._act = _Subject(act, None, act.start_leaf) if act is not None else None
         self._history = _history(leaf)
         self._changes: list[StateChange] = []
         self._now = 0.0
         self._ends: list[tuple[float, str]] = []
 
     def observe(self, frame: Frame) -> None:
-        """Note its changes, and those of the act around it."""
+        """Record the changes of the element and of its enclosing act."""
         self._now = frame.view.time
         path = "/".join(self._element.record.path)
         self._changes += [change for change in frame.changes if change.path == path]
-        if self._around is not None:
-            self._around.observe(frame)
+        if self._act is not None:
+            self._act.observe(frame)
 
     def lines(self) -> Iterator[str]:
-        """Its story, then what its trigger saw."""
+        """Yield the state changes, then the history of the trigger."""
         element = self._element
         if isinstance(element, ActElement | EventElement):
             yield from self._starts()
             word = "start"
         else:
-            yield f"the run {self._how_it_ended()}"
+            yield f"the run {self._end()}"
             word = "stop"
         if self._history is None:
             without = f"it has no {word} trigger"
@@ -105,7 +105,7 @@ class _Subject:
         if not self._history.asked:
             return
         groups = self._history.groups
-        yield f"  its {word} trigger" + (", one of whose groups has to hold:" if len(groups) > 1 else ":")
+        yield f"  its {word} trigger" + (", fulfilled by any of its groups:" if len(groups) > 1 else ":")
         for number, group in enumerate(groups, 1):
             yield from _group_lines(group, f"group {number} of {len(groups)}" if len(groups) > 1 else "")
 
@@ -119,31 +119,31 @@ class _Subject:
             yield f"{title} started{often}:"
         else:
             yield f"{title} never started"
-        yield from (f"  at {change.time:.2f} s: {change.why or 'with what is around it'}" for change in starts[:_SHOWN])
+        yield from (f"  at {change.time:.2f} s: {change.why or 'with its parent'}" for change in starts[:_SHOWN])
         if skips:
             yield f"  it was skipped {_times(len(skips))}, first at {skips[0].time:.2f} s: {skips[0].why}"
         if not starts and not any(change.after is ElementState.STANDBY for change in self._changes):
-            yield from self._never_stood_by()
+            yield from self._without_standby()
         elif not starts:
-            yield f"  {self._wait()}"
+            yield f"  {self._standby()}"
 
-    def _never_stood_by(self) -> Iterator[str]:
-        """What is around it never ran: that is what has to be explained."""
-        if self._around is None:
-            yield f"  what is around it never ran (the run ended at {self._now:.2f} s)"
+    def _without_standby(self) -> Iterator[str]:
+        """Yield the explanation of the enclosing act, which never ran."""
+        if self._act is None:
+            yield f"  its parent never ran (the run ended at {self._now:.2f} s)"
             return
-        yield "  it never stood by, as the act around it did not run; so this is about the act:"
-        yield from (f"  {line}" for line in self._around.lines())
+        yield "  it never reached standbyState because its act did not run; explanation of the act:"
+        yield from (f"  {line}" for line in self._act.lines())
 
-    def _wait(self) -> str:
+    def _standby(self) -> str:
         begin = next(change.time for change in self._changes if change.after is ElementState.STANDBY)
         stop = next((change for change in self._changes if change.transition is ElementTransition.STOP), None)
         if stop is None:
-            return f"it stood by from {begin:.2f} s to the end of the run at {self._now:.2f} s"
+            return f"it was in standbyState from {begin:.2f} s to the end of the run at {self._now:.2f} s"
         why = f" ({stop.why})" if stop.why else ""
-        return f"it stood by from {begin:.2f} s to {stop.time:.2f} s, when what is around it was stopped{why}"
+        return f"it was in standbyState from {begin:.2f} s to {stop.time:.2f} s, when its parent was stopped{why}"
 
-    def _how_it_ended(self) -> str:
+    def _end(self) -> str:
         last = self._changes[-1] if self._changes else None
         if last is None or last.after is not ElementState.COMPLETE:
             return f"was not ended by the storyboard; it lasted until {self._now:.2f} s"
@@ -155,11 +155,11 @@ class _Subject:
 
 
 def _history(leaf: WaitForTrigger | None) -> TriggerHistory | None:
-    """What is known of a leaf's trigger; one trigger has one witness, whoever asks."""
+    """Return the history of a trigger. All explanations of a trigger share one history."""
     if leaf is None:
         return None
-    known = leaf.trigger.witness
-    return known if isinstance(known, TriggerHistory) else TriggerHistory(leaf.trigger)
+    existing = leaf.trigger.witness
+    return existing if isinstance(existing, TriggerHistory) else TriggerHistory(leaf.trigger)
 
 
 def _group_lines(group: GroupHistory, title: str) -> Iterator[str]:
@@ -178,14 +178,14 @@ def _group_lines(group: GroupHistory, title: str) -> Iterator[str]:
 
 def _verdict(group: GroupHistory) -> str:
     if group.held.count:
-        return f"it held at {group.held.first[0]:.2f} s"
+        return f"fulfilled at {group.held.first[0]:.2f} s"
     total = len(group.conditions)
     if total == 1:
-        return "it never held"
+        return "never fulfilled"
     if all(condition.counted.count for condition in group.conditions):
-        return f"each condition counted as true at some time, but never all {total} at once"
+        return f"each condition was fulfilled at some time, but never all {total} at once"
     if group.most <= 0:
-        return f"none of the {total} conditions ever counted as true"
+        return f"none of the {total} conditions was ever fulfilled"
     missing = " and ".join(condition.monitor.describe() for condition in group.missing)
     return f"{group.most} of {total} conditions at most, first at {group.most_at:.2f} s, without: {missing}"
 

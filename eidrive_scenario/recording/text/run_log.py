@@ -1,4 +1,4 @@
-"""What happened in a run, for human eyes: one line per change of the storyboard, with what fired and why."""
+"""Human-readable log of a run: one line per storyboard transition, with its reason."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TextIO
 
 from eidrive_scenario.files.atomic import create
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.text.link_text import OFF_THE_AIR, describe_link
+from eidrive_scenario.recording.text.link_text import NOT_TRANSMITTED, describe_link
 from eidrive_scenario.storyboard.state.states import ElementState, ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.elements import EMPTY
 
@@ -20,39 +20,40 @@ _VERBS = {
     ElementTransition.END: "ends",
     ElementTransition.STOP: "is stopped",
     ElementTransition.SKIP: "is skipped",
-    None: "stands by",
+    None: "enters standbyState",
 }
 
 
 class RunLog:
-    """Writes a line for each change: time [s], element, what became of it, and why.
+    """Observer that writes a line for each change: time [s], element, transition and reason.
 
-    Those above an element are named when it is first spoken of, and always where another has the same name. Raises
-    SettingError if the file cannot be written; `-` is standard output.
+    The path of the parent is added at the first mention of an element, and always if another element has the same name.
+    The path `-` is standard output. Raise SettingError if the file cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
         self._own = str(path) != STANDARD_OUTPUT
         self._stream: TextIO = io.TextIOWrapper(create(path), encoding="utf-8") if self._own else sys.stdout
-        self._named: dict[tuple[str, str], str] = {}
-        self._twice: set[tuple[str, str]] = set()
-        self._told: set[tuple[str, str]] = set()
+        self._paths: dict[tuple[str, str], str] = {}
+        self._ambiguous: set[tuple[str, str]] = set()
+        self._mentioned: set[tuple[str, str]] = set()
 
     def observe(self, frame: Frame) -> None:
-        """A line for each change of this frame; who starts at once need not be said to stand by.
+        """Write one line for each change of this frame, and one for each message of a radio channel.
 
-        And one for each message that a radio carried: when it was said, its fate, and what the radio did.
+        The standbyState of an element that starts in the same tick is omitted. The line of a message begins with its
+        sending time.
         """
         started = {change.path for change in frame.changes if change.transition is ElementTransition.START}
         for change in frame.changes:
             if change.transition is not None or change.path not in started:
                 self._stream.write(f"{change.time:9.3f} s  {self._title(change)} {describe_change(change)}\n")
         for link in frame.links:
-            if link.path_loss_db is not None or link.reason in OFF_THE_AIR:
+            if link.path_loss_db is not None or link.reason in NOT_TRANSMITTED:
                 self._stream.write(f"{link.sent:9.3f} s  {describe_link(link)}\n")
 
     def close(self) -> None:
-        """Finish the file."""
+        """Close the file."""
         if self._own:
             self._stream.close()
         else:
@@ -63,18 +64,17 @@ class RunLog:
         if change.path == change.kind:
             return kind
         key = (change.kind, change.element)
-        known = self._named.setdefault(key, change.path)
-        if known != change.path:
-            self._twice.add(key)
-        above = change.path.rpartition("/")[0]
-        told = f" (in {above})" if above and (key not in self._told or key in self._twice) else ""
-        self._told.add(key)
-        return f"{kind} {change.element}{told}"
+        if self._paths.setdefault(key, change.path) != change.path:
+            self._ambiguous.add(key)
+        parent = change.path.rpartition("/")[0]
+        suffix = f" (in {parent})" if parent and (key not in self._mentioned or key in self._ambiguous) else ""
+        self._mentioned.add(key)
+        return f"{kind} {change.element}{suffix}"
 
 
 def describe_change(change: StateChange) -> str:
-    """What became of an element, and why."""
+    """Return the transition of an element and its reason."""
     verb = _VERBS[change.transition]
     if change.transition is ElementTransition.END and change.after is ElementState.STANDBY:
-        verb = "ends, and stands by again"
+        verb = "ends and returns to standbyState"
     return f"{verb}: {change.why}" if change.why and change.why != EMPTY else verb

@@ -46,7 +46,7 @@ class Story:
     """Whether the two bodies touched."""
 
     def moment(self, kind: str) -> Moment:
-        """The moment of that kind. Raises KeyError if there is none."""
+        """The moment of that kind. Raise KeyError if there is none."""
         for moment in self.moments:
             if moment.kind == kind:
                 return moment

@@ -35,7 +35,7 @@ def road_drawing(roads: Iterable[Road], window: Window | None = None) -> RoadDra
     """The lanes and markings of these roads; of those that reach into `window` if one is given.
 
     Lanes on which cars drive come last, so that they cover the shoulders of roads that cross them in a junction.
-    Edges of a large map are computed at wider distances. Raises InputError if it is too large even so.
+    Edges of a large map are computed at wider distances. Raise InputError if it is too large even so.
     """
     roads = list(roads)
     spacing = _spacing(roads)

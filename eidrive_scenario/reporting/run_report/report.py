@@ -35,7 +35,7 @@ def write_report(
     Runs are grouped by the settings in which those of a scenario differ. A run that lies in several folders is listed
     each time, and counts once.
 
-    `out` is the page if it ends in `.html`, else the folder in which `report.html` is written. Raises InputError if
+    `out` is the page if it ends in `.html`, else the folder in which `report.html` is written. Raise InputError if
     there are no results, or one of them is none.
     """
     page = out if out.suffix == ".html" else out / "report.html"

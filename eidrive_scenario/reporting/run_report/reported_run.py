@@ -54,7 +54,7 @@ class ReportedRun(BaseModel):
 def reported(result: Mapping[str, Any], source: str | Path = "") -> ReportedRun:
     """Return a checked run from the object that `--json` prints, read from the file `source` if that is given.
 
-    Raises InputError if it is not one.
+    Raise InputError if it is not one.
     """
     try:
         return ReportedRun.model_validate(result)

@@ -41,7 +41,7 @@ ARROWS = ("#b45309", "#0369a1", "#be185d", "#4d7c0f", "#7c3aed", "#0f766e")
 
 
 def write_storyboard_picture(storyboard: Storyboard, out: Path) -> Path:
-    """Draw a storyboard into an SVG file. Raises SettingError if it cannot be written. Returns `out`."""
+    """Draw a storyboard into an SVG file. Raise SettingError if it cannot be written. Returns `out`."""
     with create(out) as stream:
         stream.write(storyboard_picture(storyboard).encode())
     return out

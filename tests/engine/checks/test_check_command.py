@@ -54,7 +54,7 @@ def test_what_is_not_judged_is_a_warning(eidrive: Eidrive, folder: Callable[...,
     place = folder(runner=("<ConditionGroup>", f"<ConditionGroup>{condition}"))
     result = eidrive("check", place / "runner.xosc")
     assert result.exit_code == 0, result.output
-    assert "criterion 'KeepLaneTest' is not judged" in result.stdout
+    assert "criterion 'KeepLaneTest' is not evaluated" in result.stdout
     assert result.stdout.splitlines()[-1] == "1 file, 0 problems, 1 warning"
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.evaluation import evaluate_criteria
-from eidrive_scenario.evaluation.criteria_parser import parse_criteria
+from eidrive_scenario.evaluation.criteria_parser import build_criteria, parse_criteria
 from eidrive_scenario.experiments.single_run import read_results, run_and_save
 from eidrive_scenario.recording import TraceHash, read_recording
 from eidrive_scenario.simulation import RunSettings
@@ -22,7 +22,7 @@ CRITERIA = """
 def test_a_recording_is_judged_as_the_run_was(tmp_path: Path, other_y: str) -> None:
     result = run_and_save(PASSING_BY, seed=4, settings=RunSettings(parameters={"OtherY": other_y}), out=tmp_path)
     recording = read_recording(tmp_path / "recording.mcap")
-    assert evaluate_criteria(recording.frames(), parse_criteria(CRITERIA)) == result.criteria
+    assert evaluate_criteria(recording.frames(), build_criteria(parse_criteria(CRITERIA))) == result.criteria
     trace = TraceHash()
     for frame in recording.frames():
         trace.observe(frame)

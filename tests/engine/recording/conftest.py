@@ -1,4 +1,4 @@
-"""Frames made by hand, and random ones that use every field."""
+"""Fixtures of recording tests: random frames that use every field."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from eidrive_scenario.world.view import Contact, WorldView
 
 @pytest.fixture
 def make_frame() -> Callable[..., Frame]:
-    """A full frame with random numbers, from `seed`; NaN where a detector knows no velocity."""
+    """Return a factory of full frames with random numbers from `seed`; NaN for an unknown velocity."""
 
     def make(tick: int = 0, seed: int = 0, dt: float = 0.05) -> Frame:
         random = np.random.default_rng([seed, tick])

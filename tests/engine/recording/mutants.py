@@ -1,4 +1,4 @@
-"""Damaged copies of a recording: bytes flipped, cut, inserted, and records removed, swapped, doubled or edited."""
+"""Damaged copies of a recording: bytes flipped, cut, inserted; records removed, swapped, duplicated or edited."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Records = list[tuple[int, bytes]]
 
 
 def split(data: bytes) -> Records:
-    """The records of an intact MCAP file, each with its opcode."""
+    """Return the records of an undamaged MCAP file, each with its opcode."""
     records, offset = [], 8
     while offset < len(data) - 8:
         opcode, length = struct.unpack_from("<BQ", data, offset)
@@ -26,7 +26,7 @@ def split(data: bytes) -> Records:
 
 
 def join(records: Records) -> bytes:
-    """A file of these records; its index and the checksums over all of it are left as they are."""
+    """Return a file of these records, with unchanged index and file checksums."""
     magic = b"\x89MCAP0\r\n"
     return magic + b"".join(struct.pack("<BQ", opcode, len(body)) + body for opcode, body in records) + magic
 
@@ -66,7 +66,7 @@ def _blank(data: bytes, draw: random.Random) -> bytes:
 
 
 def _huge_length(data: bytes, draw: random.Random) -> bytes:
-    """A length field of a record that promises more than there is."""
+    """Replace the length field of a record by an invalid length."""
     offsets, offset = [], 8
     for _, body in split(data):
         offsets.append(offset)
@@ -107,19 +107,19 @@ def _drop_record(data: bytes, draw: random.Random) -> bytes:
 
 
 def unpack(body: bytes) -> bytes:
-    """The messages in a chunk."""
+    """Return the messages of a chunk."""
     return zstandard.ZstdDecompressor().decompress(body[44:])
 
 
 def pack(body: bytes, content: bytes, size: int | None = None) -> bytes:
-    """The chunk with other messages, its own checksum right."""
+    """Return the chunk with other messages and a valid chunk checksum."""
     packed = zstandard.compress(content)
     head = body[:16] + struct.pack("<QI", len(content) if size is None else size, zlib.crc32(content))
     return head + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
 
 
 def messages(content: bytes) -> list[tuple[int, bytes]]:
-    """The records in a chunk."""
+    """Return the records of a chunk."""
     found, offset = [], 0
     while offset < len(content):
         opcode, length = struct.unpack_from("<BQ", content, offset)
@@ -129,7 +129,7 @@ def messages(content: bytes) -> list[tuple[int, bytes]]:
 
 
 def _edit_frame(data: bytes, draw: random.Random) -> bytes:
-    """One frame with another text, all checksums of MCAP within the chunk being right."""
+    """Edit the text of one frame; the MCAP checksum of the chunk stays valid."""
     records = split(data)
     place = draw.choice(_chunks(records))
     body = records[place][1]
@@ -218,7 +218,7 @@ def _edit_metadata(data: bytes, draw: random.Random) -> bytes:
 
 
 def _bomb(data: bytes, draw: random.Random) -> bytes:
-    """A chunk that decompresses to far more than it says, or says."""
+    """Insert a chunk that decompresses to a much larger size, with a valid or an invalid size field."""
     records = split(data)
     place = draw.choice(_chunks(records))
     records[place] = (CHUNK, pack(records[place][1], bytes(1 << 28), draw.choice([None, 100, 2**62])))
@@ -243,12 +243,12 @@ MUTATIONS: dict[str, Callable[[bytes, random.Random], bytes]] = {
     "edit metadata": _edit_metadata,
     "bomb": _bomb,
 }
-"""By name; `edit frame` and `flip` come more often."""
-OFTEN = [*MUTATIONS, "flip", "flip", "edit frame", "edit frame", "edit frame"]
+"""Mutations by name."""
+WEIGHTED = [*MUTATIONS, "flip", "flip", "edit frame", "edit frame", "edit frame"]
 
 
 def mutant(data: bytes, number: int) -> tuple[str, bytes]:
-    """A damaged copy and what was done to it; the same for the same number."""
+    """Return the kind of mutation and a damaged copy, determined by the number."""
     draw = random.Random(number)
-    kind = OFTEN[number % len(OFTEN)] if number % len(OFTEN) else draw.choice(OFTEN)
+    kind = WEIGHTED[number % len(WEIGHTED)] if number % len(WEIGHTED) else draw.choice(WEIGHTED)
     return kind, MUTATIONS[kind](data, draw)

@@ -1,4 +1,4 @@
-"""One row per actor and tick."""
+"""CSV table with one row per actor and tick."""
 
 import csv
 import io
@@ -15,7 +15,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.csv_writer import csv_text, text_of_csv
 
 
-def test_rows(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:
+def test_csv_writer_writes_one_row_per_actor_and_tick(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:
     path = tmp_path / "out" / "run.csv"
     writer = CsvWriter(path)
     frames = [make_frame(0), make_frame(1)]
@@ -34,7 +34,7 @@ def test_rows(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:
         assert math.isclose(float(row[column]), value, abs_tol=5e-7)
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_csv_writer_of_folder_raises_setting_error(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="cannot write: Is a directory"):
         CsvWriter(tmp_path)
 
@@ -62,7 +62,7 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_in_csv_are_no_formulas_and_read_back(name: str) -> None:
+def test_csv_text_is_never_a_formula_and_is_reversible(name: str) -> None:
     line = f"0.0,{csv_text(name)},1.0\n"
     (row,) = csv.reader(io.StringIO(line, newline=""))
     assert len(row) == 3
@@ -70,9 +70,7 @@ def test_names_in_csv_are_no_formulas_and_read_back(name: str) -> None:
     assert text_of_csv(row[1]) == name
 
 
-def test_table_of_an_actor_named_like_a_formula_holds_the_neutralized_name(
-    tmp_path: Path, make_frame: Callable[..., Frame]
-) -> None:
+def test_csv_writer_neutralizes_formulas_in_actor_names(tmp_path: Path, make_frame: Callable[..., Frame]) -> None:
     frame = make_frame(0)
     named = replace(frame, view=replace(frame.view, names=("=1+1", "-x", *frame.view.names[2:])))
     writer = CsvWriter(tmp_path / "run.csv")

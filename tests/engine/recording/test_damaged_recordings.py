@@ -1,6 +1,6 @@
-"""Damaged recordings: reported, bounded in time and memory, and never an internal error.
+"""Damaged recordings: reported within bounds of time and memory, without an internal error.
 
-EIDRIVE_MUTANTS is the number of damaged recordings; a few by default.
+The environment variable EIDRIVE_MUTANTS sets the number of damaged recordings (default 32).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MAX_BYTES = 2 * 2**30
 
 @pytest.fixture(scope="module")
 def originals(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Recordings of several runs of the library, undamaged."""
+    """Record several runs of the library."""
     found = []
     for source, settings in RUNS[: max(2, min(len(RUNS), COUNT // 10))]:
         result = run_and_save(source, settings=RunSettings(**settings), below=tmp_path_factory.mktemp("runs"))
@@ -56,7 +56,7 @@ Content = tuple[dict[str, str], dict[str, bytes], list[Any]]
 
 
 def content(path: Path) -> tuple[Content, tuple[str, ...]]:
-    """All that a recording gives, and its damage."""
+    """Return the whole content of a recording, and its damage."""
     encode = codec(Frame).encode
     recording = read_recording(path)
     frames = [encode(frame) for frame in recording.frames()]
@@ -71,7 +71,7 @@ def original_content(path: Path) -> Content:
 
 
 def view(path: Path) -> tuple[int, str, str]:
-    """Exit code, standard error and the page of `eidrive view`."""
+    """Return exit code, standard error and page of `eidrive view`."""
     page = path.with_suffix(".html")
     page.unlink(missing_ok=True)
     result = CliRunner().invoke(app, ["view", str(path), "--out", str(page)])
@@ -80,7 +80,7 @@ def view(path: Path) -> tuple[int, str, str]:
     return result.exit_code, result.stderr, page.read_text(encoding="utf-8") if page.exists() else ""
 
 
-def test_originals_are_undamaged(originals: list[Path]) -> None:
+def test_read_recording_of_undamaged_file_reports_no_damage(originals: list[Path]) -> None:
     for path in originals:
         chunks = [body for opcode, body in split(path.read_bytes()) if opcode == CHUNK]
         assert len(chunks) >= 2, path
@@ -128,15 +128,15 @@ def test_view_of_damaged_recordings_reports_the_damage(originals: list[Path], tm
     [
         ("cut", "missing"),
         ("append", "the file does not end with its last record"),
-        ("drop chunk", "recorded frames are there"),
+        ("drop chunk", "recorded frames are present"),
         ("swap chunks", "out of order"),
-        ("double chunk", "doubled or out of order"),
-        ("edit frame", "not those that were recorded"),
-        ("edit attachment", "not those that were recorded"),
+        ("double chunk", "duplicated or out of order"),
+        ("edit frame", "differ from the recorded ones"),
+        ("edit attachment", "differ from the recorded ones"),
         ("bomb", "checksum"),
     ],
 )
-def test_damage_is_described(originals: list[Path], tmp_path: Path, kind: str, message: str) -> None:
+def test_damage_of_each_kind_is_described(originals: list[Path], tmp_path: Path, kind: str, message: str) -> None:
     import random
 
     data = MUTATIONS[kind](originals[0].read_bytes(), random.Random(5))
@@ -145,7 +145,7 @@ def test_damage_is_described(originals: list[Path], tmp_path: Path, kind: str, m
     assert message in " / ".join(read_recording(path).damage)
 
 
-def test_missing_ticks_are_named(originals: list[Path], tmp_path: Path) -> None:
+def test_missing_ticks_are_listed(originals: list[Path], tmp_path: Path) -> None:
     records = split(originals[0].read_bytes())
     chunks = [place for place, (opcode, _) in enumerate(records) if opcode == CHUNK]
     ticks = [
@@ -161,7 +161,7 @@ def test_missing_ticks_are_named(originals: list[Path], tmp_path: Path) -> None:
     assert not set(shown) & set(ticks)
 
 
-def test_chunks_behind_a_damaged_length_are_found_again(originals: list[Path], tmp_path: Path) -> None:
+def test_chunks_after_damaged_length_field_are_read(originals: list[Path], tmp_path: Path) -> None:
     data = originals[0].read_bytes()
     records = split(data)
     first = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
@@ -175,7 +175,7 @@ def test_chunks_behind_a_damaged_length_are_found_again(originals: list[Path], t
 
 
 def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
-    """A recording whose frames have another text, and whose seal and checksums are all right."""
+    """Write a recording with changed frames, a valid seal and valid checksums."""
     from mcap.writer import CompressionType, Writer
 
     from eidrive_scenario.recording.seal import Seal
@@ -206,9 +206,7 @@ def _forged(path: Path, source: Path, change: Callable[[bytes], bytes]) -> Path:
 
 
 @pytest.mark.parametrize("number", range(11))
-def test_a_hostile_recording_with_valid_checksums_is_no_internal_error(
-    originals: list[Path], tmp_path: Path, number: int
-) -> None:
+def test_view_of_forged_recording_raises_no_internal_error(originals: list[Path], tmp_path: Path, number: int) -> None:
     import random
 
     from .mutants import EDITS
@@ -220,7 +218,7 @@ def test_a_hostile_recording_with_valid_checksums_is_no_internal_error(
     assert "internal error" not in error
 
 
-def test_names_in_a_recording_do_not_become_markup(originals: list[Path], tmp_path: Path) -> None:
+def test_view_of_recording_escapes_actor_names(originals: list[Path], tmp_path: Path) -> None:
     attack = b"</script><img src=x onerror=alert(1)>"
     path = _forged(tmp_path / "forged.mcap", originals[1], lambda text: text.replace(b'"Ego"', b'"' + attack + b'"'))
     code, _, page = view(path)
@@ -229,15 +227,15 @@ def test_names_in_a_recording_do_not_become_markup(originals: list[Path], tmp_pa
     assert "<img" not in page
 
 
-def test_a_file_that_is_not_regular_is_refused(tmp_path: Path) -> None:
+def test_read_recording_of_irregular_file_raises_input_error(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.mcap")
     for path in (tmp_path / "pipe.mcap", Path("/dev/zero")):
         with pytest.raises(InputError, match="not a regular file"):
             read_recording(path)
 
 
-def test_a_chunk_in_chunks_is_not_followed(originals: list[Path], tmp_path: Path) -> None:
-    """Many chunks of one bomb each: the content as a whole is bounded."""
+def test_view_of_many_decompression_bombs_is_bounded_in_memory(originals: list[Path], tmp_path: Path) -> None:
+    """The recording has 20 chunks of 64 MiB each."""
     records = split(originals[1].read_bytes())
     place = next(place for place, (opcode, _) in enumerate(records) if opcode == CHUNK)
     bomb = (CHUNK, pack(records[place][1], b"\x05" + (2**26).to_bytes(8, "little") + bytes(2**26)))
@@ -249,7 +247,7 @@ def test_a_chunk_in_chunks_is_not_followed(originals: list[Path], tmp_path: Path
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 < MAX_BYTES
 
 
-def test_a_huge_road_in_a_recording_is_not_drawn(originals: list[Path], tmp_path: Path) -> None:
+def test_view_of_huge_road_network_omits_roads(originals: list[Path], tmp_path: Path) -> None:
     road = (
         '<road id="{0}" length="1e6" junction="-1"><planView><geometry s="0" x="0" y="{0}" hdg="0" length="1e6"><line/>'
         '</geometry></planView><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>'
@@ -264,7 +262,7 @@ def test_a_huge_road_in_a_recording_is_not_drawn(originals: list[Path], tmp_path
     code, error, page = view(path)
     assert time.perf_counter() - started < MAX_SECONDS
     assert (code, bool(page)) == (0, True)
-    assert "the roads are not drawn: " in error
+    assert "roads are not drawn: " in error
 
 
 def _with_road(data: bytes, road: bytes) -> bytes:

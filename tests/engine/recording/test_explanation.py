@@ -1,4 +1,4 @@
-"""Why an event did not start: what its conditions were, how near they came, what edges and delays made of them."""
+"""Explanations of missing starts: values of the conditions, and effects of edges and delays."""
 
 from collections.abc import Callable
 
@@ -59,7 +59,8 @@ Explained = Callable[..., list[str]]
 
 @pytest.fixture
 def explained() -> Explained:
-    """The explanation after 2 s in which Ego drives 10 m/s towards Other, who stands 50 m ahead (Spare is nowhere)."""
+    """Return a function that explains an event after 2 s. Ego approaches Other, 50 m ahead, at 10 m/s; Spare is
+    absent."""
 
     def lines(*events: str, about: str = "go", start: str = "", end: str = "", limit: float = 2.0) -> list[str]:
         init = PLACED.format("Ego", 0, SPEED.format(10)) + PLACED.format("Other", 50, "")
@@ -81,61 +82,61 @@ def explained() -> Explained:
     return lines
 
 
-def test_how_near_a_distance_came(explained: Explained) -> None:
+def test_explanation_of_unmet_distance_states_closest_value(explained: Explained) -> None:
     lines = explained(event(when(NEAR)))
     assert lines[0] == "event go (story/act/group/maneuver/go) never started"
     assert "never true in 20 evaluations from 0.00 s to 1.90 s" in lines
-    assert "Ego: came nearest with 31 m, at 1.90 s" in lines
+    assert "Ego: closest value 31 m, at 1.90 s" in lines
 
 
-def test_what_was_there_from_the_first_evaluation_has_no_edge(explained: Explained) -> None:
+def test_explanation_of_initially_true_condition_reports_missing_rising_edge(explained: Explained) -> None:
     far = of("Ego", GAP.format("greaterThan", 20))
     lines = explained(event(when(far, "rising")))
     assert lines[-2:] == [
         "true at all of 20 evaluations from 0.00 s to 1.90 s",
-        "it was true at the first evaluation already and never became true after that, so 'rising' yields nothing",
+        "true at the first evaluation, never became true afterwards, so edge 'rising' never occurred",
     ]
 
 
-def test_what_stays_true_never_falls(explained: Explained) -> None:
+def test_explanation_of_always_true_condition_reports_missing_falling_edge(explained: Explained) -> None:
     far = of("Ego", GAP.format("greaterThan", 20))
-    assert explained(event(when(far, "falling")))[-1] == "it never became false, so 'falling' yields nothing"
+    assert explained(event(when(far, "falling")))[-1] == "never became false, so edge 'falling' never occurred"
 
 
-def test_a_delay_that_outlasts_the_run(explained: Explained) -> None:
+def test_explanation_of_delay_beyond_run_states_due_time(explained: Explained) -> None:
     lines = explained(event(when(time("greaterOrEqual", 1), "rising", 5)))
     assert "true from 1.00 s on" in lines
     assert "became true at 1.00 s" in lines
-    assert lines[-1] == "would have counted 5 s later, at 6.00 s; its last evaluation was at 1.90 s"
+    assert lines[-1] == "due after its delay of 5 s, at 6.00 s; last evaluated at 1.90 s"
 
 
-def test_a_group_whose_conditions_miss_each_other(explained: Explained) -> None:
+def test_explanation_of_group_reports_conditions_never_true_together(explained: Explained) -> None:
     early, late = when(time("lessThan", 0.5)), when(time("greaterThan", 1))
     lines = explained(event(early + late))
-    assert "each condition counted as true at some time, but never all 2 at once" in lines
+    assert "each condition was fulfilled at some time, but never all 2 at once" in lines
     assert "true from 0.00 s to 0.40 s" in lines
     assert "true from 1.10 s on" in lines
 
 
-def test_the_condition_that_was_missing(explained: Explained) -> None:
+def test_explanation_of_group_lists_missing_condition(explained: Explained) -> None:
     lines = explained(event(when(time("greaterThan", 1)) + when(NEAR), when(time("greaterThan", 9))))
     missing = "Ego: straight distance to Other < 20 m"
     assert f"group 1 of 2: 1 of 2 conditions at most, first at 1.10 s, without: {missing}" in lines
-    assert "group 2 of 2: it never held" in lines
-    assert "came nearest with 1.90 s, at 1.90 s" in lines
+    assert "group 2 of 2: never fulfilled" in lines
+    assert "closest value 1.90 s, at 1.90 s" in lines
 
 
-def test_who_is_not_in_the_world(explained: Explained) -> None:
+def test_explanation_of_absent_entity_states_its_absence(explained: Explained) -> None:
     lines = explained(event(when(of("Spare", '<SpeedCondition rule="greaterThan" value="1"/>'))))
     assert lines[-1] == "at the last evaluation Spare is not in the world"
 
 
-def test_a_quantity_that_is_undefined(explained: Explained) -> None:
+def test_explanation_of_undefined_quantity_states_it(explained: Explained) -> None:
     headway = '<TimeHeadwayCondition entityRef="Ego" freespace="false" rule="lessThan" value="1"/>'
     assert explained(event(when(of("Other", headway))))[-1] == "Other: undefined or infinite at all evaluations"
 
 
-def test_an_event_that_started(explained: Explained) -> None:
+def test_explanation_of_started_event_states_time_and_reason(explained: Explained) -> None:
     lines = explained(event(when(time("greaterOrEqual", 1))))
     assert lines[:3] == [
         "event go (story/act/group/maneuver/go) started:",
@@ -144,36 +145,36 @@ def test_an_event_that_started(explained: Explained) -> None:
     ]
 
 
-def test_an_event_without_trigger(explained: Explained) -> None:
+def test_explanation_of_event_without_trigger_states_it(explained: Explained) -> None:
     assert explained(event())[1:] == ["at 0.00 s: it has no start trigger"]
 
 
-def test_an_event_that_was_skipped(explained: Explained) -> None:
+def test_explanation_of_skipped_event_states_reason(explained: Explained) -> None:
     slow = SPEED.format(5).replace('"step"', '"linear"').replace('value="0"', 'value="9"')
     lines = explained(event(name="first", action=slow), event(when(time("greaterThan", 1), "rising"), priority="skip"))
     assert "it was skipped once, first at 1.10 s: first is running" in lines
 
 
-def test_an_act_that_never_ran_is_what_matters(explained: Explained) -> None:
+def test_explanation_of_event_in_unstarted_act_explains_act(explained: Explained) -> None:
     start = f"<StartTrigger><ConditionGroup>{when(time('greaterThan', 7))}</ConditionGroup></StartTrigger>"
     lines = explained(event(when(NEAR)), start=start)
-    assert lines[1] == "it never stood by, as the act around it did not run; so this is about the act:"
+    assert lines[1] == "it never reached standbyState because its act did not run; explanation of the act:"
     assert lines[2] == "act act (story/act) never started"
-    assert lines[-1] == "came nearest with 1.90 s, at 1.90 s"
+    assert lines[-1] == "closest value 1.90 s, at 1.90 s"
 
 
-def test_an_act_that_was_stopped_meanwhile(explained: Explained) -> None:
+def test_explanation_of_event_in_stopped_act_states_stop(explained: Explained) -> None:
     end = f"<StopTrigger><ConditionGroup>{when(time('greaterOrEqual', 1))}</ConditionGroup></StopTrigger>"
     lines = explained(event(when(NEAR)), end=end)
     assert lines[1] == (
-        "it stood by from 0.00 s to 1.00 s, when what is around it was stopped (simulation time 1.00 s ≥ 1 s)"
+        "it was in standbyState from 0.00 s to 1.00 s, when its parent was stopped (simulation time 1.00 s ≥ 1 s)"
     )
 
 
-def test_the_end_of_the_run(explained: Explained) -> None:
+def test_explanation_of_storyboard_states_end_of_run(explained: Explained) -> None:
     assert explained(event(), about="storyboard")[0] == "the run stopped at 2.00 s: simulation time 2.00 s ≥ 2 s"
 
 
-def test_a_name_that_nothing_has(explained: Explained) -> None:
+def test_explanation_of_unknown_name_raises_setting_error(explained: Explained) -> None:
     with pytest.raises(SettingError, match="no event or act is named 'goo'; did you mean 'go'"):
         explained(event(), about="goo")

@@ -1,4 +1,4 @@
-"""What a run leaves behind can be read again, to the last bit."""
+"""Recordings: lossless round trip, and reading of truncated files."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,7 +31,7 @@ def fingerprint(frames: list[Frame]) -> str:
     return trace.hexdigest()
 
 
-def test_frames_come_back_to_the_last_bit(tmp_path: Path, make_frame: MakeFrame) -> None:
+def test_recorded_frames_are_read_bit_for_bit(tmp_path: Path, make_frame: MakeFrame) -> None:
     frames = [make_frame(tick) for tick in range(20)]
     recording = read_recording(record(tmp_path / "run.mcap", frames))
     again = list(recording.frames())
@@ -46,19 +46,19 @@ def test_frames_come_back_to_the_last_bit(tmp_path: Path, make_frame: MakeFrame)
         assert np.array_equal(first.steps["Rsu"].detections.velocity, second.steps["Rsu"].detections.velocity, True)
 
 
-def test_it_says_what_was_run(tmp_path: Path, make_frame: MakeFrame) -> None:
+def test_recording_contains_metadata_and_attachments(tmp_path: Path, make_frame: MakeFrame) -> None:
     recording = read_recording(record(tmp_path / "deep" / "run.mcap", [make_frame(0), make_frame(1)]))
     assert (recording.scenario, recording.seed, recording.frame_count) == ("cut_in", 7, 2)
     assert recording.attachments == {"road.xodr": b"<OpenDRIVE/>"}
     assert recording.metadata["numpy"] == np.__version__
 
 
-def test_equal_runs_give_equal_files(tmp_path: Path, make_frame: MakeFrame) -> None:
+def test_recordings_of_equal_frames_are_equal_files(tmp_path: Path, make_frame: MakeFrame) -> None:
     files = [record(tmp_path / name, [make_frame(tick) for tick in range(5)]) for name in ("a.mcap", "b.mcap")]
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_any_mcap_tool_reads_it(tmp_path: Path, make_frame: MakeFrame) -> None:
+def test_recording_is_readable_by_mcap_library(tmp_path: Path, make_frame: MakeFrame) -> None:
     path = record(tmp_path / "run.mcap", [make_frame(3)])
     with path.open("rb") as stream:
         ((schema, channel, message),) = make_reader(stream).iter_messages()
@@ -70,7 +70,7 @@ def test_any_mcap_tool_reads_it(tmp_path: Path, make_frame: MakeFrame) -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_a_file_that_was_cut_short_gives_what_it_holds(tmp_path: Path, make_frame: MakeFrame, share: float) -> None:
+def test_truncated_recording_returns_its_first_frames(tmp_path: Path, make_frame: MakeFrame, share: float) -> None:
     whole = record(tmp_path / "run.mcap", [make_frame(tick) for tick in range(600)]).read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: int(share * len(whole))])
@@ -81,8 +81,8 @@ def test_a_file_that_was_cut_short_gives_what_it_holds(tmp_path: Path, make_fram
     assert share < 0.9 or ticks
 
 
-def test_recorder_that_is_never_closed_leaves_all_but_the_last_second(tmp_path: Path, make_frame: MakeFrame) -> None:
-    """Frames every 0.05 s up to 2.95 s, as of a process that is killed: those since 2.0 s may be missing."""
+def test_unclosed_recorder_loses_at_most_one_second(tmp_path: Path, make_frame: MakeFrame) -> None:
+    """Frames every 0.05 s up to 2.95 s; after a kill of the process, frames since 2.0 s may be missing."""
     recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
     for tick in range(60):
         recorder.observe(make_frame(tick))
@@ -94,7 +94,7 @@ def test_recorder_that_is_never_closed_leaves_all_but_the_last_second(tmp_path: 
     assert recording.scenario == "cut_in"
 
 
-def test_closed_recorder_refuses_the_frames_of_a_second_run(tmp_path: Path, make_frame: MakeFrame) -> None:
+def test_closed_recorder_raises_error_for_second_run(tmp_path: Path, make_frame: MakeFrame) -> None:
     recorder = Recorder(tmp_path / "run.mcap", metadata={})
     recorder.observe(make_frame(0))
     recorder.close()
@@ -104,7 +104,9 @@ def test_closed_recorder_refuses_the_frames_of_a_second_run(tmp_path: Path, make
 
 
 @pytest.mark.parametrize("step", [0.3, 1.0, 7.0])
-def test_recorder_of_long_steps_loses_less_than_a_second(tmp_path: Path, make_frame: MakeFrame, step: float) -> None:
+def test_unclosed_recorder_of_long_steps_loses_less_than_one_second(
+    tmp_path: Path, make_frame: MakeFrame, step: float
+) -> None:
     recorder = Recorder(tmp_path / "run.mcap", metadata={"scenario": "cut_in", "seed": "7"})
     frames = [
         replace(frame, view=replace(frame.view, time=frame.view.tick * step)) for frame in map(make_frame, range(9))
@@ -119,19 +121,19 @@ def test_recorder_of_long_steps_loses_less_than_a_second(tmp_path: Path, make_fr
 
 
 @pytest.mark.parametrize("content", [b"", b"not a recording", b"\x89MCAP0\r\n"])
-def test_another_file_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_read_recording_of_other_file_raises_input_error(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "wrong.mcap"
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"wrong\.mcap"):
         read_recording(path)
 
 
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+def test_read_recording_of_missing_file_raises_input_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.mcap: cannot read"):
         read_recording(tmp_path / "none.mcap")
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_recorder_of_unwritable_path_raises_setting_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingError, match=r"run\.mcap: cannot write"):
         Recorder(tmp_path / "file" / "run.mcap", metadata={})

@@ -1,4 +1,4 @@
-"""The log of a run: one line per change, with what fired."""
+"""Log of a run: one line per storyboard transition, with its reason."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,7 +24,7 @@ def change(
 
 @pytest.fixture
 def lines(make_frame: Callable[..., Frame], tmp_path: Path) -> Lines:
-    """What the log says of the changes of several frames."""
+    """Return a function that writes the changes of several frames and returns the lines of the log."""
 
     def write(*frames: tuple[StateChange, ...]) -> list[str]:
         log = RunLog(tmp_path / "logs" / "run.log")
@@ -36,20 +36,20 @@ def lines(make_frame: Callable[..., Frame], tmp_path: Path) -> Lines:
     return write
 
 
-def test_each_change_has_its_line_and_its_reason(lines: Lines) -> None:
+def test_run_log_writes_each_change_with_its_reason(lines: Lines) -> None:
     assert lines(
         (change(0.0, "storyboard", "storyboard", START, RUNNING), change(0.0, "act", "s/a", None, STANDBY)),
         (change(6.24, "act", "s/a", START, RUNNING, "simulation time 6.24 s > 6 s"),),
         (change(7.5, "act", "s/a", STOP, COMPLETE, "Ego: speed 12.01 m/s > 12 m/s"),),
     ) == [
         "    0.000 s  storyboard starts",
-        "    0.000 s  act a (in s) stands by",
+        "    0.000 s  act a (in s) enters standbyState",
         "    6.240 s  act a starts: simulation time 6.24 s > 6 s",
         "    7.500 s  act a is stopped: Ego: speed 12.01 m/s > 12 m/s",
     ]
 
 
-def test_who_starts_at_once_is_not_said_to_stand_by(lines: Lines) -> None:
+def test_run_log_of_immediate_start_omits_standby_state(lines: Lines) -> None:
     together = (
         change(0.0, "maneuverGroup", "s/a/g", None, STANDBY),
         change(0.0, "maneuverGroup", "s/a/g", START, RUNNING, EMPTY),
@@ -57,7 +57,7 @@ def test_who_starts_at_once_is_not_said_to_stand_by(lines: Lines) -> None:
     assert lines(together) == ["    0.000 s  maneuver group g (in s/a) starts"]
 
 
-def test_namesakes_are_told_apart(lines: Lines) -> None:
+def test_run_log_of_equal_names_adds_parents(lines: Lines) -> None:
     one, other = (change(1.0, "action", f"s/a/g/m/{event}/x", START, RUNNING) for event in ("one", "other"))
     assert lines((one,), (other,), (one,)) == [
         "    1.000 s  action x (in s/a/g/m/one) starts",
@@ -66,20 +66,22 @@ def test_namesakes_are_told_apart(lines: Lines) -> None:
     ]
 
 
-def test_skips_and_repetitions(lines: Lines) -> None:
+def test_run_log_of_skip_and_repetition_states_them(lines: Lines) -> None:
     assert lines(
         (change(1.0, "event", "e", SKIP, STANDBY, "other is running"),), (change(2.0, "event", "e", END, STANDBY),)
-    ) == ["    1.000 s  event e is skipped: other is running", "    2.000 s  event e ends, and stands by again"]
+    ) == ["    1.000 s  event e is skipped: other is running", "    2.000 s  event e ends and returns to standbyState"]
 
 
-def test_standard_output(make_frame: Callable[..., Frame], capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_log_of_hyphen_writes_to_standard_output(
+    make_frame: Callable[..., Frame], capsys: pytest.CaptureFixture[str]
+) -> None:
     log = RunLog("-")
     log.observe(make_frame())
     log.close()
     assert capsys.readouterr().out == "    0.000 s  event Stop (in Story/Act) starts: t > 3 s\n"
 
 
-def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
+def test_run_log_of_unwritable_path_raises_setting_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(SettingError, match="cannot write"):
         RunLog(tmp_path / "file" / "run.log")

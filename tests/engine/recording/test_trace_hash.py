@@ -1,4 +1,4 @@
-"""Equal runs, equal hashes; every difference shows."""
+"""Trace hash: equal for equal runs, different for every difference."""
 
 import subprocess
 import sys
@@ -28,24 +28,24 @@ def of_view(frame: Frame, **changes: Any) -> Frame:
 
 
 def nudged(array: Any) -> Any:
-    """The same array with its last number one unit in the last place higher."""
+    """Return the array with its last number increased by one unit in the last place."""
     other = array.copy()
     other.flat[-1] = np.nextafter(other.flat[-1], np.inf)
     return other
 
 
-def test_equal_frames_equal_hash(make_frame: MakeFrame) -> None:
+def test_trace_hash_of_equal_frames_is_equal(make_frame: MakeFrame) -> None:
     assert fingerprint(make_frame(1), make_frame(2)) == fingerprint(make_frame(1), make_frame(2))
     assert fingerprint(make_frame(1), make_frame(2)) != fingerprint(make_frame(2), make_frame(1))
 
 
 @pytest.mark.parametrize("field", ["position", "yaw", "pitch", "roll", "velocity"])
-def test_the_last_bit_of_the_motion_counts(make_frame: MakeFrame, field: str) -> None:
+def test_trace_hash_depends_on_last_bit_of_motion(make_frame: MakeFrame, field: str) -> None:
     frame = make_frame(1)
     assert fingerprint(of_view(frame, **{field: nudged(getattr(frame.view, field))})) != fingerprint(frame)
 
 
-def test_names_contacts_changes_and_messages_count(make_frame: MakeFrame) -> None:
+def test_trace_hash_depends_on_names_contacts_changes_and_messages(make_frame: MakeFrame) -> None:
     frame = make_frame(1)
     others = [
         of_view(frame, names=("Ego", "IncomingL", "öschzug")),
@@ -58,13 +58,13 @@ def test_names_contacts_changes_and_messages_count(make_frame: MakeFrame) -> Non
     assert len({fingerprint(frame), *map(fingerprint, others)}) == 1 + len(others)
 
 
-def test_the_words_of_an_explanation_do_not_count(make_frame: MakeFrame) -> None:
+def test_trace_hash_does_not_depend_on_reason_text(make_frame: MakeFrame) -> None:
     frame = make_frame(1)
     reworded = replace(frame, changes=(replace(frame.changes[0], why="time above 3 s"),))
     assert fingerprint(reworded) == fingerprint(frame)
 
 
-def test_it_is_the_same_in_another_process() -> None:
+def test_trace_hash_is_equal_in_other_processes() -> None:
     script = (
         "import numpy as np; from eidrive_scenario.recording import TraceHash\n"
         "from eidrive_scenario.recording.frame import Frame; from eidrive_scenario.world.view import WorldView\n"

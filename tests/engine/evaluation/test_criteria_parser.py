@@ -1,4 +1,4 @@
-"""Criteria as scenario files state them: in our own words, in ScenarioRunner's, in scenario_simulator_v2's."""
+"""Criteria of scenario files in the formats of this project, of ScenarioRunner and of scenario_simulator_v2."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import InvalidResult, SettingError
+from eidrive_scenario.evaluation import criteria_parser
 from eidrive_scenario.evaluation.criteria_parser import (
+    build_criteria,
     exit_verdict,
     parse_criteria,
     stop_trigger_criteria,
@@ -17,6 +19,7 @@ from eidrive_scenario.evaluation.criterion import Criterion, Verdict
 from eidrive_scenario.openscenario import Scenario, load_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.registry import Registry
+from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.state.commands import CustomCommand
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -28,8 +31,12 @@ def diagnostics(text: str, **given: object) -> list[str]:
     return [str(diagnostic) for diagnostic in caught.value.diagnostics]
 
 
-def test_one_criterion() -> None:
-    (criterion,) = parse_criteria("min_distance: {of: Ego, to: Incoming, at_least: 3.5}")
+def parse(text: str, taken: list[str] | None = None, **given: object) -> list[Criterion]:
+    return build_criteria(parse_criteria(text, **given), taken or [])  # type: ignore[arg-type]
+
+
+def test_parse_criteria_of_one_entry_returns_its_settings() -> None:
+    (criterion,) = parse("min_distance: {of: Ego, to: Incoming, at_least: 3.5}")
     assert criterion.name == "min_distance"
     assert criterion.subjects == ("Ego", "Incoming")
     assert criterion.verdict().limit == 3.5
@@ -37,7 +44,7 @@ def test_one_criterion() -> None:
 
 
 class Unnamed(Criterion):
-    """States no name."""
+    """Criterion without a name."""
 
     def observe(self, frame: Frame) -> None:
         pass
@@ -51,27 +58,51 @@ def load_unnamed(self: Registry, name: str, base: type | None = None) -> type[Cr
     return Unnamed
 
 
-def test_criterion_without_a_name_has_that_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_criterion_without_name_has_name_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Registry, "load", load_unnamed)
-    (criterion,) = parse_criteria("collision: {}")
+    (criterion,) = parse("collision: {}")
     assert criterion.verdict().name == "collision"
 
 
-def test_criterion_with_a_number_for_a_name_is_an_invalid_result(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_criterion_with_numeric_name_raises_invalid_result(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Registry, "load", load_unnamed)
     monkeypatch.setattr(Unnamed, "name", 5, raising=False)
     with pytest.raises(InvalidResult, match=r"name is 5 \(expected a text\)"):
         parse_criteria("collision: {}")
 
 
-def test_several_of_one_kind_get_numbers() -> None:
+def test_criteria_of_equal_kind_get_numbered_names() -> None:
     text = "[collision: {of: A}, collision: {of: B}, collision: {of: C, name: third, fatal: true}]"
-    criteria = parse_criteria(text, taken=["collision"])
+    criteria = parse(text, taken=["collision"])
     assert [criterion.name for criterion in criteria] == ["collision_2", "collision_3", "third"]
     assert criteria[2].fatal
 
 
-def test_every_mistake_is_named_where_it_stands() -> None:
+def test_build_criteria_of_one_declaration_twice_returns_independent_criteria() -> None:
+    """A command that is executed twice adds two criteria with their own state."""
+    declarations = parse_criteria("collision: {of: Ego}")
+    first, second = (build_criteria(declarations) for _ in range(2))
+    assert first[0] is not second[0]
+    assert [criterion.name for criterion in (*first, *second)] == ["collision", "collision"]
+
+
+def test_run_parses_each_criterion_command_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library scenario declares its criteria in commands of Init, which are executed before the first tick."""
+    texts: list[str] = []
+    load = criteria_parser.load_yaml
+
+    def counted(text: str, **given: object) -> object:
+        texts.append(text)
+        return load(text, **given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(criteria_parser, "load_yaml", counted)
+    with Simulation("coop/scenario_1") as simulation:
+        simulation.tick()
+        assert {criterion.name for criterion in simulation.criteria} >= {"collision", "min_distance"}
+    assert len(texts) == len(set(texts)) > 0
+
+
+def test_parse_criteria_reports_every_error_with_its_line() -> None:
     text = "\n  colision: {of: Ego}\n  min_distance:\n    of: Ego\n    too: Incoming\n  time_limit: {within: 0}\n"
     assert diagnostics(text) == [
         "a.xosc:11: unknown criterion 'colision'; did you mean 'collision'?",
@@ -81,19 +112,19 @@ def test_every_mistake_is_named_where_it_stands() -> None:
     ]
 
 
-def test_what_is_looked_at_has_to_be_there() -> None:
+def test_criterion_of_unknown_monitor_is_reported() -> None:
     known = {"entities": ["Ego", "Incoming"], "monitors": ["CutIn"]}
     assert diagnostics("monitor: {of: CutInn}", **known) == [
-        "a.xosc:10: monitor looks at 'CutInn', which is no monitor of this scenario; did you mean 'CutIn'?"
+        "a.xosc:10: criterion 'monitor': unknown monitor 'CutInn'; did you mean 'CutIn'?"
     ]
     assert diagnostics("monitor: {of: CutIn}", monitors=[]) == [
-        "a.xosc:10: monitor looks at 'CutIn', which is no monitor of this scenario; it declares none"
+        "a.xosc:10: criterion 'monitor': unknown monitor 'CutIn'; the scenario declares no monitor"
     ]
-    assert len(parse_criteria("monitor: {of: CutIn}", entities=[], monitors=["CutIn"])) == 1
+    assert len(parse("monitor: {of: CutIn}", entities=[], monitors=["CutIn"])) == 1
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("min_distance: {of: Ego, to: Ego}", "of and to are both 'Ego': name two actors"),
         ("collision: {of: Ego, with: Ego}", "'Ego' cannot hit itself: name another actor in 'with'"),
@@ -101,13 +132,13 @@ def test_what_is_looked_at_has_to_be_there() -> None:
         ("max_speed: {of: Ego, at_most: 3, name: ''}", "setting 'name' is ''; string should have at least 1 character"),
     ],
 )
-def test_settings_without_meaning(text: str, told: str) -> None:
+def test_contradictory_settings_are_reported(text: str, message: str) -> None:
     (diagnostic,) = diagnostics(text)
     assert diagnostic.startswith("a.xosc:10: ")
-    assert told in diagnostic
+    assert message in diagnostic
 
 
-def test_in_a_list_each_has_its_own_lines() -> None:
+def test_diagnostics_of_listed_criteria_have_their_own_lines() -> None:
     text = "[collision: {off_: A},\n collision: {of: B},\n collision: {\n of: C, with: 3}]"
     assert [diagnostic.split(": ")[0] for diagnostic in diagnostics(text)] == [
         "a.xosc:10",
@@ -117,42 +148,44 @@ def test_in_a_list_each_has_its_own_lines() -> None:
     ]
 
 
-def test_an_actor_that_the_scenario_does_not_have() -> None:
+def test_criterion_of_unknown_entity_is_reported() -> None:
     assert diagnostics("min_distance: {of: Ego, to: Incomming}", entities=["Ego", "Incoming"]) == [
-        "a.xosc:10: min_distance looks at 'Incomming', which is no entity of this scenario; did you mean 'Incoming'?"
+        "a.xosc:10: criterion 'min_distance': unknown entity 'Incomming'; did you mean 'Incoming'?"
     ]
 
 
 @pytest.mark.parametrize("text", ["", "collision", "3", "[1, 2]", "[]"])
-def test_what_declares_nothing(text: str) -> None:
+def test_text_without_criterion_is_reported(text: str) -> None:
     (diagnostic,) = diagnostics(text)
-    assert "declares no criterion; write min_distance: {of: Ego" in diagnostic
-
-
-def test_settings_that_are_no_mapping() -> None:
-    (diagnostic,) = diagnostics("max_speed: 13")
-    assert (
-        diagnostic
-        == "a.xosc:10: max_speed is given 13; write max_speed: {…} with the settings name, fatal, of, at_most"
+    assert diagnostic.startswith(
+        f"a.xosc:10: eidrive.criterion: no criterion is declared (got {text!r}); write min_dis"
     )
 
 
-def test_broken_yaml() -> None:
+def test_settings_other_than_a_mapping_are_reported() -> None:
+    (diagnostic,) = diagnostics("max_speed: 13")
+    assert diagnostic == (
+        "a.xosc:10: criterion 'max_speed': settings are not a mapping (got 13); "
+        "write max_speed: {…} with the settings name, fatal, of, at_most"
+    )
+
+
+def test_invalid_yaml_is_reported() -> None:
     (diagnostic,) = diagnostics("collision: {of: Ego")
     assert diagnostic.startswith("a.xosc:10: not valid YAML")
 
 
-def test_a_criterion_that_would_get_lost() -> None:
+def test_duplicate_yaml_key_is_reported() -> None:
     (diagnostic,) = diagnostics("collision: {of: A}\ncollision: {of: B}")
     assert diagnostic.startswith("a.xosc:11: not valid YAML: 'collision' stands here twice")
 
 
 @pytest.mark.parametrize(("kind", "passed"), [("exitSuccess", True), ("exitFailure", False)])
-def test_exit_commands(kind: str, passed: bool) -> None:
+def test_exit_verdict_has_outcome_and_text_of_command(kind: str, passed: bool) -> None:
     verdict = exit_verdict(CustomCommand(kind, " gave way ", 7, "a.xosc"), 3.0)
     assert verdict.passed is passed
     assert verdict.fatal
-    assert verdict.reason == f"the scenario called {kind} at 3.00 s: gave way"
+    assert verdict.reason == f"the scenario executed {kind} at 3.00 s: gave way"
 
 
 CONDITION = """
@@ -172,7 +205,7 @@ def written_for_scenario_runner(*conditions: tuple[str, str, str], ego: bool = T
     return load_scenario(text.encode())
 
 
-def test_conditions_of_scenario_runner() -> None:
+def test_stop_trigger_criteria_translates_supported_conditions() -> None:
     scenario = written_for_scenario_runner(
         ("criteria_CollisionTest", "", ""),
         ("criteria_DrivenDistanceTest", "distance_success", "100"),
@@ -184,23 +217,23 @@ def test_conditions_of_scenario_runner() -> None:
     assert [criterion.verdict().limit for criterion in criteria] == [0.0, 100.0, 13.5]
     assert {criterion.subjects for criterion in criteria} == {("Ego",)}
     (warning,) = unsupported_criteria(scenario)
-    assert warning.message == "criterion 'KeepLaneTest' is not judged"
+    assert warning.message == "criterion 'KeepLaneTest' is not evaluated"
     assert warning.line is not None
 
 
-def test_the_other_conditions_of_the_trigger_are_no_criteria() -> None:
+def test_stop_trigger_criteria_ignores_other_conditions() -> None:
     scenario = load_scenario(PASSING_BY)
     assert stop_trigger_criteria(scenario) == []
     assert unsupported_criteria(scenario) == []
 
 
-def test_a_value_that_is_no_number() -> None:
+def test_stop_trigger_criterion_with_non_numeric_value_raises_setting_error() -> None:
     scenario = written_for_scenario_runner(("criteria_DrivenDistanceTest", "distance_success", "far"))
     with pytest.raises(SettingError, match="setting 'at_least' is 'far'"):
         stop_trigger_criteria(scenario)
 
 
-def test_no_ego() -> None:
+def test_stop_trigger_criteria_without_ego_raises_setting_error() -> None:
     scenario = written_for_scenario_runner(("criteria_CollisionTest", "", ""), ego=False)
-    with pytest.raises(SettingError, match="no entity is one; give a Vehicle the property"):
+    with pytest.raises(SettingError, match="the scenario has no ego vehicle; give a Vehicle the property"):
         stop_trigger_criteria(scenario)

@@ -1,4 +1,4 @@
-"""A result as one line, one flat row, and HTML."""
+"""Views of a result: one line, one flat row, and HTML."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ RESULT = RunResult(
 )
 
 
-def test_str_of_result_is_one_short_line() -> None:
+def test_str_of_result_is_one_line() -> None:
     assert str(RESULT) == "street, seed 3, channel custom: failed by collision (stop trigger at 2.50 s, 1 warning)"
     passed = replace(RESULT, passed=True, criteria=(), warnings=(), run=4)
     assert str(passed) == "street, run 4, seed 3, channel custom: passed (stop trigger at 2.50 s)"
     assert "not passed (time limit" in str(replace(passed, passed=False, end_reason="time limit"))
 
 
-def test_row_of_result_is_flat_and_scalar() -> None:
+def test_to_dict_of_result_is_flat_and_scalar() -> None:
     row = RESULT.to_dict()
     assert all(value is None or isinstance(value, str | int | float | bool) for value in row.values())
     expected = {
@@ -70,7 +70,7 @@ def test_row_of_result_is_flat_and_scalar() -> None:
     assert {name: row[name] for name in expected} == expected
 
 
-def test_rows_become_scalar_columns_of_a_table() -> None:
+def test_to_dict_of_results_forms_a_data_frame() -> None:
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame([RESULT.to_dict(), replace(RESULT, seed=4, parameters={"Latency": "0.4"}).to_dict()])
     assert table["parameter.Latency"].tolist() == [0.2, 0.4]
@@ -97,7 +97,7 @@ def test_rows_become_scalar_columns_of_a_table() -> None:
         (" 1", " 1"),
     ],
 )
-def test_parameter_that_reads_as_a_number_is_one(text: str, value: object) -> None:
+def test_typed_of_decimal_text_returns_number(text: str, value: object) -> None:
     assert typed(text) == value
     assert type(typed(text)) is type(value)
 
@@ -115,7 +115,7 @@ class _Tags(HTMLParser):
         self.text += data
 
 
-def test_html_of_result_escapes_every_text() -> None:
+def test_repr_html_of_result_escapes_every_text() -> None:
     parser = _Tags()
     hostile = replace(RESULT, scenario="<img src=x>", channel="<b>", end_reason="<i>")
     parser.feed(hostile._repr_html_())

@@ -1,4 +1,4 @@
-"""The cameras' pictures that a run leaves behind, with boxes drawn in."""
+"""Camera images of a run, with detections drawn in."""
 
 from __future__ import annotations
 
@@ -7,38 +7,39 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from eidrive_scenario.detections import Detections
 from eidrive_scenario.experiments.single_run import IMAGES, run_and_save
 from eidrive_scenario.perception.image_detections import ImageDetections
-from eidrive_scenario.recording.camera_images import drawn, drawn_in_space
+from eidrive_scenario.recording.camera_images import draw_image_detections, draw_projected_boxes
 from eidrive_scenario.sensing.readings import CameraReading
 from eidrive_scenario.simulation import RunSettings
 
 GRAY = np.full((100, 160, 3), 90, dtype=np.uint8)
 
 
-def colored(picture: np.ndarray) -> np.ndarray:
-    """(H, W) the pixels that are gray no more."""
-    found: np.ndarray = (picture != GRAY).any(axis=2)
-    return found
+def changed_pixels(image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return the mask (H, W) of the pixels that are no longer gray."""
+    changed: NDArray[np.bool_] = (image != GRAY).any(axis=2)
+    return changed
 
 
-def test_a_box_is_drawn_along_its_border_with_its_class_above() -> None:
-    picture = drawn(GRAY, ImageDetections(np.array([[40.0, 50.0, 100.0, 80.0]]), np.array([0.5]), ("car",)))
-    changed = colored(picture)
+def test_image_detection_is_drawn_as_border_with_label_above() -> None:
+    box = ImageDetections(np.array([[40.0, 50.0, 100.0, 80.0]]), np.array([0.5]), ("car",))
+    changed = changed_pixels(draw_image_detections(GRAY, box))
     assert changed[50, 40:100].all()
     assert changed[79, 40:100].all()
     assert changed[50:80, 40].all()
     assert changed[50:80, 99].all()
     assert not changed[52:78, 42:98].any()
     assert changed[35:48, 40:100].any()
-    assert not colored(GRAY).any()
+    assert not changed_pixels(GRAY).any()
 
 
-def test_a_box_in_space_is_drawn_where_its_corners_are_seen() -> None:
-    """A camera that looks along x with 80 px of focal length: the near face of a box 2 m wide and high, 8 m ahead, is a
-    square of 20 px around the middle."""
+def test_projected_box_is_drawn_at_its_projected_corners() -> None:
+    """A camera looks along x with a focal length of 80 px. The near face of a box of 2 m width and height at 8 m is a
+    square of 20 px at the image center."""
     pose = np.eye(4)
     pose[:3, :3] = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     lens = np.array([[80.0, 0.0, 80.0], [0.0, 80.0, 50.0], [0.0, 0.0, 1.0]])
@@ -46,22 +47,22 @@ def test_a_box_in_space_is_drawn_where_its_corners_are_seen() -> None:
     reading = CameraReading(GRAY, depth, label, lens, pose)
     ahead, behind = [10.0, 0.0, 0.0, 4.0, 2.0, 2.0, 0.0], [-10.0, 0.0, 0.0, 4.0, 2.0, 2.0, 0.0]
 
-    def seen(*boxes: list[float]) -> np.ndarray:
+    def draw(*boxes: list[float]) -> NDArray[np.bool_]:
         count = len(boxes)
         unknown = np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
-        found = Detections(0.0, np.array(boxes), np.ones(count), ("truck",) * count, *unknown)
-        return colored(drawn_in_space(reading, found))
+        detections = Detections(0.0, np.array(boxes), np.ones(count), ("truck",) * count, *unknown)
+        return changed_pixels(draw_projected_boxes(reading, detections))
 
-    changed = seen(ahead)
+    changed = draw(ahead)
     assert changed[60, 70:91].all()
     assert changed[40:61, 70].all()
     assert changed[40:61, 90].all()
-    assert not seen(behind).any()
-    np.testing.assert_array_equal(seen(ahead, behind), changed)
+    assert not draw(behind).any()
+    np.testing.assert_array_equal(draw(ahead, behind), changed)
 
 
-def test_a_run_leaves_the_pictures_of_all_stations(tmp_path: Path) -> None:
-    """At 10 Hz every second tick; the same run without pictures is the same run."""
+def test_run_writes_camera_images_of_all_stations(tmp_path: Path) -> None:
+    """Cameras of 10 Hz expose in every second tick. The trace hash does not depend on image files."""
     pytest.importorskip("torch", reason="needs the extra 'learned'")
     settings = RunSettings(detector="yolov5", time_limit=0.3)
     kept = run_and_save("coop/scenario_1", settings=settings, out=tmp_path / "kept")
@@ -71,6 +72,6 @@ def test_a_run_leaves_the_pictures_of_all_stations(tmp_path: Path) -> None:
     for station in ("Ego", "RSU"):
         files = sorted((tmp_path / "kept" / IMAGES / station).iterdir())
         assert [file.name for file in files] == [f"camera-{tick:06d}.jpg" for tick in (0, 2, 4, 6)]
-        picture = cv2.imread(str(files[0]))
-        assert picture is not None
-        assert picture.shape == (384, 512, 3)
+        image = cv2.imread(str(files[0]))
+        assert image is not None
+        assert image.shape == (384, 512, 3)
