@@ -25,7 +25,7 @@ from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
 from eidrive_scenario.v2x.channel import Channel
-from eidrive_scenario.v2x.channel_checks import check_delivered, check_interval, check_statistics, check_told
+from eidrive_scenario.v2x.channel_checks import check_delivered, check_events, check_interval, check_statistics
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -205,7 +205,7 @@ class Stations:
             outbox += [(message, receivers) for message in step.outbox]
         told = self._channel.transmit(outbox, now)
         if self._checked_channel is not None:
-            check_told(self._checked_channel, told)
+            check_events(self._checked_channel, told)
         self._books = None
         self.links = told if isinstance(told, LinkEvents) else tuple(told)
 

@@ -1,1 +1,1 @@
-"""What stations say to each other, and the radio between them."""
+"""Messages between stations and models of the channels that carry them."""

@@ -1,4 +1,4 @@
-"""The seam between stations and the radio: a Channel takes messages and gives them out when they arrive."""
+"""Interface between stations and the radio: a `Channel` accepts messages and delivers them on arrival."""
 
 from __future__ import annotations
 
@@ -10,58 +10,58 @@ from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.links import LinkStatistics
 
 OutgoingMessage = tuple[Message, Sequence[str]]
-"""A message and those who listen."""
+"""A message and its receivers."""
 
 
 class Channel(ABC):
-    """Carries messages between stations. Nobody hears a message before it has arrived, nor in the tick it was said.
+    """Abstract base class for channels, which carry messages between stations.
 
-    Loss and delay are drawn once per message and link, from a generator keyed by
-    (seed, purpose, sender, receiver, message number).
+    A message is never delivered before it arrives or in the tick in which it is sent. Loss and delay are drawn once
+    per message and link, from a generator keyed by (seed, purpose, sender, receiver, message number).
 
-    A model is a class with `settings`, the ChannelProfile that it reads, and is built as `Model(profile, seed)`.
-    In each tick `update_environment` comes first, then `deliver` for every station, then one `transmit`.
+    A channel model is a class with an attribute `settings`, its subclass of ChannelProfile. It is constructed as
+    `Model(profile, seed)`. Each tick calls `update_environment`, then `deliver` for every station, then `transmit`.
     """
 
     own_perception: bool = False
-    """True: a station's own detections travel this channel too, as a link from the station to itself."""
+    """True if the channel also carries the own detections of a station, on a link from the station to itself."""
 
-    def update_environment(self, surroundings: RadioEnvironment) -> None:  # noqa: B027 - a channel need not care
-        """Where the antennas are now, and whom to ask for lines of sight between them."""
+    def update_environment(self, surroundings: RadioEnvironment) -> None:  # noqa: B027 - optional
+        """Set the current antenna positions and the query for lines of sight."""
 
     @abstractmethod
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
-        """Put a message on its links; the answer says what is known by now of the fates of messages.
+        """Send a message on its links. Return events of all messages whose outcome is known.
 
-        A link from a station to itself is one like any other: list the sender among the receivers where
-        `own_perception` asks for it.
+        If `own_perception` is True, the sender is also listed among the receivers. Its link is an ordinary one.
         """
 
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
-        """All that the stations say in one tick; it may be nothing.
+        """Send all messages of one tick, possibly none. Return events of all messages whose outcome is known.
 
-        Any sequence of events will do as the answer. A channel that decides about very many messages may keep their
-        fates in arrays instead, and answer with LinkEvents.
+        Channels with many messages may store the outcomes in arrays and return LinkEvents.
         """
         return [event for message, receivers in outbox for event in self.send(message, receivers, now)]
 
     @abstractmethod
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
-        """What has arrived at `receiver` by `now` [s] and was not given out yet, in order of arrival."""
+        """Return messages that have arrived at `receiver` by `now` [s], each once, in order of arrival."""
 
     def min_message_interval(self, station: str) -> float:
-        """How long congestion control lets a station wait from one message to the next [s]: T_GenCam_DCC of ETSI
-        EN 302 637-2. 0 where there is no such control."""
+        """Return the minimum interval between messages that congestion control requires [s]; 0 without it.
+
+        This is T_GenCam_DCC of ETSI EN 302 637-2.
+        """
         return 0.0
 
     @abstractmethod
     def in_flight(self) -> int:
-        """How many messages are on their way."""
+        """Return the number of messages in flight."""
 
     @abstractmethod
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        """The books of every link so far, by (sender, receiver)."""
+        """Return the statistics of every link, by (sender, receiver)."""
 
     @abstractmethod
     def continue_from(self, previous: Channel) -> None:
-        """Carry on for a channel replaced during a run: what it has on its way arrives by its old fate."""
+        """Take the state of a channel that is replaced during a run; its messages in flight keep their outcome."""

@@ -1,4 +1,4 @@
-"""Random numbers for many links at once, each a function of its key and a count alone."""
+"""Counter-based random numbers for many links: each number is a function of its key and a count."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ _64_BITS = (1 << 64) - 1
 
 
 def key(seed: int, *parts: str | int) -> int:
-    """64 bits for this seed, purpose and link, the same in every process."""
+    """Return a 64-bit key of this seed, purpose and link, equal in every process."""
     text = "\x1f".join([str(seed), *(f"{type(part).__name__}:{part}" for part in parts)])
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
 
 
 def uniforms(keys: Keys, counts: Integers | int) -> Array:
-    """Numbers in (0, 1): output number `counts` of the generator SplitMix64 that starts at each key.
+    """Return uniform numbers in (0, 1): output `counts` of a SplitMix64 generator seeded with each key.
 
     G. L. Steele, D. Lea, C. H. Flood: Fast Splittable Pseudorandom Number Generators, OOPSLA 2014.
     """
-    mixed = _mixed(keys + (np.atleast_1d(counts).astype(np.uint64) + np.uint64(1)) * _GOLDEN)
+    mixed = _mix(keys + (np.atleast_1d(counts).astype(np.uint64) + np.uint64(1)) * _GOLDEN)
     numbers: Array = ((mixed >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
     return numbers
 
 
 def uniform(key: int, count: int) -> float:
-    """One of `uniforms`, to the bit, for a handful of links."""
+    """Return one number of `uniforms`, identical to the bit; faster for few links."""
     mixed = (key + (count + 1) * GOLDEN) & _64_BITS
     mixed = ((mixed ^ mixed >> 30) * FIRST) & _64_BITS
     mixed = ((mixed ^ mixed >> 27) * SECOND) & _64_BITS
@@ -41,11 +41,11 @@ def uniform(key: int, count: int) -> float:
 
 
 def combine_keys(first: Keys, second: Keys) -> Keys:
-    """The keys of pairs, broadcast; (a, b) and (b, a) differ."""
-    return _mixed(_mixed(first + _GOLDEN) ^ second)
+    """Return the keys of pairs, broadcast; (a, b) and (b, a) differ."""
+    return _mix(_mix(first + _GOLDEN) ^ second)
 
 
-def _mixed(numbers: Keys) -> Keys:
+def _mix(numbers: Keys) -> Keys:
     numbers = (numbers ^ (numbers >> np.uint64(30))) * _FIRST
     numbers = (numbers ^ (numbers >> np.uint64(27))) * _SECOND
     return numbers ^ (numbers >> np.uint64(31))

@@ -1,4 +1,4 @@
-"""The base of channels that decide about each link by itself; causality and books are done here once."""
+"""Base class of channels that model every link independently, with causal delivery and link statistics."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from eidrive_scenario.v2x.statistics.links import Links, LinkStatistics
 
 
 class LinkChannel(Channel):
-    """A subclass returns in `transmission_outcome` how long a message takes on one link, or why it is lost."""
+    """Base class of channels that model every link independently.
+
+    It enforces causal delivery and maintains link statistics. A subclass implements `transmission_outcome`.
+    """
 
     def __init__(self) -> None:
         self._links = Links()
         self.surroundings = EMPTY_RADIO_ENVIRONMENT
-        """Where the antennas are."""
+        """Current antenna positions."""
 
         self._remaining: list[LinkEvent] = []
 
     @abstractmethod
     def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
-        """The delay on this link, at least 0 [s]; or the reason for which the message is lost."""
+        """Return the delay of a message on one link [s], at least 0, or the reason for its loss."""
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         self.surroundings = surroundings
@@ -31,12 +34,12 @@ class LinkChannel(Channel):
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         events = []
         for receiver in receivers:
-            fate = self.transmission_outcome(message, receiver, now)
+            outcome = self.transmission_outcome(message, receiver, now)
             distance = self.surroundings.distance(message.sender, receiver)
-            if isinstance(fate, str):
-                events.append(self._links.record_loss(message, receiver, now, fate, distance))
+            if isinstance(outcome, str):
+                events.append(self._links.record_loss(message, receiver, now, outcome, distance))
             else:
-                events.append(self._links.enqueue_delivery(message, receiver, now, fate, distance))
+                events.append(self._links.enqueue_delivery(message, receiver, now, outcome, distance))
         return tuple(events)
 
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
@@ -52,19 +55,21 @@ class LinkChannel(Channel):
         return self._links.statistics(now, self.channel_busy_ratio)
 
     def channel_busy_ratio(self, station: str) -> float | None:
-        """Share of the time in which this station found the channel busy; None where there is no such thing."""
+        """Return the channel busy ratio that this station measures; None if the model has none."""
         return None
 
     def continue_from(self, previous: Channel) -> None:
-        """Share the links of the previous channel. Raises TypeError if that is no LinkChannel."""
+        """Take the links of the previous channel. Raise TypeError if it is not a LinkChannel."""
         if not isinstance(previous, LinkChannel):
-            raise TypeError(f"{type(self).__name__} cannot carry on for a {type(previous).__name__}")
+            raise TypeError(
+                f"{type(self).__name__} cannot replace a {type(previous).__name__} (expected a LinkChannel)"
+            )
         previous.finalize()
         self._links = previous._links
         self._remaining = list(previous.drain_events())
 
     def finalize(self) -> None:
-        """Decide at once whatever is undecided: another channel takes over."""
+        """Determine all pending outcomes before another channel replaces this one."""
 
     def drain_events(self) -> Sequence[LinkEvent]:
         """Return events of all messages whose outcome has become known since the last call."""

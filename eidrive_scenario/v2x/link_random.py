@@ -1,4 +1,4 @@
-"""Uniform numbers in (0, 1) that depend on seed, purpose, link and message number alone."""
+"""Uniform numbers in (0, 1) that depend only on seed, purpose, link and message number."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from eidrive_scenario.randomness import generator
 
 BLOCK = 128
-"""Numbers made at once: a keyed generator costs some 20 µs, however many are drawn from it."""
+"""Numbers per block: creating a keyed generator costs about 20 µs, independent of the block size."""
 
 
 class LinkRandom:
-    """The draw of message `number` on a link is the same whoever else talks, and whenever it is asked for."""
+    """Random numbers of links, independent of other links and of the order of calls."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
         self._blocks: dict[tuple[str, str, str], tuple[int, array[float]]] = {}
 
     def uniform(self, purpose: str, sender: str, receiver: str, number: int) -> float:
-        """One number in (0, 1) for this purpose, link and message."""
+        """Return the number in (0, 1) of this purpose, link and message."""
         block, place = divmod(number, BLOCK)
         link = (purpose, sender, receiver)
         held = self._blocks.get(link)

@@ -1,4 +1,4 @@
-"""Channel profiles: what a person writes about the radio, and the channel made of it."""
+"""Channel profiles: settings of a channel model, and the channel built from them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from eidrive_scenario.settings import Settings, key_lines, load_yaml, load_yaml_
 from eidrive_scenario.v2x.channel import Channel
 
 NO_COOPERATION = "none"
-"""The profile without any channel: stations hear nobody, and see with their own sensors undisturbed."""
+"""Name of the profile without a channel: stations receive no messages, and their own perception is unaffected."""
 
 SUFFIXES = (".yaml", ".yml")
 
 
 class ChannelProfile(Settings):
-    """What every channel model has in common; each model adds its own settings in a class of its own.
+    """Settings common to all channel models. Each model adds its settings in a subclass.
 
     model           name of the channel model (entry point `eidrive_scenario.channels`)
-    own_perception  true: a station's own detections travel the channel too, as a link from the station to itself, and
-                    are delayed and lost like those of others; then not even they are heard in the tick they were said
+    own_perception  true: the channel also carries the own detections of a station, on a link from the station to
+                    itself; they are delayed and lost like messages, and never delivered in the tick of generation
     """
 
     model: str = "composed"
@@ -42,13 +42,15 @@ def load_profile(
     line: int | None = None,
     scope: Scope | None = None,
 ) -> ChannelProfile | None:
-    """A checked profile: by name, by path, from YAML text, or from a mapping. None stands for no cooperation.
+    """Return a validated profile, by name, by path, from YAML text or from a mapping; None for no cooperation.
 
-    A text that is a mapping in YAML (`{delay: {kind: constant, seconds: 0.3}}`) is read as such; any other is the name
-    of a `.yaml` file in one of `folders` (first match), or a path: relative to the folder of the file `origin`, to the
-    working directory or to `folders` (first match). `origin` and `line` say where the source itself was written;
-    `scope` holds the parameters to which settings refer as `$name` or `${expression}`, or the text itself, which then
-    is a name or a path. Raises SettingError with file, line and key.
+    source  YAML mapping as text (`{delay: {kind: constant, seconds: 0.3}}`), name of a `.yaml` file in one of
+            `folders`, or path relative to the folder of `origin`, to the working directory or to `folders`; the first
+            match applies
+    origin, line  file and line of the source, for messages
+    scope   parameters for references `$name` and `${expression}` in settings; `source` may also be such a reference
+
+    Raise SettingError with file, line and key if the profile is invalid.
     """
     if isinstance(source, Mapping):
         return _parse(source, "custom", origin or "channel", line, {}, scope)
@@ -65,30 +67,31 @@ def load_profile(
             lines = {} if line is None else key_lines(source, line)
             return _parse(_mapping(data, origin or "channel", line), "custom", origin or "channel", line, lines, scope)
         if not text:
-            raise SettingError(Diagnostic("the channel has no name", "write `ideal`, or `none`", origin, line))
+            message = "channel name is empty"
+            raise SettingError(Diagnostic(message, "expected a profile such as `ideal`, or `none`", origin, line))
         source = Path(text)
     path = _find(source, Path(origin).parent, folders)
     if path is None:
         names = {found.stem for folder in folders for found in _profiles(folder)} | {NO_COOPERATION}
         kind = "file" if source.suffix in SUFFIXES else "channel profile"
-        what = f"no {kind} {quoted(str(source))}"
+        message = f"no {kind} {quoted(str(source))}"
         hint = suggestion(source.stem, names)
         if is_regular_file(source):
-            what, hint = f"the file {quoted(str(source))} is no channel profile", "give one that ends in .yaml"
-        raise SettingError(Diagnostic(what, hint, origin, line))
+            message, hint = f"file {quoted(str(source))} is not a channel profile", "expected a file name in .yaml"
+        raise SettingError(Diagnostic(message, hint, origin, line))
     data, lines = load_yaml_file(path)
     return _parse(_mapping(data, str(path), 1), path.stem, str(path), 1, lines, scope, folder=path.parent)
 
 
 def profile_names(folder: Path) -> tuple[str, ...]:
-    """The names of the profiles in a folder, sorted; `none` is always there."""
+    """Return the sorted names of the profiles in a folder, including `none`."""
     return tuple(sorted({NO_COOPERATION, *(path.stem for path in _profiles(folder))}))
 
 
 def build_channel(profile: ChannelProfile | None, seed: int, previous: Channel | None = None) -> Channel | None:
-    """The channel of a profile, None where there is none.
+    """Return the channel of a profile; None without a profile.
 
-    `previous` is the channel that this one replaces during a run: what is on its way there arrives by its old fate.
+    previous  channel that is replaced during a run; its messages in flight keep their outcome
     """
     if profile is None:
         return None
@@ -111,22 +114,21 @@ def _find(source: Path, beside: Path, folders: Sequence[Path]) -> Path | None:
 
 
 def _with_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The settings of a profile with every `file` in it relative to the profile's own folder."""
-    placed = dict(data)
+    """Return the settings of a profile with every `file` resolved relative to the folder of the profile."""
+    resolved = dict(data)
     for key, value in data.items():
         if isinstance(value, Mapping):
-            placed[key] = _with_paths(value, folder)
+            resolved[key] = _with_paths(value, folder)
         elif key == "file" and isinstance(value, str):
-            placed[key] = str(folder / value)
-    return placed
+            resolved[key] = str(folder / value)
+    return resolved
 
 
 def _mapping(data: Any, source: str, line: int | None) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
-        found = f"found {type(data).__name__}" if data is not None else "it is empty"
-        raise SettingError(
-            Diagnostic(f"a channel profile is a mapping, {found}", "write `model: composed`", source, line)
-        )
+        found = type(data).__name__ if data is not None else "an empty file"
+        message = f"channel profile is not a mapping (got {found})"
+        raise SettingError(Diagnostic(message, "expected settings such as `model: composed`", source, line))
     return data
 
 
@@ -150,6 +152,6 @@ def _parse(
         raise SettingError(diagnostic)
     settings = getattr(models.load(model, Channel), "settings", None)
     if not (isinstance(settings, type) and issubclass(settings, ChannelProfile)):
-        raise RegistryError(f"the channel model {model!r} has no `settings`, a class derived from ChannelProfile")
+        raise RegistryError(f"channel model {model!r}: attribute `settings` is not a subclass of ChannelProfile")
     profile = parse_settings(settings, data, source=source, line=line, lines=lines)
     return profile if profile.name else profile.model_copy(update={"name": name})

@@ -1,4 +1,4 @@
-"""Where the antennas are, and what stands between them: all that a channel is told about the world."""
+"""Antenna positions and lines of sight: the data that a channel receives from the world."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from eidrive_scenario.arrays import Array, Integers
 from eidrive_scenario.v2x.messages.message import LineOfSight
 
 LOS, NLOSV, NLOS = range(3)
-"""Codes of the states of a line of sight in arrays."""
+"""Codes of line-of-sight states in arrays."""
 
 STATES: tuple[LineOfSight, ...] = ("los", "nlosv", "nlos")
-"""Their names, by code."""
+"""Names of line-of-sight states, by code."""
 
 
 class LineOfSightStates(NamedTuple):
-    """What M rays from antenna to antenna met.
+    """Result of M rays between antennas.
 
     states    (M,) LOS, NLOSV or NLOS
-    heights   (M,) top of the highest vehicle in between, in the world frame [m]; minus infinity where there is none
-    blockers  by place of the ray: names of the bodies in between, from the first antenna on; open rays are not there
+    heights   (M,) top of the highest blocking vehicle in the world frame [m]; minus infinity without one
+    blockers  names of the blocking bodies in order from the first antenna, by index of the ray; without open rays
     """
 
     states: Integers
@@ -34,31 +34,31 @@ class LineOfSightStates(NamedTuple):
 
 
 LineOfSightQuery = Callable[[Sequence[tuple[str, str]]], LineOfSightStates]
-"""Asks for the lines of sight between pairs of stations, now."""
+"""Query of the current lines of sight between pairs of stations."""
 
 
 @dataclass(frozen=True)
 class RadioEnvironment:
-    """Antennas by the name of their station, in the world frame [m]; `sight` is None where nobody can look."""
+    """Antenna positions by station in the world frame [m]; `sight` is None without a query for lines of sight."""
 
     places: Mapping[str, tuple[float, float, float]]
     sight: LineOfSightQuery | None = None
 
     def distance(self, first: str, second: str) -> float | None:
-        """Between two antennas [m]; None if one of them is nowhere."""
+        """Return the distance between two antennas [m]; None if one is absent."""
         a, b = self.places.get(first), self.places.get(second)
         return None if a is None or b is None else math.dist(a, b)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """In alphabetical order, so that no sum over stations depends on the order in which they joined."""
+        """Names in alphabetical order, which makes sums over stations independent of the order of entry."""
         return tuple(sorted(self.places))
 
     @cached_property
     def positions(self) -> Array:
-        """(N, 3) in the order of `names` [m]."""
+        """Antenna positions (N, 3) in the order of `names` [m]."""
         return np.array([self.places[name] for name in self.names], dtype=float).reshape(-1, 3)
 
 
 EMPTY_RADIO_ENVIRONMENT = RadioEnvironment({})
-"""Before anybody said where the antennas are."""
+"""Environment without antennas, before the first update."""

@@ -349,7 +349,7 @@ WRONG = [
         "{model: radio, background: {kind: cv2x_mode4, density: 0.1}}",
         "the background is cv2x_mode4, the technology 80211p",
     ),
-    ("{model: radio, own_perception: true}", "own_perception does not go with a radio"),
+    ("{model: radio, own_perception: true}", "own_perception has no effect with model radio"),
     ("{model: radio, technology: cv2x_mode4, sidelink: {interval: 0.3}}", "known: 0.02, 0.05, 0.1"),
     ("{model: radio, queue: {discipline: lifo}}", "'queue.discipline' is 'lifo'"),
 ]

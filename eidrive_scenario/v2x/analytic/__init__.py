@@ -1,1 +1,1 @@
-"""How a channel shared by many vehicles fares: the published analytic models of packet delivery."""
+"""Published analytic models of packet delivery on a channel that many vehicles share."""

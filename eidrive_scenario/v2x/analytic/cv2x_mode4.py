@@ -1,4 +1,6 @@
-"""C-V2X Mode 4 (LTE-V2X sidelink, resources chosen by the vehicles) among many vehicles on a straight road.
+"""Analytic model of C-V2X Mode 4 (LTE-V2X sidelink, autonomous resource selection) for many vehicles on a road.
+
+The road is straight.
 
 M. Gonzalez-Martín, M. Sepulcre, R. Molina-Masegosa, J. Gozalvez: Analytical Models of the Performance of C-V2X Mode 4
 Vehicular Communications, IEEE Transactions on Vehicular Technology 68(2), 2019, arXiv:1807.06508. Numbers in brackets
@@ -23,23 +25,23 @@ from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.propagation.gains import winner_b1
 
 FREQUENCY = 5.91
-"""[GHz]"""
+"""Carrier frequency [GHz]."""
 ANTENNA = 1.5
 """Height of all antennas [m]."""
 ENVIRONMENT = 0.0
-"""Height of the environment [m], which the path loss takes off the antennas'."""
+"""Height of the environment, which the path loss subtracts from the antenna heights [m]."""
 SHADOWING = 3.0
-"""Standard deviation [dB]."""
+"""Standard deviation of the shadowing [dB]."""
 SENSING, NOISE = -90.5, -95.0
-"""Threshold of sensing, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
+"""Sensing threshold, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
 BLOCKS = 50
-"""Resource blocks in 10 MHz."""
+"""Number of resource blocks in 10 MHz."""
 NO_INTERFERENCE = -180.0
-"""Power of an interferer that is not there [dBm]."""
+"""Power of an absent interferer [dBm]."""
 REACH, FARTHEST_INTERFERER = 1500, 1000
-"""How far away vehicles count for the load and as interferers [m]."""
+"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
 CANDIDATES = 0.2
-"""Share of the resources that sensing leaves to choose from (3GPP TS 36.213, 14.1.1.6)."""
+"""Minimum share of candidate resources after the exclusion by sensing (3GPP TS 36.213, 14.1.1.6)."""
 
 _TAIL = (20.0, 20.0 + 1e-6)
 CODINGS = {
@@ -48,11 +50,13 @@ CODINGS = {
     2: (12, (-2.0, 0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, *_TAIL),
         (1.0, 0.9, 0.7, 0.3, 0.09, 0.02, 0.002, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4)),
 }  # fmt: skip
-"""Subchannels to (resource blocks of 190 bytes, SINR [dB], block error rate there): 3GPP R1-160284, QPSK with r = 0.7
-or 0.5, 280 km/h."""
+"""By number of subchannels: resource blocks of 190 bytes, SINR [dB], and block error rate at each SINR.
+
+Source: 3GPP R1-160284, QPSK with r = 0.7 or 0.5, 280 km/h.
+"""
 
 MESSAGE = 190
-"""Size for which the block error rates are published [bytes]."""
+"""Message size of the published block error rates [bytes]."""
 
 
 def cv2x_mode4_errors(
@@ -64,7 +68,9 @@ def cv2x_mode4_errors(
     subchannels: int = 4,
     environment_height: float = ENVIRONMENT,
 ) -> ErrorTable:
-    """Causes of loss over `distance` (D,) [m]: half_duplex, sensing, propagation, collision. Packets have 190 bytes.
+    """Return the error probabilities over `distance` (D,) [m]: half_duplex, sensing, propagation, collision.
+
+    Packets have 190 bytes.
 
     density  vehicles per meter;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
     """
@@ -86,25 +92,28 @@ def cv2x_mode4_errors(
     to_sender = np.abs(to_receiver + distance[:, None])
     with_interferer = errors @ interference(received(to_receiver), SHADOWING, noise).T  # (17)
     certain = propagation[:, None] >= 1.0
-    spoils = np.where(
+    destroys = np.where(
         certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
     )  # (18)
 
     resources = subchannels * 1000.0 / rate  # (28)
-    around = received(np.arange(-REACH, REACH + 1.0))
-    sensed = sensed_share(around, SENSING, SHADOWING)  # (11)
+    power_by_distance = received(np.arange(-REACH, REACH + 1.0))
+    sensed = sensed_share(power_by_distance, SENSING, SHADOWING)  # (11)
     in_reach = density * float(sensed.sum())  # (29.1)
     overlap = autocorrelation(sensed)  # (30.2)
 
     def collides(excluded: float, threshold: float) -> Array:
-        """(14), (15), (23) to (27), (30): that some interferer has chosen the same resource and spoils the packet."""
+        """Return the probability of a collision: an interferer on the same resource destroys the packet.
+
+        Equations (14), (15), (23) to (27), (30).
+        """
         apart = excluded**2 / resources
         common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
         candidates = CANDIDATES * resources
         both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
         unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received(to_sender), threshold, SHADOWING)
         chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
-        lost: Array = 1.0 - np.prod(1.0 - chosen * spoils, axis=1)
+        lost: Array = 1.0 - np.prod(1.0 - chosen * destroys, axis=1)
         return lost
 
     excluded = _excluded(in_reach, resources)
@@ -112,7 +121,7 @@ def cv2x_mode4_errors(
     weight = float(np.clip(2.0 * channel_busy_ratio - 0.4, 0.0, 1.0))  # (22)
     collision = weight * collides(excluded, SENSING)
     if weight < 1.0:
-        raised, excluded = _raised(around, density, resources)
+        raised, excluded = _raise_threshold(power_by_distance, density, resources)
         collision = collision + (1.0 - weight) * collides(excluded, raised)  # (21)
     given = {
         "half_duplex": np.full_like(distance, rate / 1000.0),  # (7)
@@ -124,17 +133,17 @@ def cv2x_mode4_errors(
 
 
 def _excluded(in_reach: float, resources: float) -> float:
-    """Resources that sensing excludes, with `in_reach` vehicles in reach (29), (33)."""
+    """Return the number of resources that sensing excludes with `in_reach` vehicles in reach (29), (33)."""
     half = in_reach / 2.0
     shared = np.maximum(1.0 - np.arange(1.0, half + 1e-9) / (resources - half), 0.0)
     return half + float(shared.sum())
 
 
-def _raised(around: Array, density: float, resources: float) -> tuple[float, float]:
-    """Step 3 raises the threshold [dBm] until enough resources are left: it, and how many are excluded then (32)."""
+def _raise_threshold(power: Array, density: float, resources: float) -> tuple[float, float]:
+    """Raise the threshold [dBm] until enough candidates remain (step 3); return it and the excluded resources (32)."""
     threshold = SENSING
     while True:
-        in_reach = 2.0 * density * float(sensed_share(around, threshold, SHADOWING).sum())
+        in_reach = 2.0 * density * float(sensed_share(power, threshold, SHADOWING).sum())
         excluded = _excluded(in_reach, resources)
         if resources - excluded >= CANDIDATES * resources:
             return threshold, excluded

@@ -1,4 +1,4 @@
-"""IEEE 802.11p among many vehicles on a straight road.
+"""Analytic model of IEEE 802.11p for many vehicles on a straight road.
 
 M. Sepulcre, M. Gonzalez-Martín, J. Gozalvez, R. Molina-Masegosa, B. Coll-Perales: Analytical Models of the Performance
 of IEEE 802.11p Vehicle to Vehicle Communications, IEEE Transactions on Vehicular Technology 2021, arXiv:2104.07923.
@@ -23,32 +23,32 @@ from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.propagation.gains import winner_b1
 
 FREQUENCY = 5.89
-"""[GHz]"""
+"""Carrier frequency [GHz]."""
 ANTENNA = 1.5
 """Height of all antennas [m]."""
 ENVIRONMENT = 0.5
-"""Height of the environment [m], which the path loss takes off the antennas'."""
+"""Height of the environment, which the path loss subtracts from the antenna heights [m]."""
 SHADOWING = 3.0
-"""Standard deviation [dB]."""
+"""Standard deviation of the shadowing [dB]."""
 SENSING, NOISE = -85.0, -95.0
-"""Threshold of sensing, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
+"""Sensing threshold, and noise in 10 MHz at a noise figure of 9 dB [dBm]."""
 SLOT, PREAMBLE, HEADERS = 13e-6, 40e-6, 30
-"""aSlotTime and preamble with signal field [s]; headers below the message [bytes]."""
+"""Duration of aSlotTime and of the preamble with signal field [s]; size of the lower-layer headers [bytes]."""
 BANDWIDTH = 10e6
-"""[Hz]"""
+"""Channel bandwidth [Hz]."""
 REACH, FARTHEST_INTERFERER = 1500, 1000
-"""How far away vehicles count for the load and as interferers [m]."""
+"""Maximum distances at which vehicles contribute to the load and interfere [m]."""
 
 FRAME_ERRORS = ((5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0), (1.0, 0.4, 0.015, 0.004, 0.003, 0.002, 0.001))
 """Frame error rate by Eb/N0 [dB]: O. Goubet et al., IEEE Transactions on Vehicular Technology 64(9), 2015, fig. 14."""
 FIT = (-0.2481, 0.913, 0.003844)
-"""From the offered load to the busy ratio (35)."""
+"""Polynomial from the offered load to the channel busy ratio (35)."""
 FULL = -FIT[1] / (2.0 * FIT[0])
-"""From this offered load on, 1.84, the fit falls, and means nothing."""
+"""Maximum offered load of the fit, 1.84: the polynomial decreases above it."""
 
 
 def airtime(size: int, bit_rate: float) -> float:
-    """Duration of a packet [s] of `size` bytes at `bit_rate` [bit/s]."""
+    """Return the duration of a packet of `size` bytes at `bit_rate` [bit/s] in seconds."""
     return PREAMBLE + (size + HEADERS) * 8.0 / bit_rate
 
 
@@ -62,7 +62,7 @@ def ieee80211p_errors(
     bit_rate: float = 6e6,
     environment_height: float = ENVIRONMENT,
 ) -> ErrorTable:
-    """Causes of loss over `distance` (D,) [m]: sensing, busy, propagation, collision.
+    """Return the error probabilities over `distance` (D,) [m]: sensing, busy, propagation, collision.
 
     density  vehicles per meter;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
     """
@@ -89,28 +89,30 @@ def ieee80211p_errors(
     closer = np.abs(to_receiver) < np.abs(distance)[:, None]
     with_interferer = errors @ interference(received(to_receiver), SHADOWING, NOISE).T  # (30)
     certain = propagation[:, None] >= 1.0
-    spoils = np.where(
+    destroys = np.where(
         certain, 0.0, (with_interferer - propagation[:, None]) / np.where(certain, 1.0, 1.0 - propagation[:, None])
     )  # (31)
-    hears = sensed_share(received(to_receiver), SENSING, SHADOWING)
+    at_receiver = sensed_share(received(to_receiver), SENSING, SHADOWING)
     senses = sensed_share(received(to_sender), SENSING, SHADOWING)
     share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
     same_slot = SLOT * share * senses  # (22)
     hidden = duration * share * (1.0 - senses)  # (18)
-    busy = _any(np.where(closer, same_slot * hears, 0.0) + hidden * hears)  # (14), (16), (21)
-    collision = _any(np.where(closer, 0.0, spoils * same_slot) + spoils * hidden * (2.0 - hears))  # (26), (28), (32)
+    busy = _any(np.where(closer, same_slot * at_receiver, 0.0) + hidden * at_receiver)  # (14), (16), (21)
+    collision = _any(
+        np.where(closer, 0.0, destroys * same_slot) + destroys * hidden * (2.0 - at_receiver)
+    )  # (26), (28), (32)
     given = {"sensing": not_sensed, "busy": busy, "propagation": propagation, "collision": collision}
     return ErrorTable(distance, given, channel_busy_ratio)
 
 
 def offered_load(density: float, rate: float, size: int, power: float, bit_rate: float, height: float) -> float:
-    """(34): how much of its time the channel would be busy if no two transmissions overlapped; `height` of antennas."""
-    around = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
-    return density * rate * airtime(size, bit_rate) * float(sensed_share(around, SENSING, SHADOWING).sum())
+    """Return the channel busy ratio without overlap of transmissions (34); `height` is the antenna height [m]."""
+    received = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
+    return density * rate * airtime(size, bit_rate) * float(sensed_share(received, SENSING, SHADOWING).sum())
 
 
 def _interferers(density: float) -> Array:
-    """Their places relative to the receiver [m], one per 1/density on both sides."""
+    """Return the positions of the interferers relative to the receiver [m], spaced by 1/density on both sides."""
     count = round(FARTHEST_INTERFERER * density)
     places = np.arange(-count, count + 1) / density
     others: Array = places[places != 0.0]
@@ -118,6 +120,6 @@ def _interferers(density: float) -> Array:
 
 
 def _any(probability: Array) -> Array:
-    """That at least one of the independent events along the last axis happens."""
+    """Return the probability that at least one of the independent events along the last axis occurs."""
     happens: Array = 1.0 - np.prod(1.0 - np.clip(probability, 0.0, 1.0), axis=-1)
     return happens

@@ -1,7 +1,7 @@
-"""Distributions of received power over a grid of decibels, and the packet errors that they come to.
+"""Distributions of received power on a decibel grid, and the resulting packet error rates.
 
-Both analytic models average a curve of packet errors over shadowed signal and shadowed interference; here each
-average is one correlation and one matrix product.
+Both analytic models average a packet error curve over shadowed signal and shadowed interference. Each average is one
+correlation and one matrix product.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from scipy.special import erf
 from eidrive_scenario.arrays import Array
 
 STEP = 0.1
-"""Width of a class of power [dB]."""
+"""Grid step of the power levels [dB]."""
 LEVELS: Array = np.round(np.arange(-2000, 2001) * STEP, 1)
-"""(L,) powers [dBm]."""
+"""Power levels (L,) [dBm]."""
 RATIOS: Array = np.round(np.arange(-4000, 4001) * STEP, 1)
-"""(2 L - 1,) ratios of two powers on that grid [dB]."""
+"""Ratios (2 L - 1,) of two power levels [dB]."""
 
 
 def sensed_share(power: Array, threshold: float, spread: float) -> Array:
-    """How many packets of this mean power [dBm] lie above the threshold, with shadowing of this spread [dB]."""
+    """Return the share of packets above the threshold, by mean power and spread of the shadowing [dBm, dB]."""
     share: Array = 0.5 * (1.0 + erf((power - threshold) / (spread * math.sqrt(2.0))))
     return share
 
 
 def signal(power: Array, spread: float, threshold: float) -> Array:
-    """(D, L) distribution of the power of packets that are sensed, for mean powers (D,) [dBm]."""
+    """Return the power distribution (D, L) of the sensed packets, for mean powers (D,) [dBm]."""
     density = np.exp(-0.5 * ((LEVELS - power[:, None]) / spread) ** 2)
     density[:, threshold > LEVELS] = 0.0
     return _normalized(density)
 
 
 def noise_alone(noise: float) -> Array:
-    """(1, L) distribution of a constant noise [dBm]."""
+    """Return the distribution (1, L) of a constant noise power [dBm]."""
     density = np.zeros((1, len(LEVELS)))
     density[0, round((noise - LEVELS[0]) / STEP)] = 1.0
     return density
 
 
 def interference(power: Array, spread: float, noise: float) -> Array:
-    """(I, L) distribution of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
+    """Return the distribution (I, L) of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
     total = 10.0 ** (LEVELS[noise < LEVELS] / 10.0)
     alone = total - 10.0 ** (noise / 10.0)
     exponent = -0.5 * ((10.0 * np.log10(alone) - power[:, None]) / spread) ** 2
@@ -53,9 +53,9 @@ def interference(power: Array, spread: float, noise: float) -> Array:
 
 
 def errors_over(packets: Array, curve: Array) -> Array:
-    """(D, L) share of packets in error when noise and interference have each level.
+    """Return the packet error rate (D, L) at each level of noise and interference.
 
-    packets  (D, L) distributions of the signal;  curve  (2 L - 1,) packet errors by RATIOS
+    packets  (D, L) distributions of the signal power;  curve  (2 L - 1,) packet error rate by RATIOS
     """
     middle = len(LEVELS) - 1
     full = fftconvolve(packets, curve[None, ::-1], axes=1)
@@ -64,7 +64,7 @@ def errors_over(packets: Array, curve: Array) -> Array:
 
 
 def autocorrelation(values: Array) -> Array:
-    """Correlation of a sequence with itself at lags 0, 1, 2, …"""
+    """Return the autocorrelation of a sequence at lags 0, 1, 2, …"""
     correlated: Array = fftconvolve(values, values[::-1])[len(values) - 1 :]
     return correlated
 

@@ -1,4 +1,4 @@
-"""The analytic models as settings: a loss of the composed channel, and the background load of a radio."""
+"""Settings of the analytic models: loss of the composed channel, background load of the radio channel."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from eidrive_scenario.v2x.analytic.ieee80211p import ANTENNA, FULL, ieee80211p_e
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 
 FARTHEST, STEP = 1000.0, 10.0
-"""Tables reach this far, in these steps [m]; beyond, nothing of either model gets through."""
+"""Maximum distance and step of the tables [m]; neither model delivers packets beyond."""
 
 Density = Annotated[float, Field(gt=0.0, le=1.0)]
 Power = Annotated[float, Field(ge=-30.0, le=50.0)]
@@ -22,11 +22,11 @@ Power = Annotated[float, Field(ge=-30.0, le=50.0)]
 
 
 class Ieee80211pLoss(Settings):
-    """The losses of IEEE 802.11p among other vehicles, by distance (Sepulcre et al. 2021).
+    """Loss of IEEE 802.11p messages among other vehicles, by distance (Sepulcre et al. 2021).
 
     density    vehicles per meter of road
-    rate, size, power_dbm, data_rate_mbps   what all of them send: packets per second, bytes, dBm, Mbit/s
-    environment_height   taken off the antennas' 1.5 m in the path loss [m]
+    rate, size, power_dbm, data_rate_mbps   traffic of each vehicle: packets per second, bytes, dBm, Mbit/s
+    environment_height   height subtracted from the antenna height of 1.5 m in the path loss [m]
     """
 
     kind: Literal["80211p"]
@@ -38,30 +38,30 @@ class Ieee80211pLoss(Settings):
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.5
 
     @model_validator(mode="after")
-    def _not_too_much(self) -> Ieee80211pLoss:
+    def _check_load(self) -> Ieee80211pLoss:
         height = ANTENNA - self.environment_height
         bit_rate = self.data_rate_mbps * 1e6
         load = offered_load(self.density, self.rate, self.size, self.power_dbm, bit_rate, height)
         if load > FULL:
             raise ValueError(
-                f"vehicles in reach would need {load:.3g} times the time there is; the model holds up to {FULL:.3g}: "
-                "lower density, rate or size"
+                f"density, rate and size: the offered load exceeds the range of the model (got {load:.3g}; "
+                f"expected at most {FULL:.3g})"
             )
         return self
 
     def table(self) -> ErrorTable:
-        """What the model says."""
+        """Return the error probabilities by distance."""
         return _ieee80211p(self)
 
 
 class Cv2xMode4Loss(Settings):
-    """The losses of C-V2X Mode 4 among other vehicles that send 190 bytes, by distance (Gonzalez-Martín et al. 2019).
+    """Loss of C-V2X Mode 4 messages of 190 bytes among other vehicles, by distance (Gonzalez-Martín et al. 2019).
 
     density    vehicles per meter of road
-    rate, power_dbm   what all of them send: packets per second (published for 10 and 20; at most
-                     one in each subframe), dBm
+    rate, power_dbm   traffic of each vehicle: packets per second (published for 10 and 20; at most
+                      one per subframe), dBm
     subchannels   4 (QPSK, r = 0.7) or 2 (r = 0.5)
-    environment_height   taken off the antennas' 1.5 m in the path loss [m]
+    environment_height   height subtracted from the antenna height of 1.5 m in the path loss [m]
     """
 
     kind: Literal["cv2x_mode4"]
@@ -72,17 +72,17 @@ class Cv2xMode4Loss(Settings):
     environment_height: Annotated[float, Field(ge=0.0, lt=1.5)] = 0.0
 
     @model_validator(mode="after")
-    def _not_too_much(self) -> Cv2xMode4Loss:
+    def _check_load(self) -> Cv2xMode4Loss:
         busy = self.table().channel_busy_ratio
         if busy > 1.0 - CANDIDATES:
             raise ValueError(
-                f"vehicles in reach would keep {busy:.3g} of the resources, and the model holds while {CANDIDATES:g} "
-                "are left to choose from: lower density or rate"
+                f"density and rate: the reserved share of the resources exceeds the range of the model "
+                f"(got {busy:.3g}; expected at most {1.0 - CANDIDATES:g})"
             )
         return self
 
     def table(self) -> ErrorTable:
-        """What the model says."""
+        """Return the error probabilities by distance."""
         return _cv2x_mode4(self)
 
 

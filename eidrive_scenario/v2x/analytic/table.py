@@ -1,4 +1,4 @@
-"""What an analytic model says: how often a packet is lost for each cause, by distance."""
+"""Result of an analytic model: error probability of each cause of loss, by distance."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from eidrive_scenario.arrays import Array
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """Causes stand in the order in which they strike: who is lost for one is not lost for a later one.
+    """Error probabilities by distance. Causes are exclusive and ordered: a packet is lost for the first that applies.
 
-    distance  (D,) between the antennas, rising [m]
-    given     cause to (D,) probability of it where no earlier cause struck
-    channel_busy_ratio  channel busy ratio, in [0, 1]
+    distance  (D,) distance between the antennas, ascending [m]
+    given     by cause: conditional probability (D,), given that no earlier cause applies
+    channel_busy_ratio  in [0, 1]
     """
 
     distance: Array
@@ -26,7 +26,7 @@ class ErrorTable:
 
     @cached_property
     def errors(self) -> Mapping[str, Array]:
-        """Cause to (D,) probability that a packet is lost for it."""
+        """Error probability (D,) by cause."""
         left = np.ones_like(self.distance)
         found = {}
         for cause, probability in self.given.items():
@@ -36,14 +36,14 @@ class ErrorTable:
 
     @cached_property
     def delivery_ratio(self) -> Array:
-        """(D,) packet delivery ratio."""
+        """Packet delivery ratio (D,)."""
         ratio: Array = 1.0 - np.sum(list(self.errors.values()), axis=0)
         return ratio
 
     def cause(self, distance: float, draw: float) -> str | None:
-        """Why a packet over this distance [m] is lost, by a number in (0, 1); None if it is not.
+        """Return the cause of loss of a packet over this distance [m]; None if it is delivered.
 
-        Beyond the table its last entry holds.
+        `draw` is a uniform number in (0, 1). The last entry of the table applies beyond its end.
         """
         reached = 0.0
         for cause, probability in self.errors.items():

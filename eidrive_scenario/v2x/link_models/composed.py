@@ -1,4 +1,4 @@
-"""The channel composed of one delay and one loss model, the same on every link."""
+"""Channel composed of one delay model and one loss model for all links."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from eidrive_scenario.v2x.profile import ChannelProfile
 
 
 class ComposedProfile(ChannelProfile):
-    """Delay and loss of every link.
+    """Settings of the composed channel: delay and loss of every link.
 
-    reordering  true: a message may overtake an earlier one of its link, so that delays are those drawn; false: it
-                waits until the earlier ones have arrived
+    reordering  true: a message may overtake an earlier one of its link, and delays are those drawn; false: a message
+                arrives after all earlier ones of its link
     """
 
     model: Literal["composed"] = "composed"
@@ -30,10 +30,11 @@ class ComposedProfile(ChannelProfile):
 
 
 class ComposedChannel(LinkChannel):
-    """A message is lost where its draw lies below the loss probability p, and else delayed by another draw's quantile.
+    """Channel that loses or delays each message by two random numbers.
 
-    Both draws belong to the message and the link, whatever p is: what arrives with a larger p arrives with a smaller
-    one too.
+    A message is lost if the first number is below the loss probability p. Otherwise the second number selects the
+    quantile of the delay. Both are independent of p: a message that arrives with a larger p also arrives with a
+    smaller one.
     """
 
     settings: ClassVar[type[ChannelProfile]] = ComposedProfile
@@ -67,7 +68,7 @@ class ComposedChannel(LinkChannel):
 
 
 def delay_of(delay: Delay, draws: LinkRandom, message: Message, receiver: str) -> float:
-    """How long this message takes on this link [s]."""
+    """Return the delay of this message on this link [s]."""
     if isinstance(delay, TraceDelay) and delay.replay:
         return delay.at(message.number)
     u = draws.uniform("delay", message.sender, receiver, message.number) if delay.random else 0.5

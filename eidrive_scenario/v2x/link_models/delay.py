@@ -1,7 +1,7 @@
-"""One-way delays: a distribution is its quantile function, so that one uniform draw gives one delay.
+"""One-way delay models. A distribution is given by its quantile function: one uniform number gives one delay.
 
-With the draw fixed, a larger mean gives a larger delay of every single message: arms of an experiment stay comparable
-message by message (common random numbers).
+With common random numbers, a larger mean gives a larger delay of every message, so that the arms of an experiment are
+comparable message by message.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from eidrive_scenario.v2x.link_models.delay_trace import TraceDelay
 
 
 class ConstantDelay(Settings):
-    """Every message takes the same time."""
+    """Constant delay of every message."""
 
     kind: Literal["constant"] = "constant"
     seconds: NonNegativeFloat = 0.0
@@ -27,7 +27,7 @@ class ConstantDelay(Settings):
         return False
 
     def quantile(self, u: float) -> float:
-        """The delay [s]."""
+        """Return the delay [s]."""
         return self.seconds
 
 
@@ -38,25 +38,25 @@ class _RandomDelay(Settings):
 
 
 class UniformDelay(_RandomDelay):
-    """Evenly spread between two bounds [s]."""
+    """Delay with a uniform distribution between two bounds [s]."""
 
     kind: Literal["uniform"]
     minimum: NonNegativeFloat
     maximum: NonNegativeFloat
 
     @model_validator(mode="after")
-    def _ordered(self) -> UniformDelay:
+    def _check_order(self) -> UniformDelay:
         if self.maximum < self.minimum:
-            raise ValueError(f"maximum {self.maximum:g} lies below minimum {self.minimum:g}")
+            raise ValueError(f"maximum must be at least minimum (got {self.maximum:g}, below {self.minimum:g})")
         return self
 
     def quantile(self, u: float) -> float:
-        """The delay that a share `u` of all messages does not exceed [s]."""
+        """Return the quantile of the delay at probability `u` [s]."""
         return self.minimum + u * (self.maximum - self.minimum)
 
 
 class TruncatedNormalDelay(_RandomDelay):
-    """A normal distribution cut off at two bounds; `mean` and `sd` are those before the cut [s]."""
+    """Delay with a truncated normal distribution; `mean` and `sd` refer to the distribution before truncation [s]."""
 
     kind: Literal["truncated_normal"]
     mean: float
@@ -65,10 +65,12 @@ class TruncatedNormalDelay(_RandomDelay):
     maximum: PositiveFloat | None = None
 
     @model_validator(mode="after")
-    def _some_mass_between_the_bounds(self) -> TruncatedNormalDelay:
+    def _check_mass(self) -> TruncatedNormalDelay:
         low, high = self._mass
         if high - low < 1e-12:
-            raise ValueError(f"no delay of mean {self.mean:g}, sd {self.sd:g} falls between minimum and maximum")
+            raise ValueError(
+                f"minimum and maximum must enclose part of the distribution (got mean {self.mean:g}, sd {self.sd:g})"
+            )
         return self
 
     @property
@@ -78,16 +80,16 @@ class TruncatedNormalDelay(_RandomDelay):
         return low, high
 
     def quantile(self, u: float) -> float:
-        """The delay that a share `u` of all messages does not exceed [s]."""
+        """Return the quantile of the delay at probability `u` [s]."""
         low, high = self._mass
         delay = self.mean + self.sd * float(ndtri(low + u * (high - low)))
         return min(max(delay, self.minimum), math.inf if self.maximum is None else self.maximum)
 
 
 class ShiftedGammaDelay(_RandomDelay):
-    """A least delay and a gamma tail of shape 2 above it; the standard deviation is (mean - minimum) / sqrt 2 [s].
+    """Delay with a gamma distribution of shape 2 above a minimum; the standard deviation is (mean - minimum) / sqrt 2.
 
-    The shape that Eclipse MOSAIC fits to measured vehicular links (GammaRandomDelay).
+    Eclipse MOSAIC fits this shape to measured vehicular links (GammaRandomDelay).
     """
 
     kind: Literal["shifted_gamma"]
@@ -95,18 +97,18 @@ class ShiftedGammaDelay(_RandomDelay):
     mean: NonNegativeFloat
 
     @model_validator(mode="after")
-    def _ordered(self) -> ShiftedGammaDelay:
+    def _check_order(self) -> ShiftedGammaDelay:
         if self.mean < self.minimum:
-            raise ValueError(f"mean {self.mean:g} lies below minimum {self.minimum:g}")
+            raise ValueError(f"mean must be at least minimum (got {self.mean:g}, below {self.minimum:g})")
         return self
 
     def quantile(self, u: float) -> float:
-        """The delay that a share `u` of all messages does not exceed [s]."""
+        """Return the quantile of the delay at probability `u` [s]."""
         return self.minimum + (self.mean - self.minimum) / 2.0 * float(gammaincinv(2.0, u))
 
 
 class LognormalDelay(_RandomDelay):
-    """A lognormal delay above an offset; `mean` and `sd` are those of the part above it [s]."""
+    """Delay with a lognormal distribution above a minimum; `mean` and `sd` refer to the part above it [s]."""
 
     kind: Literal["lognormal"]
     mean: Annotated[float, Field(ge=1e-9, le=1e6)]
@@ -114,7 +116,7 @@ class LognormalDelay(_RandomDelay):
     minimum: NonNegativeFloat = 0.0
 
     def quantile(self, u: float) -> float:
-        """The delay that a share `u` of all messages does not exceed [s]."""
+        """Return the quantile of the delay at probability `u` [s]."""
         variance = math.log1p((self.sd / self.mean) ** 2)
         exponent = math.log(self.mean) - variance / 2.0 + math.sqrt(variance) * float(ndtri(u))
         return self.minimum + math.exp(exponent)

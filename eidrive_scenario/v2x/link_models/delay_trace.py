@@ -15,19 +15,20 @@ from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.settings import Settings
 
 MAX_BYTES = 32 * MIB
-"""Size of a file of measured delays."""
+"""Maximum size of a file of measured delays [bytes]."""
 UNITS = {"s": 1.0, "ms": 1e-3}
+"""Factor from each unit to seconds."""
 
 
 class TraceDelay(Settings):
-    """Delays that somebody measured.
+    """Measured delays.
 
-    seconds  the values [s]; or
-    file     a CSV file, relative to the profile, with
-    column   the name of its column in the first row, or its number from 0 on, and
-    unit     `s` or `ms`
-    replay   false: drawn from the values, with straight lines between neighboring ones; true: message n of a link
-             takes value n, and begins anew at the end
+    seconds  values [s], as an alternative to `file`
+    file     CSV file, relative to the profile
+    column   name of the column in the first row of the file, or its index from 0
+    unit     unit of the file, `s` or `ms`
+    replay   false: drawn from the values, with linear interpolation; true: message n of a link has value n, and the
+             trace repeats
     """
 
     kind: Literal["trace"]
@@ -45,10 +46,10 @@ class TraceDelay(Settings):
         if data.get("file") is None:
             idle = [name for name in ("column", "unit") if name in data]
             if idle:
-                raise ValueError(f"{idle[0]} belongs to a file; the list of seconds has none")
+                raise ValueError(f"{idle[0]} requires file and has no effect with seconds")
             return data
         if data.get("seconds") is not None:
-            raise ValueError("give either seconds or a file")
+            raise ValueError("either seconds or file is expected, not both")
         scale = UNITS.get(str(data.get("unit", "s")), 1.0)
         values = _column(Path(str(data["file"])), data.get("column", 0))
         return {**data, "seconds": [scale * value for value in values]}
@@ -59,11 +60,11 @@ class TraceDelay(Settings):
 
     @property
     def random(self) -> bool:
-        """Whether a draw decides."""
+        """Whether delays are drawn at random."""
         return not self.replay
 
     def quantile(self, u: float) -> float:
-        """The delay that a share `u` of all messages does not exceed [s]."""
+        """Return the quantile of the delay at probability `u` [s]."""
         ascending = self._ascending
         place = u * (len(ascending) - 1)
         below = min(int(place), len(ascending) - 1)
@@ -71,47 +72,50 @@ class TraceDelay(Settings):
         return ascending[below] + (place - below) * (ascending[above] - ascending[below])
 
     def at(self, number: int) -> float:
-        """The delay of message `number` of a link, where the trace is replayed [s]."""
+        """Return the delay of message `number` of a link in a replayed trace [s]."""
         return self.seconds[number % len(self.seconds)]
 
 
 def _column(path: Path, column: object) -> list[float]:
-    """The numbers in a column of a CSV file; a first row of words names the columns. Raises ValueError."""
+    """Return the numbers in a column of a CSV file. A first row of words names the columns.
+
+    Raise ValueError if the file cannot be read, the column is missing, or a value is not a delay.
+    """
     if not isinstance(column, str | int) or isinstance(column, bool):
-        raise ValueError(f"the column is {quoted(column)}; give its name, or its number from 0 on")
+        raise ValueError(f"column is invalid (got {quoted(column)}; expected a name or an index from 0)")
     try:
         text = read_regular_file(path, MAX_BYTES).decode("utf-8")
         reader = csv.reader(text.splitlines(keepends=True))
         rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = "it is not text in UTF-8" if isinstance(error, UnicodeDecodeError) else reason_of(error)
-        raise ValueError(f"cannot read {_shown(path)}: {reason}") from error
+        reason = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else reason_of(error)
+        raise ValueError(f"cannot read {_format_path(path)}: {reason}") from error
     if not rows:
-        raise ValueError(f"{_shown(path)} is empty")
+        raise ValueError(f"{_format_path(path)} is empty")
     header = [cell.strip() for cell in rows[0][1]]
     if isinstance(column, str):
         if column not in header:
-            raise ValueError(f"{_shown(path)} has no column {quoted(column)} in its first row")
+            raise ValueError(f"{_format_path(path)} has no column {quoted(column)} in its first row")
         place = header.index(column)
     else:
         place = column
     if not 0 <= place < len(header):
-        raise ValueError(f"{_shown(path)} has no column {quoted(place)}; it has {len(header)}, from 0 on")
+        raise ValueError(f"{_format_path(path)} has no column {quoted(place)} (expected 0 to {len(header) - 1})")
     body = rows[1:] if isinstance(column, str) or not _is_number(header[place]) else rows
     if not body:
-        raise ValueError(f"{_shown(path)} has no delays")
+        raise ValueError(f"{_format_path(path)} has no delays")
     values = []
     for number, row in body:
-        # The row is not quoted: the path may lead to a file of another kind.
+        # The row is not quoted: the path may refer to a file with other, confidential content.
         if place >= len(row) or not _is_number(row[place]):
-            raise ValueError(f"{_shown(path)}:{number}: column {place} holds no delay")
+            raise ValueError(f"{_format_path(path)}:{number}: column {place} is not a delay")
         if float(row[place]) < 0.0:
-            raise ValueError(f"{_shown(path)}:{number}: a delay is negative")
+            raise ValueError(f"{_format_path(path)}:{number}: delay is negative")
         values.append(float(row[place]))
     return values
 
 
-def _shown(path: Path) -> str:
+def _format_path(path: Path) -> str:
     return shortened(str(path), 200)
 
 

@@ -1,4 +1,4 @@
-"""Which messages are lost: each model says with which probability, and for which reason."""
+"""Settings of the loss models. Each model defines the probability and the reason of a loss."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class NoLoss(Settings):
-    """Every message arrives."""
+    """No loss: every message arrives."""
 
     kind: Literal["none"] = "none"
 
 
 class BernoulliLoss(Settings):
-    """Each message is lost with the same probability, independently of all others.
+    """Independent losses with the same probability for each message.
 
-    scope  `link`: one draw per message and link. `frame`: one draw per receiver and instant takes all that is sent to
-           it then, over links from others and from itself. With `own_perception: true` this is the fault that the
-           published EI-Drive code injects: in one tick a station loses the whole list of objects, or nothing.
+    scope  `link`: one draw per message and link. `frame`: one draw per receiver and instant applies to all messages
+           that are sent to it then, including its own. With `own_perception: true` this is the fault of the published
+           EI-Drive code: in one tick a station loses the whole object list or nothing.
     """
 
     kind: Literal["bernoulli"]
@@ -34,14 +34,14 @@ class BernoulliLoss(Settings):
 
 
 class GilbertElliottLoss(Settings):
-    """Losses in bursts: a chain of two states, good and bad, that takes a step with each message of a link.
+    """Burst losses: a two-state Markov chain (good, bad) with one transition per message of a link.
 
-    (E. N. Gilbert 1960, E. O. Elliott 1963.) Say either the two steps or what they come to:
+    (E. N. Gilbert 1960, E. O. Elliott 1963.) Set either the transition probabilities or the resulting burst statistics:
 
-    to_bad, to_good     probability of the step from good to bad, and back
-    probability, burst  share of bad messages in the long run, and mean number of bad ones in a row; bursts are at
-                        least as long as independent draws would make them, 1 / (1 - probability)
-    good_loss, bad_loss probability with which a message is lost in either state
+    to_bad, to_good     transition probabilities from good to bad, and back
+    probability, burst  stationary share of the bad state, and mean number of consecutive bad messages, which is at
+                        least that of independent draws, 1 / (1 - probability)
+    good_loss, bad_loss loss probability in each state
     """
 
     kind: Literal["gilbert_elliott"]
@@ -53,21 +53,21 @@ class GilbertElliottLoss(Settings):
     bad_loss: Probability = 1.0
 
     @model_validator(mode="after")
-    def _one_way_of_saying_it(self) -> GilbertElliottLoss:
+    def _check_alternatives(self) -> GilbertElliottLoss:
         steps, shares = (self.to_bad, self.to_good), (self.probability, self.burst)
         if (None in steps) == (None in shares) or (steps != (None, None) and shares != (None, None)):
-            raise ValueError("give either to_bad and to_good, or probability and burst")
+            raise ValueError("either to_bad and to_good, or probability and burst are expected")
         if self.burst is not None and self.probability is not None:
             least = 1.0 / (1.0 - self.probability)
             if self.burst < least - 1e-9:
-                raise ValueError(f"with probability {self.probability:g} a burst is at least {least:g} messages long")
+                raise ValueError(f"burst must be at least {least:g} messages with probability {self.probability:g}")
         if sum(self.steps) == 0.0:
-            raise ValueError("the chain never moves: to_bad or to_good must be above 0")
+            raise ValueError("to_bad or to_good must be above 0")
         return self
 
     @property
     def steps(self) -> tuple[float, float]:
-        """From good to bad, from bad to good."""
+        """Transition probabilities from good to bad and from bad to good."""
         if self.to_bad is not None and self.to_good is not None:
             return self.to_bad, self.to_good
         assert self.probability is not None
@@ -77,21 +77,21 @@ class GilbertElliottLoss(Settings):
 
     @property
     def share_bad(self) -> float:
-        """Share of messages that meet the bad state in the long run."""
+        """Stationary probability of the bad state."""
         to_bad, to_good = self.steps
         return to_bad / (to_bad + to_good)
 
     @property
     def share_lost(self) -> float:
-        """Share of messages that are lost in the long run."""
+        """Stationary loss probability."""
         return self.share_bad * self.bad_loss + (1.0 - self.share_bad) * self.good_loss
 
 
 class DistanceLoss(Settings):
-    """Reception by distance between the antennas, from a table; linear in between, constant beyond its ends.
+    """Loss by distance between the antennas, from a table with linear interpolation, constant beyond its ends.
 
-    distances  [m], rising
-    reception  packet reception ratio at each
+    distances  ascending [m]
+    reception  packet reception ratio at each distance
     """
 
     kind: Literal["by_distance"]
@@ -99,15 +99,17 @@ class DistanceLoss(Settings):
     reception: tuple[Probability, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _a_table(self) -> DistanceLoss:
+    def _check_table(self) -> DistanceLoss:
         if len(self.distances) != len(self.reception):
-            raise ValueError(f"{len(self.distances)} distances for {len(self.reception)} values of reception")
+            raise ValueError(
+                f"reception must have one value per distance (got {len(self.reception)} for {len(self.distances)})"
+            )
         if any(second <= first for first, second in pairwise(self.distances)):
-            raise ValueError("distances must rise")
+            raise ValueError("distances must be ascending")
         return self
 
     def probability_at(self, distance: float) -> float:
-        """Of a loss over this distance [m]."""
+        """Return the loss probability over this distance [m]."""
         return 1.0 - float(np.interp(distance, self.distances, self.reception))
 
 

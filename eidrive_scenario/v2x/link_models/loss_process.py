@@ -1,4 +1,4 @@
-"""Decides message by message which is lost, after any of the models of loss."""
+"""Random losses of messages by any of the loss models."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from eidrive_scenario.v2x.link_random import LinkRandom
 from eidrive_scenario.v2x.messages.message import Message
 
 RENEWAL = 4096
-"""After so many messages of a link the chain of Gilbert and Elliott begins anew, in its long-run state: it would take
-too long to play it from the first message on for somebody who begins to listen after hours."""
+"""Number of messages after which the Gilbert-Elliott chain of a link restarts in its stationary distribution.
+
+It bounds the computing time for a receiver that joins after hours, since the chain is simulated message by message.
+"""
 
 
 class LossProcess:
-    """A message is lost where its draw lies below the probability of loss.
+    """Random losses: a message is lost if its random number is below the loss probability.
 
-    The draw belongs to the message and the link, whatever the probability is: what arrives with a larger one arrives
-    with a smaller one too. That holds for bursts as well, as long as a bad message makes the next bad one likelier.
+    The random number depends only on message and link. A message that arrives with a larger probability also arrives
+    with a smaller one. This holds for bursts if a bad message raises the probability of the next bad one.
     """
 
     def __init__(self, loss: AnyLoss, seed: int) -> None:
@@ -28,7 +30,10 @@ class LossProcess:
         self._chains: dict[tuple[str, str], tuple[int, bool]] = {}
 
     def reason(self, message: Message, receiver: str, now: float, distance: float | None) -> str | None:
-        """Why the message is lost on its way to `receiver` over `distance` [m]; None if it is not."""
+        """Return the reason for the loss of a message to `receiver` over `distance` [m]; None if it arrives.
+
+        Raise ValueError if the model requires a distance and it is None.
+        """
         loss = self.loss
         if isinstance(loss, NoLoss):
             return None
@@ -37,13 +42,14 @@ class LossProcess:
         if isinstance(loss, GilbertElliottLoss):
             return self._gilbert_elliott(loss, message, receiver)
         if distance is None:
-            raise ValueError(f"the loss {loss.kind!r} needs to know where {message.sender!r} and {receiver!r} are")
+            stations = f"{message.sender!r} and {receiver!r}"
+            raise ValueError(f"loss {loss.kind!r} requires antenna positions of {stations} (got none)")
         draw = self._draws.uniform("loss", message.sender, receiver, message.number)
         if isinstance(loss, DistanceLoss):
             return "distance" if draw < loss.probability_at(distance) else None
         if isinstance(loss, Ieee80211pLoss | Cv2xMode4Loss):
             return loss.table().cause(distance, draw)
-        raise TypeError(f"no loss {loss!r}")
+        raise TypeError(f"loss is not a loss model (got {loss!r})")
 
     def _bernoulli(self, loss: BernoulliLoss, message: Message, receiver: str, now: float) -> float:
         if loss.scope == "link":

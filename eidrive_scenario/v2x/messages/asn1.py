@@ -1,8 +1,8 @@
-"""Messages in unaligned packed encoding rules, with ASN.1 modules that the user supplies.
+"""Message encoding in unaligned packed encoding rules (UPER), with ASN.1 modules supplied by the user.
 
-The values are laid out as in ETSI EN 302 637-2 V1.4.1 (CAM) and ETSI TR 103 562 V2.1.1 (CPM). A module may have fewer
-components than those; a component that it asks for beyond them is an error. TS 103 324 wraps the containers of a CPM in
-open types, which is not supported.
+The structure follows ETSI EN 302 637-2 V1.4.1 (CAM) and ETSI TR 103 562 V2.1.1 (CPM). A module may define fewer
+components; additional mandatory components are an error. The open types of TS 103 324 around the containers of a CPM
+are not supported.
 """
 
 from __future__ import annotations
@@ -23,25 +23,24 @@ from eidrive_scenario.files.bounded import MIB, is_regular_file, read_regular_fi
 from eidrive_scenario.v2x.messages.message import Message, StationState
 
 TYPES = {"cam": "CAM", "cpm": "CPM"}
-"""The type of the whole message, by kind."""
+"""ASN.1 type of the message, by kind."""
 
 _STATION_TYPES = {"pedestrian": 1, "bicycle": 2, "motorbike": 4, "car": 5, "bus": 6, "van": 7, "truck": 8, "misc": 15}
 _SUBCLASSES = {"car": 3, "motorbike": 2, "bus": 4, "van": 5, "truck": 6}
 _METERS_PER_DEGREE = 111_319.49
-"""Along the equator, about which the plane of the world is put."""
-
+"""Length of a degree along the equator [m]; the origin of the world is at latitude and longitude 0."""
 
 MAX_BYTES = MIB
-"""Size of an ASN.1 module."""
+"""Maximum size of an ASN.1 module [bytes]."""
 ROADSIDE = "misc"
-"""The class of stations that are no vehicles: roadside units."""
+"""Class of stations that are not vehicles: roadside units."""
 
 
 class Asn1Encoder:
-    """Writes messages of a station of this class (`car`, …, `misc` is a roadside unit) with the modules in these files.
+    """Encoder of the messages of one station. `station` is its class (`car`, …; `misc` is a roadside unit).
 
-    Raises SettingError, naming the file or the missing type, if asn1tools is not installed, a file cannot be read, or a
-    module has no such type or one that takes other components than ours: each kind of message is tried at once.
+    Raise SettingError if asn1tools is not installed, a file cannot be read, a type is missing, or a type requires
+    components that are not supported. The constructor encodes one message of each kind as a check.
     """
 
     def __init__(
@@ -57,25 +56,25 @@ class Asn1Encoder:
         try:
             import asn1tools
         except ImportError as error:
-            hint = "install it: pip install 'eidrive-scenario[asn1]'"
-            raise SettingError(Diagnostic("asn1_files needs the package asn1tools", hint, source, line)) from error
+            hint = "install it with pip install 'eidrive-scenario[asn1]'"
+            raise SettingError(Diagnostic("asn1_files requires package asn1tools", hint, source, line)) from error
         for file in files:
             if not is_regular_file(file):
-                diagnostic = Diagnostic(f"no ASN.1 module {quoted(str(file))}", "give the path of a file", source, line)
-                raise SettingError(diagnostic)
+                message = f"no ASN.1 module {quoted(str(file))}"
+                raise SettingError(Diagnostic(message, "expected the path of a file", source, line))
         try:
             texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
             self._modules = asn1tools.compile_string("\n".join(texts), "uper")
         except OSError as error:
-            diagnostic = Diagnostic(f"{error.filename}: cannot be read: {reason_of(error)}", "check it", source, line)
-            raise SettingError(diagnostic) from error
-        except Exception as error:  # asn1tools raises errors of many kinds for modules that are wrong
+            message = f"ASN.1 module {error.filename} cannot be read: {reason_of(error)}"
+            raise SettingError(Diagnostic(message, "check the file", source, line)) from error
+        except Exception as error:  # asn1tools raises errors of many types for invalid modules
             names = ", ".join(str(file) for file in files)
             message = f"{names}: {_without_quotes(error)}"
             raise SettingError(Diagnostic(message, "correct the module", source, line)) from error
         for kind in kinds:
             if TYPES[kind] not in self._modules.types:
-                message = f"the ASN.1 modules have no type {TYPES[kind]!r}, which a {kind} needs"
+                message = f"ASN.1 modules do not define type {TYPES[kind]!r}, which messages of kind {kind} require"
                 raise SettingError(Diagnostic(message, "add the file that defines it", source, line))
         try:
             for kind in kinds:
@@ -86,7 +85,7 @@ class Asn1Encoder:
             ) from error
 
     def _try(self, kind: str) -> None:
-        """Encode messages of this kind with and without what is optional."""
+        """Encode messages of this kind with and without the optional components."""
         car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown(1))
         state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
@@ -94,39 +93,40 @@ class Asn1Encoder:
             self.encode(message, sensors=int(more), low_frequency=more)
 
     def encode(self, message: Message, *, sensors: int = 0, low_frequency: bool = False) -> bytes:
-        """The message; a CPM with so many sensors, a CAM with or without the low-frequency container.
+        """Return the encoded message; `sensors` applies to a CPM, `low_frequency` to a CAM.
 
-        Raises SettingError if the module does not take it.
+        Raise SettingError if the message does not match the type of the module.
         """
         value = (
             cam_value(message, low_frequency) if message.kind == "cam" else cpm_value(message, sensors, self._station)
         )
         try:
             encoded: bytes = self._modules.encode(TYPES[message.kind], value)
-        except Exception as error:  # of many kinds, such as AttributeError for a type that refers to itself
-            why = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without all that we wanted to say
-            hint = "docs/channels.md says after which standards messages are laid out"
-            raise SettingError(Diagnostic(f"the ASN.1 modules take no {message.kind}: {why}", hint)) from error
+        except Exception as error:  # errors of many types, such as AttributeError for a recursive type
+            reason = re.sub(r"( in)? [{(].*", " …", str(error), flags=re.DOTALL)  # without the message content
+            hint = "docs/channels.md lists the standards of the message structure"
+            text = f"ASN.1 modules cannot encode a {message.kind}: {reason}"
+            raise SettingError(Diagnostic(text, hint)) from error
         return encoded
 
     def decode(self, kind: str, data: bytes) -> Any:
-        """What such a message says, as asn1tools has it."""
+        """Return the content of an encoded message in the representation of asn1tools."""
         return self._modules.decode(TYPES[kind], data)
 
 
 def _without_quotes(error: Exception) -> str:
-    """What asn1tools says, without the line of the file that it quotes: the path may lead to a file of another kind."""
+    """Return the message of an asn1tools error without the quoted line, because the file may be confidential."""
     place = re.search(r"line (\d+)", str(error))
     return "not a valid ASN.1 module" + (f" in line {place[1]}" if place else "")
 
 
 def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Velocities and covariances of so many objects of which neither is known."""
+    """Return unknown velocities (N, 2) and covariances (N, 2, 2)."""
     return np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
 
 
 def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
-    """A cooperative awareness message after EN 302 637-2, annex A; of a roadside unit it says only where that is."""
+    """Return a CAM (EN 302 637-2, annex A); that of a roadside unit contains only its position."""
     state = message.state
     if message.detections.classes[0] == ROADSIDE:
         place = {"stationType": _STATION_TYPES[ROADSIDE], "referencePosition": _position(state)}
@@ -174,9 +174,9 @@ def _cam(message: Message, parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def cpm_value(message: Message, sensors: int, station: str) -> dict[str, Any]:
-    """A collective perception message of a station of this class after TR 103 562, annex A.
+    """Return a CPM (TR 103 562, annex A) of a station of this class.
 
-    Objects are in the frame of the sender. A roadside unit leaves out the container of the originating station.
+    Objects are in the frame of the sender. A CPM of a roadside unit omits the container of the originating station.
     """
     state, detections = message.state, message.detections
     parameters: dict[str, Any] = {
@@ -240,7 +240,7 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
 
 
 def _sensor(number: int) -> dict[str, Any]:
-    """A sensor of which only is said that it is there."""
+    """Return a sensor with unknown properties."""
     properties = {"range": 0, "horizontalOpeningAngleStart": 3601, "horizontalOpeningAngleEnd": 3601}
     area = {"refPointId": 0, "xSensorOffset": 0, "ySensorOffset": 0, "vehicleSensorPropertyList": [properties]}
     return {"sensorID": number % 256, "type": 0, "detectionArea": ("vehicleSensor", area)}
@@ -252,7 +252,7 @@ def _header(number: int, sender: str) -> dict[str, int]:
 
 
 def _position(state: StationState) -> dict[str, Any]:
-    """The plane of the world about latitude and longitude 0."""
+    """Return the geographic position, with the origin of the world at latitude and longitude 0."""
     return {
         "latitude": _within(state.y / _METERS_PER_DEGREE * 1e7, -900_000_000, 900_000_000),
         "longitude": _within(state.x / _METERS_PER_DEGREE * 1e7, -1_800_000_000, 1_800_000_000),
@@ -266,7 +266,7 @@ def _position(state: StationState) -> dict[str, Any]:
 
 
 def _heading(yaw: float) -> dict[str, int]:
-    """Clockwise from north, where y points."""
+    """Return the heading, clockwise from north (the y axis)."""
     return {"headingValue": _tenths_of_degrees(math.pi / 2.0 - yaw), "headingConfidence": 127}
 
 

@@ -1,4 +1,4 @@
-"""The clock of a station, which is never quite right."""
+"""Station clock with offset and drift."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from eidrive_scenario.v2x.messages.message import Message
 
 @dataclass(frozen=True)
 class StationClock:
-    """Shows true time + offset + drift · true time [s]; `drift` is a share, 20e-6 for 20 parts per million."""
+    """Clock that shows true time + offset + drift · true time [s]; `drift` is a ratio, 20e-6 for 20 ppm."""
 
     offset: float = 0.0
     drift: float = 0.0
 
     def error(self, now: float) -> float:
-        """How much it is ahead [s]."""
+        """Return the difference between station time and true time [s]."""
         return self.offset + self.drift * now
 
     def with_station_timestamps(self, message: Message, now: float) -> Message:
-        """A message of this station, its time stamps as this clock shows them; `generated` stays the true instant."""
-        return _moved(message, self.error(now))
+        """Return a message of this station with timestamps of this clock; `generated` stays in true time."""
+        return _shift_timestamps(message, self.error(now))
 
     def with_local_timestamps(self, message: Message, now: float) -> Message:
-        """A received message, its time stamps as this station takes them: it believes its own clock."""
-        return _moved(message, -self.error(now))
+        """Return a received message with timestamps relative to this clock, which the station assumes to be true."""
+        return _shift_timestamps(message, -self.error(now))
 
 
-def _moved(message: Message, error: float) -> Message:
+def _shift_timestamps(message: Message, error: float) -> Message:
     if error == 0.0:
         return message
     return replace(

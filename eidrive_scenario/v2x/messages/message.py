@@ -1,4 +1,4 @@
-"""A message, and what becomes of it on each link."""
+"""Messages and the outcomes of their transmissions."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from eidrive_scenario.records import fast_frozen
 from eidrive_scenario.v2x.messages.point_cloud import PointCloud
 
 LineOfSight = Literal["los", "nlosv", "nlos"]
-"""Between two antennas: nothing, vehicles only, or a building or the ground (3GPP TR 37.885, 6.2.1)."""
+"""State of a line of sight: free, blocked by vehicles only, or by a building or the ground (3GPP TR 37.885, 6.2.1)."""
 
 
 @fast_frozen
 @dataclass(frozen=True)
 class StationState:
-    """Where the sender says it is: reference point [m], yaw [rad], speed [m/s], at `time` [s] of its own clock.
+    """State of the sender as it reports it: reference point [m], yaw [rad], speed [m/s], at station `time` [s].
 
-    pose_covariance (3, 3) of x, y and yaw; it is not part of the covariances of the objects that the sender reports.
-    None: the sender knows its place exactly
+    pose_covariance (3, 3) covariance of x, y and yaw, not included in the covariances of the reported objects; None:
+                    the pose is exact
     """
 
     time: float
@@ -37,32 +37,32 @@ class StationState:
 @fast_frozen
 @dataclass(frozen=True)
 class Message:
-    """What a station says of the objects that it knows at `detections.time` of its own clock, said at `generated` [s].
+    """Message with the objects of a station at station time `detections.time`, generated at true time `generated` [s].
 
-    kind     cpm  collective perception message (ETSI TS 103 324): what the sender perceives
-             cam  cooperative awareness message (ETSI EN 302 637-2): the sender itself, as the only object
-    objects  the sender's numbers of its objects, one per row of `detections`: the others are still what an earlier
-             message said of them. None: the list is all that the sender knows now
+    kind     cpm  collective perception message (ETSI TS 103 324): objects that the sender perceives
+             cam  cooperative awareness message (ETSI EN 302 637-2): the sender as the only object
+    objects  object ids of the sender, one per row of `detections`; objects that are not listed keep the state of
+             their last report. None: the list is complete
     """
 
     sender: str
     number: int
-    """Counts the sender's messages from 0."""
+    """Sequence number of the sender's messages, from 0."""
     generated: float
     state: StationState
     detections: Detections
     size: int
-    """[bytes]"""
+    """Size of the message [bytes]."""
     kind: Literal["cpm", "cam"] = "cpm"
     objects: tuple[int, ...] | None = None
     points: PointCloud | None = None
-    """What the sender's LiDARs measured, where it shares that; `size` contains it."""
+    """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
 
 
 @fast_frozen
 @dataclass(frozen=True)
 class ReceivedMessage:
-    """A message at its receiver, and when it arrived [s]."""
+    """Message at its receiver, with the time of arrival [s]."""
 
     message: Message
     arrived: float
@@ -71,10 +71,10 @@ class ReceivedMessage:
 @fast_frozen
 @dataclass(frozen=True)
 class LinkEvent:
-    """The fate of one message on one link, told when it is known: it arrives at `arrives` [s], or is lost for a reason.
+    """Outcome of one message on one link: it arrives at `arrives` [s] or is lost for `reason`.
 
-    Channels that know a radio say too: the path loss with shadowing and blocking bodies [dB], the ratio of signal to
-    noise without interference [dB], what stands between the antennas, and whose bodies those are.
+    Radio models also report the path loss with shadowing and blockage [dB], the signal-to-noise ratio without
+    interference [dB], the state of the line of sight, and the names of the blocking bodies.
     """
 
     sender: str

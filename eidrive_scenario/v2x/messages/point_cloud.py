@@ -1,4 +1,4 @@
-"""Points of a LiDAR in a message: rounded to a grid, sorted, and told as steps from one to the next."""
+"""Compressed lidar point cloud in a message: occupied grid cells, sorted and delta encoded."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from eidrive_scenario.arrays import Array
 Bytes = NDArray[np.uint8]
 
 HEADER_BYTES = 32
-"""Time (8), corner (3 x 4), cell (2), cells along each axis (3 x 2) and number of points (4)."""
+"""Size of the header [bytes]: time (8), corner (3 x 4), cell (2), cells along each axis (3 x 2), points (4)."""
 _SEVEN_BITS = 7
-_MOST_BYTES = 9
-"""Of one step: 63 bits."""
+_MAX_BYTES = 9
+"""Maximum length of one encoded step [bytes]: 63 bits."""
 
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points measured at `time` [s], in the world as their sender knows it.
+    """Points measured at `time` [s], in the world frame by the pose estimate of the sender.
 
-    corner  (3,) of the grid [m]
-    cell    edge of its cells [m]
-    shape   how many cells along x, y and z
-    steps   from one occupied cell to the next, in the order of x, y, z: numbers to the base 128, the least significant
-            digit first, the highest bit set in all bytes of a number but the last (LEB128, as in protobuf)
+    corner  (3,) corner of the grid [m]
+    cell    edge length of the cells [m]
+    shape   number of cells along x, y and z
+    steps   index differences between occupied cells in the order of x, y, z, in LEB128 as in protobuf: base 128, least
+            significant digit first, highest bit set in all bytes of a number except the last
     """
 
     time: float
@@ -37,19 +37,19 @@ class PointCloud:
 
     @property
     def size(self) -> int:
-        """[bytes]"""
+        """Size of the encoded point cloud [bytes]."""
         return HEADER_BYTES + len(self.steps)
 
     def points(self) -> Array:
-        """(N, 3) the middles of the occupied cells [m]."""
+        """Return the centers of the occupied cells (N, 3) [m]."""
         _, along, up = self.shape
-        cells = np.cumsum(_numbers(self.steps))
+        cells = np.cumsum(_decode_numbers(self.steps))
         indices = np.stack([cells // (along * up), cells // up % along, cells % up], axis=1)
         return np.asarray(np.asarray(self.corner) + (indices + 0.5) * self.cell, dtype=np.float64)
 
 
 def compressed(points: Array, time: float, cell: float) -> PointCloud:
-    """Points (N, 3) in the world on a grid of this cell [m]; those of one cell are one. Off by half a cell at most."""
+    """Return the points (N, 3) on a grid of this cell size [m], one point per cell, within half a cell."""
     if not len(points):
         return PointCloud(time, (0.0, 0.0, 0.0), cell, (0, 0, 0), np.empty(0, dtype=np.uint8))
     low = np.floor(points.min(axis=0) / cell).astype(np.int64)
@@ -57,11 +57,11 @@ def compressed(points: Array, time: float, cell: float) -> PointCloud:
     wide, along, up = (indices.max(axis=0) + 1).tolist()
     occupied = np.unique((indices[:, 0] * along + indices[:, 1]) * up + indices[:, 2])
     x, y, z = (low * cell).tolist()
-    return PointCloud(time, (x, y, z), cell, (wide, along, up), _bytes(np.diff(occupied, prepend=0)))
+    return PointCloud(time, (x, y, z), cell, (wide, along, up), _encode_numbers(np.diff(occupied, prepend=0)))
 
 
-def _bytes(numbers: NDArray[np.int64]) -> Bytes:
-    groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MOST_BYTES)) & 127
+def _encode_numbers(numbers: NDArray[np.int64]) -> Bytes:
+    groups = numbers[:, None] >> (_SEVEN_BITS * np.arange(_MAX_BYTES)) & 127
     later = np.cumsum(groups[:, ::-1], axis=1)[:, ::-1] - groups
     needed = (later > 0) | (groups > 0)
     needed[:, 0] = True
@@ -70,7 +70,7 @@ def _bytes(numbers: NDArray[np.int64]) -> Bytes:
     return digits
 
 
-def _numbers(data: Bytes) -> NDArray[np.int64]:
+def _decode_numbers(data: Bytes) -> NDArray[np.int64]:
     if not len(data):
         return np.empty(0, dtype=np.int64)
     ends = np.flatnonzero(data < 128)

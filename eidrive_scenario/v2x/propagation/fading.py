@@ -1,4 +1,4 @@
-"""Fast fading: the power of each message at each receiver, drawn separately around the link budget."""
+"""Fast fading: independent random power of each message at each receiver, relative to the link budget."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Shape = Annotated[float, Field(ge=0.5, le=1000.0)]
 
 
 class NoFading(Settings):
-    """Every message has the power of the link budget."""
+    """No fading: every message has the power of the link budget."""
 
     kind: Literal["none"] = "none"
 
@@ -24,8 +24,8 @@ class NoFading(Settings):
 class Nakagami(Settings):
     """Nakagami-m fading: the power is gamma distributed with shape m around its mean (M. Nakagami, 1960).
 
-    m          shape, at least 0.5: 1 is Rayleigh fading, infinity none; or one for each range of distance
-    distances  where one range ends and the next begins [m], one less than there are shapes
+    m          shape, at least 0.5 (1: Rayleigh fading; infinity: no fading), or one shape per distance range
+    distances  boundaries between the distance ranges [m], one fewer than shapes
     """
 
     kind: Literal["nakagami"]
@@ -34,17 +34,18 @@ class Nakagami(Settings):
 
     @field_validator("m", mode="before")
     @classmethod
-    def _one_for_all(cls, value: object) -> object:
+    def _wrap_single_shape(cls, value: object) -> object:
         return (value,) if isinstance(value, int | float | str) else value
 
     @model_validator(mode="after")
-    def _ranges(self) -> Nakagami:
+    def _check_ranges(self) -> Nakagami:
         if len(self.m) != len(self.distances) + 1 or list(self.distances) != sorted(set(self.distances)):
-            raise ValueError("distances must rise, and m needs one value more than there are distances")
+            counts = f"{len(self.distances)} distances and {len(self.m)} values of m"
+            raise ValueError(f"distances must be ascending, one fewer than values of m (got {counts})")
         return self
 
     def gain_db(self, distance: Array, draws: Array) -> Array:
-        """(N,) power over its mean [dB] at these distances [m]; `draws` (N,) in (0, 1)."""
+        """Return the fading gain (N,) [dB] at these distances [m]; `draws` (N,) in (0, 1)."""
         shape = np.array(self.m)[np.searchsorted(self.distances, distance, side="right")]
         gain: Array = 10.0 * np.log10(np.maximum(gammaincinv(shape, draws) / shape, 1e-30))
         return gain
@@ -54,20 +55,20 @@ Fading = Annotated[NoFading | Nakagami, Field(discriminator="kind")]
 
 
 class FadingDraws:
-    """Draws the fading of messages between N stations, keyed by link and message number."""
+    """Random fading of messages between N stations, keyed by link and message number."""
 
     def __init__(self, fading: Nakagami, seed: int) -> None:
         self._fading = fading
         self._seed = seed
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self.distance: Array = np.zeros((0, 0))
-        """(N, N) between the antennas now [m]."""
+        """Current distance between the antennas (N, N) [m]."""
 
     def rearrange(self, names: tuple[str, ...]) -> None:
-        """Use these stations from now on."""
+        """Replace the stations."""
         own = np.array([key(self._seed, "fading", name) for name in names], dtype=np.uint64)
         self._keys = combine_keys(own[:, None], own[None, :])
 
     def gain_db(self, row: int, number: int) -> Array:
-        """(N,) power of message `number` of this station over its mean at each station [dB]."""
+        """Return the fading gain (N,) of message `number` of the station in `row` at each station [dB]."""
         return self._fading.gain_db(self.distance[row], uniforms(self._keys[row], number))

@@ -1,4 +1,4 @@
-"""Path loss as a setting: which published model, and what it makes of bodies in between."""
+"""Settings of the path loss: published model and additional loss by blocking bodies."""
 
 from __future__ import annotations
 
@@ -24,10 +24,13 @@ from eidrive_scenario.v2x.radio_environment import LOS, NLOSV
 
 
 class LinkGeometry:
-    """M links and what stands on them; LOS is 0 among the states.
+    """Geometry of M links; the code of state LOS is 0.
 
-    distance  (M,) between the antennas [m];  states  (M,) LOS, NLOSV or NLOS;  lower, upper  (M,) heights of the
-    antennas, tops  (M,) and of the highest vehicle in between [m];  vehicles  (M,) how many there are
+    distance      (M,) distance between the antennas [m]
+    states        (M,) LOS, NLOSV or NLOS
+    lower, upper  (M,) heights of the lower and the higher antenna [m]
+    tops          (M,) top of the highest blocking vehicle [m]
+    vehicles      (M,) number of blocking vehicles
     """
 
     def __init__(
@@ -42,7 +45,7 @@ class LinkGeometry:
 
 
 class Link(NamedTuple):
-    """One link of `LinkGeometry`, in plain numbers."""
+    """One link of `LinkGeometry`, in Python numbers."""
 
     distance: float
     state: int
@@ -53,10 +56,10 @@ class Link(NamedTuple):
 
 
 class Tr37885(Settings):
-    """3GPP TR 37.885: LOS of streets or of highways, NLOS behind buildings, and vehicles that add to LOS.
+    """Path loss of 3GPP TR 37.885: LOS in streets or on highways, NLOS behind buildings, NLOSv behind vehicles.
 
-    blockage  how the loss by vehicles in between is spread: `lognormal` as ns-3 reads the report, `normal` and not
-              below 0 dB, or its `mean`
+    blockage  distribution of the loss by blocking vehicles: `lognormal` as in ns-3, `normal` with a minimum of 0 dB,
+              or its `mean`
     """
 
     kind: Literal["tr37885"] = "tr37885"
@@ -68,11 +71,11 @@ class Tr37885(Settings):
 
     @property
     def reaches(self) -> tuple[float, float, float]:
-        """Distance over which shadowing loses all but 1/e of its correlation, with LOS, NLOSv and NLOS [m]."""
+        """Decorrelation distance of the shadowing (correlation 1/e), with LOS, NLOSv and NLOS [m]."""
         return (10.0, 13.0, 13.0) if self.environment == "urban" else (25.0, 25.0, 25.0)
 
     def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
-        """(M,) path loss without shadowing [dB]; `draws` (M,) in (0, 1) decide about the loss by vehicles."""
+        """Return the path loss without shadowing (M,) [dB]; `draws` (M,) in (0, 1) sample the loss by vehicles."""
         los = urban_los if self.environment == "urban" else highway_los
         clear = los(between.distance, frequency_ghz)
         if not between.states.any():
@@ -80,12 +83,12 @@ class Tr37885(Settings):
         mean, spread = blockage_moments(between.distance, between.lower, between.upper, between.tops)
         return np.select(
             [between.states == LOS, between.states == NLOSV],
-            [clear, clear + self._blocked(mean, spread, draws)],
+            [clear, clear + self._blockage_loss(mean, spread, draws)],
             building_nlos(between.distance, frequency_ghz),
         )
 
     def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """The same for one link."""
+        """Return the path loss without shadowing of one link [dB]."""
         distance = max(link.distance, 1.0)
         los = urban_los if self.environment == "urban" else highway_los
         if link.state == LOS:
@@ -93,22 +96,23 @@ class Tr37885(Settings):
         if link.state != NLOSV:
             return float(building_nlos(distance, frequency_ghz))
         mean, spread = blockage_moments(distance, link.lower, link.upper, link.top)
-        return float(los(distance, frequency_ghz) + self._blocked(mean, spread, draw))
+        return float(los(distance, frequency_ghz) + self._blockage_loss(mean, spread, draw))
 
-    def _blocked(self, mean: Array, spread: Array, draws: Array | float) -> Array:
+    def _blockage_loss(self, mean: Array, spread: Array, draws: Array | float) -> Array:
         if self.blockage == "mean":
             return mean
         if self.blockage == "normal":
             return np.maximum(0.0, mean + spread * ndtri(draws))
-        some = np.where(mean > 0.0, mean, 1.0)
-        variance = np.log1p((spread / some) ** 2)
-        return np.where(mean > 0.0, np.exp(np.log(some) - variance / 2.0 + np.sqrt(variance) * ndtri(draws)), 0.0)
+        positive = np.where(mean > 0.0, mean, 1.0)
+        variance = np.log1p((spread / positive) ** 2)
+        lognormal = np.exp(np.log(positive) - variance / 2.0 + np.sqrt(variance) * ndtri(draws))
+        return np.where(mean > 0.0, lognormal, 0.0)
 
 
 class _LossPerVehicle(Settings):
-    """Base of path loss with LOS that adds a fixed loss for each vehicle in between (ETSI TR 103 257: 6.9 dB).
+    """Base class of path loss models with a fixed loss per blocking vehicle (ETSI TR 103 257: 6.9 dB).
 
-    Buildings have the NLOS of TR 37.885 where that loses more.
+    Behind buildings the larger of this loss and the NLOS loss of TR 37.885 applies.
     """
 
     per_vehicle_db: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.9
@@ -116,14 +120,14 @@ class _LossPerVehicle(Settings):
     spreads: ClassVar[tuple[float, float, float]] = (3.0, 3.0, 4.0)
     """Standard deviation of the shadowing with LOS, NLOSv and NLOS [dB]."""
     reaches: ClassVar[tuple[float, float, float]] = (25.0, 25.0, 25.0)
-    """Distance over which shadowing loses all but 1/e of its correlation [m]."""
+    """Decorrelation distance of the shadowing (correlation 1/e), with LOS, NLOSv and NLOS [m]."""
 
     @abstractmethod
     def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
         """Return the path loss with LOS [dB] at distances [m]."""
 
     def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
-        """(M,) path loss without shadowing [dB]; nothing is drawn."""
+        """Return the path loss without shadowing (M,) [dB]; `draws` has no effect."""
         clear = self.line_of_sight_loss(between.distance, frequency_ghz)
         if not between.states.any():
             return clear
@@ -134,7 +138,7 @@ class _LossPerVehicle(Settings):
         )
 
     def loss_of(self, link: Link, frequency_ghz: float, draw: float) -> float:
-        """The same for one link."""
+        """Return the path loss without shadowing of one link [dB]."""
         distance = max(link.distance, 1.0)
         clear = float(self.line_of_sight_loss(distance, frequency_ghz))
         if link.state == LOS:
@@ -145,11 +149,12 @@ class _LossPerVehicle(Settings):
 
 
 class WinnerB1(_LossPerVehicle):
-    """WINNER+ B1 as in 3GPP TR 36.885, with one loss for each vehicle in between.
+    """Path loss of WINNER+ B1 as in 3GPP TR 36.885, with a fixed loss per blocking vehicle.
 
-    environment_height  taken off the antennas' heights [m]: 1.0 after 3GPP; 0.5 and 0 in the analytic models of 802.11p
-                        and C-V2X. 16 dB at 200 m hang on it
-    Buildings have the NLOS of TR 37.885, as that of TR 36.885 needs the corners of streets.
+    environment_height  height subtracted from the antenna heights [m]: 1.0 in 3GPP; 0.5 and 0 in the analytic models
+                        of 802.11p and C-V2X. It changes the loss at 200 m by 16 dB
+
+    The NLOS loss is that of TR 37.885, because that of TR 36.885 requires the positions of street corners.
     """
 
     kind: Literal["winner_b1"]
@@ -162,10 +167,11 @@ class WinnerB1(_LossPerVehicle):
 
 
 class LogDistance(_LossPerVehicle):
-    """Log-distance path loss, with one loss for each vehicle in between.
+    """Log-distance path loss, with a fixed loss per blocking vehicle.
 
-    exponent            10 times this many dB per decade of distance; 2 is free space
-    reference_distance  [m], with the loss `reference_loss_db` there and below; None: of free space at the carrier
+    exponent            slope: 10 `exponent` dB per decade of distance; 2 is free space
+    reference_distance  distance up to which the loss is `reference_loss_db` [m]
+    reference_loss_db   [dB]; None: free-space loss at the carrier frequency
     """
 
     kind: Literal["log_distance"]

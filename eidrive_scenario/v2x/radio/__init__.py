@@ -1,1 +1,1 @@
-"""The radio: path loss and what stands in between, access to the medium, reception, congestion control."""
+"""Radio channel: link budget, medium access, reception, congestion control."""

@@ -1,4 +1,4 @@
-"""Access to the medium: who is on the air when. The base keeps queues and gates; a technology says when to start."""
+"""Medium access. The base class manages queues and DCC gates; a technology determines the start of transmissions."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from eidrive_scenario.v2x.messages.message import Message
 from eidrive_scenario.v2x.propagation.fading import FadingDraws
 from eidrive_scenario.v2x.radio.congestion import DccGate
 
-EARLY = 1e-9
-"""Instants nearer than this are one [s]."""
+TOLERANCE = 1e-9
+"""Tolerance of time comparisons [s]."""
 
 
 class QueueSettings(Settings):
-    """What waits for the medium at a sender.
+    """Transmit queue of a sender.
 
-    discipline  `fifo`: first come, first served; `lcfs`: a message takes the place of those of its kind that wait
-                since an earlier tick, as old news are worth nothing
-    length      how many messages can wait; what does not fit is lost
+    discipline  `fifo`: first come, first served; `lcfs`: a message replaces queued messages of its kind from earlier
+                ticks, because their information is outdated
+    length      maximum number of queued messages; further messages are dropped
     """
 
     discipline: Literal["fifo", "lcfs"] = "fifo"
@@ -37,7 +37,7 @@ class QueueSettings(Settings):
 
 @dataclass(eq=False)
 class Transmission:
-    """A message on its way through a sender: said at `sent`, ready at `ready`, on the air from `start` to `end` [s]."""
+    """Transmission of a message: sent at `sent`, ready at `ready`, transmitted from `start` to `end` [s]."""
 
     message: Message
     receivers: Sequence[str]
@@ -48,19 +48,19 @@ class Transmission:
     end: float = math.nan
     first_band: int = 0
     bands: int = 1
-    """Which subchannels it takes."""
+    """Number of subchannels, from `first_band` on."""
     reserves: bool = False
-    """Whether its control information announces another use of the resource."""
+    """Whether the control information reserves the resource for another transmission."""
     gain: Array | None = None
-    """(N,) its power at each station over that of the link budget [dB]: fading; None: it has none."""
+    """Fading gain at each station (N,) [dB]; None without fading."""
     control: NDArray[np.int8] | None = None
-    """(N,) what became of its control information at each station, as a cause of loss or 0; None where it has none."""
+    """Outcome of the control information at each station (N,), as cause of loss or 0; None without it."""
 
 
 class MediumAccess(ABC):
-    """A discrete-event model of the medium for the stations in `names`, one row each.
+    """Abstract base class for discrete-event models of the medium, with one row per station in `names`.
 
-    sensing_dbm  a station senses a message of at least this power
+    sensing_dbm  minimum power of messages that a station senses [dBm]
     """
 
     def __init__(self, names: tuple[str, ...], queue: QueueSettings, gate: DccGate, sensing_dbm: float) -> None:
@@ -74,60 +74,60 @@ class MediumAccess(ABC):
         self._arrivals: deque[Transmission] = deque()
         self._head: list[Transmission | None] = [None] * count
         self.contending = 0
-        """How many stations have a message for the medium."""
+        """Number of stations with a queued message."""
         self.ready = np.full(count, math.inf)
-        """When the first message of each station may contend [s]; infinity where there is none."""
+        """Time from which the first message of each station may contend [s]; infinity for empty queues."""
         self._last_start = np.full(count, -math.inf)
         self._last_use = np.zeros(count)
-        """Channel time that the last message of each station took: its duration, times its share of the channel [s]."""
+        """Channel time of the last message of each station: duration times share of the channel [s]."""
         self._busy_time = np.zeros(count)
         self._period_busy = np.zeros(count)
         self._period: int | None = None
-        """Which period of congestion control goes on; None before the first message."""
+        """Index of the current period of congestion control; None before the first message."""
         self.fading: FadingDraws | None = None
-        """Draws the power of each message at each station; None: it is that of the link budget."""
+        """Fading of each message at each station; None: power of the link budget."""
         self.on_air: list[Transmission] = []
-        """What may overlap with something whose end is not reached."""
+        """Transmissions that may overlap with unfinished ones."""
 
     def enqueue(self, transmissions: Sequence[Transmission]) -> None:
-        """Messages that stations have said; they enter their queues when they are ready."""
-        self._arrivals = deque(sorted([*self._arrivals, *transmissions], key=_entry))
+        """Add transmissions, which enter the queue of their sender when they are ready."""
+        self._arrivals = deque(sorted([*self._arrivals, *transmissions], key=_queue_key))
 
     @property
     def waiting(self) -> list[Transmission]:
-        """What has not started."""
+        """Transmissions that have not started."""
         return [*self._arrivals, *(entry for queue in self._waiting for entry in queue)]
 
     @abstractmethod
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
-        """Play the medium up to `until` [s]: what has started, and what was thrown out of queues.
+        """Simulate the medium up to `until` [s]; return started and dropped transmissions.
 
-        power  (N, N) at which each station (column) receives each other (row) [dBm]
+        power  (N, N) received power by sender (row) and receiver (column) [dBm]
         """
 
     @abstractmethod
     def predicted_starts(self, row: int, transmission: Transmission | None) -> None:
-        """A message has become the first in the queue of its station; None: the queue is empty now."""
+        """Reset the predicted start after a new first message of a queue; None: the queue is empty."""
 
     def share(self, transmission: Transmission) -> float:
-        """Which share of the channel a message takes while it is on the air."""
+        """Return the share of the channel that a transmission occupies."""
         return 1.0
 
     def rest(self, until: float) -> None:
-        """Nobody has anything to say up to `until` [s]."""
+        """Advance to `until` [s] without transmissions."""
         if math.isfinite(until):
             self._measure(until)
 
     def interval(self, row: int) -> float:
-        """How long congestion control lets a station wait from one message to the next, after its last one [s]."""
+        """Return the minimum interval between messages of a station after its last one, by congestion control [s]."""
         return self.gate.interval(row, float(self._last_use[row]))
 
     def channel_busy_ratio(self, row: int, span: float) -> float:
-        """The channel busy ratio of a station over the `span` [s] since it joined."""
+        """Return the channel busy ratio of a station over the `span` [s] since its entry."""
         return float(self._busy_time[row] + self._period_busy[row]) / span
 
     def rearrange(self, names: tuple[str, ...]) -> list[Transmission]:
-        """Other stations from now on; the answer is what those had still to say who have left."""
+        """Replace the stations; return the pending transmissions of removed stations."""
         rows = [self._rows.get(name) for name in names]
         gone = [name for name in self.names if name not in names]
         lost = [entry for name in gone for entry in self._waiting[self._rows[name]]]
@@ -143,21 +143,21 @@ class MediumAccess(ABC):
             ("_busy_time", 0.0),
             ("_period_busy", 0.0),
         ):
-            setattr(self, field, moved(getattr(self, field), rows, fresh))
+            setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
         for entry in self.on_air:
             if entry.gain is not None:
-                entry.gain = moved(entry.gain, rows, 0.0)
-        self.gate = self.gate.rearranged(rows)
+                entry.gain = reorder_rows(entry.gain, rows, 0.0)
+        self.gate = self.gate.reordered(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
         return lost
 
     @abstractmethod
     def reorder(self, rows: Sequence[int | None]) -> None:
-        """Stations have other rows now: the former row of each is in `rows`, None for those who are new."""
+        """Reorder the state of the stations; `rows` contains the former row of each station, None for new ones."""
 
     def forget(self, before: float) -> None:
-        """Drop what ended before this instant [s], as nothing that goes on overlaps with it."""
+        """Remove transmissions that ended before this time [s] and overlap with no unfinished one."""
         self.on_air = [entry for entry in self.on_air if entry.end > before]
 
     def _arrive(self, transmission: Transmission) -> list[Transmission]:
@@ -166,9 +166,9 @@ class MediumAccess(ABC):
         dropped: list[Transmission] = []
         place = len(queue)
         if self.queue.discipline == "lcfs" and queue:
-            if any(_old_news(transmission, beside=entry) for entry in queue):
+            if any(_is_outdated(transmission, by=entry) for entry in queue):
                 return [transmission]
-            dropped = [entry for entry in queue if _old_news(entry, beside=transmission)]
+            dropped = [entry for entry in queue if _is_outdated(entry, by=transmission)]
             place = queue.index(dropped[0]) if dropped else place
             for entry in dropped:
                 queue.remove(entry)
@@ -180,7 +180,7 @@ class MediumAccess(ABC):
         return dropped
 
     def _next(self, row: int) -> None:
-        """The first message in the queue of a station becomes the one that contends, as soon as the gate is open."""
+        """Let the first message in the queue of a station contend as soon as the DCC gate opens."""
         queue = self._waiting[row]
         self.contending += bool(queue) - (self._head[row] is not None)
         if not queue:
@@ -193,7 +193,7 @@ class MediumAccess(ABC):
         self.predicted_starts(row, first)
 
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
-        """The first message in the queue of a station goes on the air."""
+        """Start the transmission of the first message in the queue of a station."""
         transmission.start, transmission.end = start, start + transmission.duration
         if self.fading is not None:
             transmission.gain = self.fading.gain_db(row, transmission.message.number)
@@ -202,30 +202,30 @@ class MediumAccess(ABC):
         self.on_air.append(transmission)
 
     def _measure(self, now: float) -> None:
-        """Tell congestion control how busy each of its periods was."""
+        """Pass the channel busy ratio of each completed period to congestion control."""
         period = self.gate.control.period
         if self._period is None:
             self._period = math.floor(now / period + 1e-6)
-        while now >= (self._period + 1) * period - EARLY:
+        while now >= (self._period + 1) * period - TOLERANCE:
             self._busy_time += self._period_busy
-            self.gate.measured(self._period_ratio(period))
+            self.gate.update(self._period_ratio(period))
             self._period_busy = np.zeros(len(self.names))
             self._period += 1
 
     def _period_ratio(self, period: float) -> Array:
-        """(N,) busy ratio of the period that ends [s]."""
+        """Return the channel busy ratio (N,) of the completed period [s]."""
         return self._period_busy / period
 
 
-def moved(values: NDArray[Any], rows: Sequence[int | None], fresh: float) -> Array:
-    """An array by station for other stations: the value of the former row, or `fresh`."""
+def reorder_rows(values: NDArray[Any], rows: Sequence[int | None], fresh: float) -> Array:
+    """Return an array for reordered stations: the value of the former row, or `fresh` for new stations."""
     return np.array([fresh if old is None else values[old] for old in rows], dtype=float)
 
 
-def _old_news(entry: Transmission, *, beside: Transmission) -> bool:
-    """Whether another message of this kind was said later. Those of one tick belong together."""
-    return entry.message.kind == beside.message.kind and entry.sent < beside.sent
+def _is_outdated(entry: Transmission, *, by: Transmission) -> bool:
+    """Return True if another message of the same kind was sent in a later tick."""
+    return entry.message.kind == by.message.kind and entry.sent < by.sent
 
 
-def _entry(transmission: Transmission) -> tuple[float, str, int]:
+def _queue_key(transmission: Transmission) -> tuple[float, str, int]:
     return transmission.ready, transmission.message.sender, transmission.message.number

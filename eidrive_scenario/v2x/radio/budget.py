@@ -1,4 +1,4 @@
-"""The link budget between all stations at one instant: distance, line of sight, path loss with correlated shadowing."""
+"""Link budget between all stations: distance, line of sight, and path loss with correlated shadowing."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ from eidrive_scenario.v2x.propagation.path_loss import Link, LinkGeometry, PathL
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
 
 OUT_OF_REACH = 170.0
-"""Where even an open path loses so much, nobody looks what stands on it [dB]."""
-FEW = 8
-"""Up to so many pairs of stations, plain numbers are faster than arrays."""
+"""LOS path loss from which the line of sight is not determined, because no message is received [dB]."""
+MAX_SCALAR = 8
+"""Maximum number of station pairs for scalar evaluation, which is then faster than arrays."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Between N stations, in the order of `names`; all matrices are symmetric.
+    """Link budget between N stations, in the order of `names`; all matrices are symmetric.
 
-    distance  (N, N) [m];  loss  (N, N) path loss with shadowing and blockage [dB];  mean_loss  without shadowing [dB]
-    states    (N, N) LOS, NLOSV or NLOS;  blockers  pairs of rows, the lower first, to names of bodies in between
+    distance   (N, N) [m]
+    loss       (N, N) path loss with shadowing and blockage [dB]
+    mean_loss  (N, N) path loss with blockage, without shadowing [dB]
+    states     (N, N) LOS, NLOSV or NLOS
+    blockers   names of the blocking bodies by pair of rows, the lower row first
     """
 
     names: tuple[str, ...]
@@ -38,19 +41,19 @@ class Budget:
     blockers: Mapping[tuple[int, int], tuple[str, ...]]
 
     def bodies_between(self, sender: int, receiver: int) -> tuple[str, ...]:
-        """Names of the bodies between two stations (rows), from the sender on."""
+        """Return the names of the blocking bodies between two stations (rows), in order from the sender."""
         if sender < receiver:
             return self.blockers.get((sender, receiver), ())
         return self.blockers.get((receiver, sender), ())[::-1]
 
 
 class LinkBudget:
-    """Follows the shadowing of each pair of stations as they move, the same in both directions.
+    """Link budget with the shadowing state of each pair of stations, symmetric in both directions.
 
-    Shadowing is correlated over the way that both antennas have covered, e^(-way / d) (M. Gudmundson, Electronics
-    Letters 27(23), 1991), and so is the loss by vehicles in between. Draws are keyed by pair and count of updates.
+    Shadowing and the loss by blocking vehicles are correlated over the distance s that both antennas have covered,
+    e^(-s / d) (M. Gudmundson, Electronics Letters 27(23), 1991). Random numbers are keyed by pair and update count.
 
-    line_of_sight  `rays` through the world, `random` after TR 37.885's probabilities, or `clear`
+    line_of_sight  `rays` through the world, `random` by the probabilities of TR 37.885, or `clear`
     """
 
     def __init__(
@@ -76,31 +79,31 @@ class LinkBudget:
         self._rows: dict[str, int] = {}
         self._first = self._second = np.zeros(0, dtype=np.int64)
         self._normals, self._updates, self._places = np.zeros((2, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        self._take_in(())
+        self._set_stations(())
 
     def at(self, surroundings: RadioEnvironment) -> Budget:
-        """The budget with the antennas where they are now."""
+        """Return the link budget at the current antenna positions."""
         names = surroundings.names
         if names != self._names:
-            self._take_in(names)
-        return self._at_few(surroundings) if 0 < len(self._pairs) <= FEW else self._at_many(surroundings)
+            self._set_stations(names)
+        return self._at_scalar(surroundings) if 0 < len(self._pairs) <= MAX_SCALAR else self._at_array(surroundings)
 
-    def _at_many(self, surroundings: RadioEnvironment) -> Budget:
+    def _at_array(self, surroundings: RadioEnvironment) -> Budget:
         names, positions = surroundings.names, surroundings.positions
         first, second = self._first, self._second
         distance = np.linalg.norm(positions[first] - positions[second], axis=1)
         between, blockers = self._between(surroundings, positions, distance)
-        shadow = self._walk(positions, between.states)
+        shadow = self._update_shadowing(positions, between.states)
         mean_loss = self._path_loss.loss(between, self._frequency, ndtr(shadow[1]))
         spread = np.take(self._path_loss.spreads, between.states) if self._spread is None else self._spread
-        links = np.zeros((3, len(first) + 1))  # the last one is that of a station with itself
+        links = np.zeros((3, len(first) + 1))  # the last link is that of a station to itself
         links[0, :-1], links[1, :-1], links[2, :-1] = distance, mean_loss + spread * shadow[0], mean_loss
         square = links.take(self._pair_at, axis=1)
         states = np.append(between.states, LOS).take(self._pair_at)
         return Budget(names, self._rows, square[0], square[1], square[2], states, blockers)
 
-    def _at_few(self, surroundings: RadioEnvironment) -> Budget:
-        """The same in plain numbers, pair by pair."""
+    def _at_scalar(self, surroundings: RadioEnvironment) -> Budget:
+        """Return the link budget, evaluated pair by pair."""
         names = surroundings.names
         places = [surroundings.places[name] for name in names]
         moved = [math.dist(here, there) for here, there in zip(self._places.tolist(), places, strict=True)]
@@ -109,7 +112,7 @@ class LinkBudget:
         distance, loss, mean_loss = ([[0.0] * len(names) for _ in names] for _ in range(3))
         states = [[LOS] * len(names) for _ in names]
         for pair, (link, a, b) in enumerate(zip(between, self._first.tolist(), self._second.tolist(), strict=True)):
-            shadow, blockage = self._step(pair, moved[a] + moved[b], link.state)
+            shadow, blockage = self._update_pair(pair, moved[a] + moved[b], link.state)
             mean = self._path_loss.loss_of(link, self._frequency, float(ndtr(blockage)))
             spread = self._path_loss.spreads[link.state] if self._spread is None else self._spread
             distance[a][b] = distance[b][a] = link.distance
@@ -122,7 +125,7 @@ class LinkBudget:
     def _links(
         self, surroundings: RadioEnvironment, places: Sequence[tuple[float, float, float]]
     ) -> tuple[list[Link], dict[tuple[int, int], tuple[str, ...]]]:
-        """What is between the stations of each pair, and the bodies there by rows, for few pairs."""
+        """Return the geometry of each link, and the blocking bodies by rows, evaluated pair by pair."""
         links, blockers = [], {}
         ends = list(zip(self._first.tolist(), self._second.tolist(), strict=True))
         for pair, (a, b) in enumerate(ends):
@@ -135,25 +138,25 @@ class LinkBudget:
             links.append(link)
         if self._line_of_sight == "rays" and surroundings.sight is not None and links:
             near = [pair for pair, link in enumerate(links) if link.distance < self._reach]
-            seen = surroundings.sight([self._pairs[pair] for pair in near])
+            sight = surroundings.sight([self._pairs[pair] for pair in near])
             for ray, (pair, state, top) in enumerate(
-                zip(near, seen.states.tolist(), seen.heights.tolist(), strict=True)
+                zip(near, sight.states.tolist(), sight.heights.tolist(), strict=True)
             ):
                 if state != LOS:
-                    bodies = seen.blockers.get(ray, ())
+                    bodies = sight.blockers.get(ray, ())
                     links[pair] = links[pair]._replace(state=state, top=top, vehicles=len(bodies))
                     if bodies:
                         blockers[ends[pair]] = bodies
         return links, blockers
 
-    def _step(self, pair: int, way: float, state: int) -> tuple[float, float]:
-        """`_walk` of one pair of stations."""
+    def _update_pair(self, pair: int, covered: float, state: int) -> tuple[float, float]:
+        """Return `_update_shadowing` of one pair of stations after the covered distance [m]."""
         shadow, blockage = self._normals[:, pair].tolist()
-        if way == 0.0:
+        if covered == 0.0:
             return shadow, blockage
         self._updates[pair] += 1
         reach = self._path_loss.reaches[state] if self._decorrelation is None else self._decorrelation
-        kept = 0.0 if math.isnan(way) else math.exp(-way / reach)
+        kept = 0.0 if math.isnan(covered) else math.exp(-covered / reach)
         fresh, count = math.sqrt(1.0 - kept * kept), int(self._updates[pair])
         for_shadow, for_blockage = (float(ndtri(uniform(own, count))) for own in self._keys[:, pair].tolist())
         shadow, blockage = kept * shadow + fresh * for_shadow, kept * blockage + fresh * for_blockage
@@ -161,7 +164,7 @@ class LinkBudget:
         return shadow, blockage
 
     def _distance_of(self, loss: float) -> float:
-        """From where on an open path loses at least so much [dB], in meters."""
+        """Return the distance from which the LOS path loss is at least `loss` [dB], in meters."""
         near, far = 1.0, 1e9
         for _ in range(100):
             middle = math.sqrt(near * far)
@@ -169,8 +172,8 @@ class LinkBudget:
             near, far = (near, middle) if there >= loss else (middle, far)
         return far
 
-    def _take_in(self, names: tuple[str, ...]) -> None:
-        """Other stations from now on; pairs that were there keep their shadowing."""
+    def _set_stations(self, names: tuple[str, ...]) -> None:
+        """Replace the stations. Remaining pairs keep their shadowing."""
         count, former = len(names), len(self._names)
         first, second = np.triu_indices(count, 1)
         normals, updates = np.zeros((2, len(first))), np.full(len(first), -1)
@@ -178,14 +181,14 @@ class LinkBudget:
         old = np.array([self._rows.get(name, -1) for name in names], dtype=np.int64)
         pair_at = np.full((former + 1, former + 1), -1)
         pair_at[self._first, self._second] = pair_at[self._second, self._first] = np.arange(len(self._first))
-        was = pair_at[old[first], old[second]] if count else updates
-        known = was >= 0
-        normals[:, known], updates[known] = self._normals[:, was[known]], self._updates[was[known]]
+        former_pair = pair_at[old[first], old[second]] if count else updates
+        known = former_pair >= 0
+        normals[:, known], updates[known] = self._normals[:, former_pair[known]], self._updates[former_pair[known]]
         places[old >= 0] = self._places[old[old >= 0]]
         self._names, self._rows = names, {name: row for row, name in enumerate(names)}
         self._first, self._second = first, second
         self._pair_at = np.full((count, count), len(first))
-        """Which pair two rows are; the number of pairs on the diagonal."""
+        """Index of the pair of two rows; the number of pairs on the diagonal."""
         self._pair_at[first, second] = self._pair_at[second, first] = np.arange(len(first))
         self._normals, self._updates, self._places = normals, updates, places
         self._pairs = [(names[a], names[b]) for a, b in zip(first.tolist(), second.tolist(), strict=True)]
@@ -213,28 +216,28 @@ class LinkBudget:
             states[hidden], tops[hidden], vehicles[hidden] = NLOSV, upper[hidden] + 0.1, 1
         elif self._line_of_sight == "rays" and surroundings.sight is not None and count:
             near = np.flatnonzero(distance < self._reach)
-            asked = self._pairs if len(near) == count else [self._pairs[pair] for pair in near.tolist()]
-            seen = surroundings.sight(asked)
-            states[near], tops[near] = seen.states, seen.heights
-            for ray, names in seen.blockers.items():
+            pairs = self._pairs if len(near) == count else [self._pairs[pair] for pair in near.tolist()]
+            sight = surroundings.sight(pairs)
+            states[near], tops[near] = sight.states, sight.heights
+            for ray, names in sight.blockers.items():
                 pair = int(near[ray])
                 vehicles[pair] = len(names)
                 blockers[int(self._first[pair]), int(self._second[pair])] = names
         return between, blockers
 
-    def _walk(self, positions: Array, states: Integers) -> Array:
-        """(2, M) standard normal numbers behind shadowing and blockage, moved on by what the stations have moved."""
+    def _update_shadowing(self, positions: Array, states: Integers) -> Array:
+        """Return the standard normal numbers of shadowing and blockage (2, M), updated by the covered distance."""
         step = positions - self._places
         moved = np.sqrt(np.einsum("ni,ni->n", step, step))
-        way = moved[self._first] + moved[self._second]
-        way[np.isnan(way)] = math.inf
-        moving = way > 0.0
+        covered = moved[self._first] + moved[self._second]
+        covered[np.isnan(covered)] = math.inf
+        moving = covered > 0.0
         self._places = positions.copy()
         if moving.any():
             self._updates += moving
             reach = np.take(self._path_loss.reaches, states) if self._decorrelation is None else self._decorrelation
-            kept = np.exp(-way / reach)
+            kept = np.exp(-covered / reach)
             innovation = ndtri(uniforms(self._keys, self._updates))
-            walked = kept * self._normals + np.sqrt(1.0 - kept * kept) * innovation
-            self._normals = np.where(moving, walked, self._normals)
+            updated = kept * self._normals + np.sqrt(1.0 - kept * kept) * innovation
+            self._normals = np.where(moving, updated, self._normals)
         return self._normals

@@ -1,4 +1,4 @@
-"""The radio channel: messages queue, contend for the medium, and reach whom the link budget lets them reach."""
+"""Radio channel: messages are queued, contend for the medium, and are received according to the link budget."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ from eidrive_scenario.v2x.statistics.reception_log import Entry
 Rows = NDArray[np.int64]
 
 ABSENT = "absent"
-"""The reason of loss where sender or receiver has left the world."""
+"""Reason for the loss of a message whose sender or receiver has left the world."""
 
 
 class RadioChannel(LinkChannel):
-    """What a message meets on its way is known when it has left the air, so its fate is told in a later tick.
+    """Channel that models the medium as a whole. The outcome of a transmission is known when it has ended.
 
-    The medium is played up to `now` when somebody first listens at `now`, with the antennas where they are then.
-    Stations are kept in alphabetical order: nothing depends on the order in which they are listed.
+    Outcomes are therefore returned in a later tick. The first delivery at `now` simulates the medium up to `now`, with
+    the current antenna positions. Stations are sorted by name, so that results do not depend on their order.
     """
 
     settings: ClassVar[type[ChannelProfile]] = RadioProfile
@@ -66,44 +66,44 @@ class RadioChannel(LinkChannel):
             decorrelation=profile.decorrelation,
         )
         self._receiver = Receiver(
-            tuple(profile.noise_in(width) for width in range(1, profile.most_subchannels + 1)),
+            tuple(profile.noise_in(width) for width in range(1, profile.max_subchannels + 1)),
             profile.sensing,
             profile.curves,
             locks=profile.technology == "80211p",
             background=profile.background_by_loss(),
         )
         background = self._receiver.background
-        self._outside = 0.0 if background is None else background[0].channel_busy_ratio
-        """Share of the time in which vehicles that are not simulated fill the channel."""
+        self._background_ratio = 0.0 if background is None else background[0].channel_busy_ratio
+        """Channel busy ratio caused by vehicles that are not simulated."""
         self._losses = LossProcess(profile.loss, seed)
         self._draws = LinkRandom(seed)
         self._rows: dict[str, int] = {}
-        self._listeners: dict[str, tuple[list[str], Rows]] = {}
+        self._receivers: dict[str, tuple[list[str], Rows]] = {}
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         self._access = self._new_access(())
         self._access.fading = self._fading
-        self._ledger = LinkCounterTable(())
+        self._counters = LinkCounterTable(())
         self._keys: Keys = np.zeros((0, 0), dtype=np.uint64)
         self._jitter_keys: list[int] = []
         self._budget: Budget | None = None
         self._open: list[Transmission] = []
-        self._told: list[OutcomeBlock] = []
+        self._outcomes: list[OutcomeBlock] = []
         self._dropped: list[LinkEvent] = []
         self._until: float | None = None
-        """Up to when the medium was played [s]."""
-        self._joined: dict[str, float] = {}
+        """Time up to which the medium is simulated [s]."""
+        self._entry_times: dict[str, float] = {}
         self._last_arrival: dict[tuple[str, str], float] = {}
 
     def _new_access(self, names: tuple[str, ...]) -> MediumAccess:
         profile = self.profile
-        gate = DccGate(profile.congestion, len(names), self._outside)
+        gate = DccGate(profile.congestion, len(names), self._background_ratio)
         if profile.technology == "80211p":
             return Csma(names, profile.queue, gate, profile.sensing, self._seed)
         return Sidelink(names, profile.queue, gate, profile.sensing, self._seed, profile.sidelink, profile.noise_dbm)
 
     def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
-        """Nothing can be said of one link alone. Raises TypeError."""
-        raise TypeError("a radio decides about messages together: use transmit")
+        """Raise TypeError, because outcomes of links are not independent."""
+        raise TypeError("transmission_outcome is not defined for a radio channel (expected a call of transmit)")
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         super().update_environment(surroundings)
@@ -122,8 +122,8 @@ class RadioChannel(LinkChannel):
             rows = self._rows_of(message.sender, receivers)
             if len(rows) < len(receivers):
                 missing = next(name for name in receivers if name not in self._rows)
-                raise ValueError(f"the radio was not told where {missing!r} is")
-            self._ledger.send(row, rows, message.size)
+                raise ValueError(_no_position(missing))
+            self._counters.send(row, rows, message.size)
         self._access.enqueue(offered)
         return self.drain_events()
 
@@ -136,14 +136,15 @@ class RadioChannel(LinkChannel):
         return super().in_flight() + undecided
 
     def statistics(self, now: float) -> Mapping[tuple[str, str], LinkStatistics]:
-        self._ledger.flush_into(self._links)
+        self._counters.flush_into(self._links)
         return super().statistics(now)
 
     def channel_busy_ratio(self, station: str) -> float | None:
         row = self._rows.get(station)
-        if row is None or self._until is None or self._until <= self._joined[station]:
-            return self._outside
-        return min(1.0, self._access.channel_busy_ratio(row, self._until - self._joined[station]) + self._outside)
+        if row is None or self._until is None or self._until <= self._entry_times[station]:
+            return self._background_ratio
+        simulated = self._access.channel_busy_ratio(row, self._until - self._entry_times[station])
+        return min(1.0, simulated + self._background_ratio)
 
     def min_message_interval(self, station: str) -> float:
         row = self._rows.get(station)
@@ -151,38 +152,38 @@ class RadioChannel(LinkChannel):
 
     def finalize(self) -> None:
         self._advance(math.inf)
-        self._ledger.flush_into(self._links)
+        self._counters.flush_into(self._links)
 
     def drain_events(self) -> Sequence[LinkEvent]:
-        told = LinkEvents([super().drain_events(), self._dropped, *self._told])
-        self._told, self._dropped = [], []
-        return told
+        events = LinkEvents([super().drain_events(), self._dropped, *self._outcomes])
+        self._outcomes, self._dropped = [], []
+        return events
 
     def _rows_of(self, sender: str, receivers: Sequence[str]) -> Rows:
-        """The rows of those among the receivers who are there; the same ones listen to a sender most of the time."""
-        held = self._listeners.get(sender)
-        if held is None or held[0] != list(receivers):
+        """Return the rows of present receivers. They are cached, because the receivers of a sender rarely change."""
+        cached = self._receivers.get(sender)
+        if cached is None or cached[0] != list(receivers):
             rows = np.array([self._rows[name] for name in receivers if name in self._rows], dtype=np.int64)
-            held = self._listeners[sender] = (list(receivers), rows)
-        return held[1]
+            cached = self._receivers[sender] = (list(receivers), rows)
+        return cached[1]
 
     def _row(self, name: str) -> int:
         row = self._rows.get(name)
         if row is None:
-            raise ValueError(f"the radio was not told where {name!r} is")
+            raise ValueError(_no_position(name))
         return row
 
-    def _take_in(self, names: tuple[str, ...], now: float) -> None:
-        """Other stations from now on; what those say who have left is lost."""
-        self._joined = {name: self._joined.get(name, now) for name in names}
-        self._ledger.flush_into(self._links)
+    def _set_stations(self, names: tuple[str, ...], now: float) -> None:
+        """Replace the stations. Pending messages of removed stations are lost."""
+        self._entry_times = {name: self._entry_times.get(name, now) for name in names}
+        self._counters.flush_into(self._links)
         lost = self._access.rearrange(names)
         gone = [entry for entry in self._open if entry.message.sender not in names]
         self._open = [entry for entry in self._open if entry not in gone]
         self._access.on_air = [entry for entry in self._access.on_air if entry.message.sender in names]
         self._rows = {name: row for row, name in enumerate(names)}
-        self._listeners.clear()
-        self._ledger = LinkCounterTable(names)
+        self._receivers.clear()
+        self._counters = LinkCounterTable(names)
         own = np.array([key(self._seed, "reception", name) for name in names], dtype=np.uint64)
         self._keys = combine_keys(own[:, None], own[None, :])
         self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
@@ -190,19 +191,19 @@ class RadioChannel(LinkChannel):
             self._fading.rearrange(names)
         for entry in [*lost, *gone]:
             for receiver in entry.receivers:
-                self._lose(entry, receiver, ABSENT)
+                self._record_loss(entry, receiver, ABSENT)
 
     def _advance(self, now: float) -> None:
-        """Play the medium up to `now`; more than once at one instant does nothing."""
+        """Simulate the medium up to `now`. Repeated calls at the same time have no effect."""
         if self._until is None:
             self._until = now
         if self.surroundings.names != self._access.names:
-            self._take_in(self.surroundings.names, self._until)
+            self._set_stations(self.surroundings.names, self._until)
         if now <= self._until:
             return
         if math.isfinite(now):
             self._until = now
-        if self._budget is None:  # even where nobody talks: who talks when shall not shift the draws of shadowing
+        if self._budget is None:  # also without transmissions: shadowing must not depend on when stations transmit
             self._budget = self._link_budget.at(self.surroundings)
         if not self._open and not self._access.waiting:
             self._access.rest(now)
@@ -221,62 +222,60 @@ class RadioChannel(LinkChannel):
         self._access.forget(min((entry.start for entry in self._open), default=now))
 
     def _drop(self, entry: Transmission) -> None:
-        """A queue has thrown a message out."""
+        """Record a message that was dropped from a queue."""
         message = entry.message
         sender, rows = self._rows[message.sender], self._rows_of(message.sender, entry.receivers)
-        self._ledger.drop(sender, rows)
-        self._told.append(DroppedBlock(entry, self._access.names, sender, rows))
-        self._lose_absent(entry, rows)
+        self._counters.drop(sender, rows)
+        self._outcomes.append(DroppedBlock(entry, self._access.names, sender, rows))
+        self._record_absent(entry, rows)
 
     def _receive(self, ended: Sequence[Transmission], power: Array, budget: Budget) -> None:
-        """Decide who hears the messages that have left the air, and put them on their way."""
+        """Determine the receptions of ended transmissions and enqueue their deliveries."""
         receptions = self._receiver.receive(ended, self._access.on_air, power, budget, self._keys)
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
         for place, entry in enumerate(ended):
             present = self._rows_of(entry.message.sender, entry.receivers)
-            self._lose_absent(entry, present)
-            receivers.append(
-                present if plain else self._pending_at_switch(entry, present, receptions.causes[place], budget)
-            )
-        batch = ReceptionBlock(ended, receptions, budget, receivers)
-        self._carry(batch)
-        self._ledger.decide(
-            batch.senders,
-            batch.reached_receivers,
-            batch.causes,
-            budget.distance[batch.senders, batch.reached_receivers],
+            self._record_absent(entry, present)
+            receivers.append(present if plain else self._apply_loss(entry, present, receptions.causes[place], budget))
+        block = ReceptionBlock(ended, receptions, budget, receivers)
+        self._enqueue_deliveries(block)
+        self._counters.decide(
+            block.senders,
+            block.reached_receivers,
+            block.causes,
+            budget.distance[block.senders, block.reached_receivers],
         )
-        self._told.append(batch)
+        self._outcomes.append(block)
 
-    def _carry(self, batch: ReceptionBlock) -> None:
-        """Put the messages on their way to those who hear them."""
-        heard = np.flatnonzero(batch.causes == DELIVERED)
-        receivers: list[list[str]] = [[] for _ in batch.ended]
-        names, delay = batch.budget.names, self.profile.delay
-        places = batch.places[heard]
-        for place, row in zip(places.tolist(), batch.reached_receivers[heard].tolist(), strict=True):
+    def _enqueue_deliveries(self, block: ReceptionBlock) -> None:
+        """Enqueue delivered messages for their receivers."""
+        delivered = np.flatnonzero(block.causes == DELIVERED)
+        receivers: list[list[str]] = [[] for _ in block.ended]
+        names, delay = block.budget.names, self.profile.delay
+        places = block.places[delivered]
+        for place, row in zip(places.tolist(), block.reached_receivers[delivered].tolist(), strict=True):
             receivers[place].append(names[row])
         if isinstance(delay, ConstantDelay):
-            ends = np.array([entry.end + delay.seconds for entry in batch.ended])
-            batch.arrives[heard] = ends[places]
-            for entry, arrives, hearing in zip(batch.ended, ends.tolist(), receivers, strict=True):
-                self._links.enqueue(_parcel(entry, arrives), *hearing)
+            ends = np.array([entry.end + delay.seconds for entry in block.ended])
+            block.arrives[delivered] = ends[places]
+            for entry, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):
+                self._links.enqueue(_queue_entry(entry, arrives), *reached)
             return
         arrivals = []
-        for entry, hearing in zip(batch.ended, receivers, strict=True):
-            for name in hearing:
+        for entry, reached in zip(block.ended, receivers, strict=True):
+            for name in reached:
                 arrives = entry.end + delay_of(delay, self._draws, entry.message, name)
                 if not self.profile.reordering:
                     link = (entry.message.sender, name)
                     arrives = self._last_arrival[link] = max(arrives, self._last_arrival.get(link, arrives))
                 arrivals.append(arrives)
-                self._links.enqueue(_parcel(entry, arrives), name)
-        batch.arrives[heard] = arrivals
+                self._links.enqueue(_queue_entry(entry, arrives), name)
+        block.arrives[delivered] = arrivals
 
-    def _pending_at_switch(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
-        """Those among the receivers for whom the loss that comes on top of the radio does not strike."""
-        spared = []
+    def _apply_loss(self, entry: Transmission, rows: Rows, causes: NDArray[np.int8], budget: Budget) -> Rows:
+        """Apply the additional loss model; return the rows of receivers without an additional loss."""
+        remaining = []
         sender = self._rows[entry.message.sender]
         for row in rows.tolist():
             distance = float(budget.distance[sender, row])
@@ -284,30 +283,34 @@ class RadioChannel(LinkChannel):
             if causes[row] == DELIVERED:
                 reason = self._losses.reason(entry.message, budget.names[row], entry.sent, distance)
             if reason is None:
-                spared.append(row)
+                remaining.append(row)
             else:
-                self._lose(entry, budget.names[row], reason, distance)
-        return np.array(spared, dtype=np.int64)
+                self._record_loss(entry, budget.names[row], reason, distance)
+        return np.array(remaining, dtype=np.int64)
 
-    def _lose_absent(self, entry: Transmission, present: Rows) -> None:
+    def _record_absent(self, entry: Transmission, present: Rows) -> None:
         if len(present) < len(entry.receivers):
             for name in entry.receivers:
                 if name not in self._rows:
-                    self._lose(entry, name, ABSENT)
+                    self._record_loss(entry, name, ABSENT)
 
-    def _lose(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
-        """A message that was written down as sent is lost for a reason that the reception does not know."""
+    def _record_loss(self, entry: Transmission, receiver: str, reason: str, distance: float | None = None) -> None:
+        """Record the loss of a sent message for a reason outside the reception model."""
         message = entry.message
-        book = self._links.counters(message.sender, receiver)
-        book.count_loss(reason)
+        counters = self._links.counters(message.sender, receiver)
+        counters.count_loss(reason)
         if distance is not None:
-            book.count_outcome(distance, False)
+            counters.count_outcome(distance, False)
         self._dropped.append(
             LinkEvent(message.sender, receiver, message.number, entry.sent, "lost", None, reason, message.size)
         )
 
 
-def _parcel(entry: Transmission, arrives: float) -> Entry:
-    """A message on its way to whoever hears it at this instant [s]."""
+def _no_position(name: str) -> str:
+    return f"station {name!r} has no antenna position in the radio environment"
+
+
+def _queue_entry(entry: Transmission, arrives: float) -> Entry:
+    """Return the queue entry of a message in flight that arrives at this time [s]."""
     message = entry.message
     return arrives, message.sender, message.number, entry.sent, ReceivedMessage(message, arrives)

@@ -1,4 +1,4 @@
-"""Congestion control (ETSI TS 102 687): how long a station waits between two messages as the channel fills."""
+"""Decentralized congestion control (ETSI TS 102 687): minimum message interval by channel busy ratio."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from eidrive_scenario.arrays import Array
 from eidrive_scenario.settings import Settings
 
 LONGEST_INTERVAL = 10.0
-"""Largest time between two messages that a profile can ask for [s]; the standard has 1 s."""
+"""Maximum message interval in a profile [s]; that of the standard is 1 s."""
 
 
 class NoDcc(Settings):
-    """Everybody sends when it likes."""
+    """No congestion control."""
 
     kind: Literal["none"] = "none"
 
@@ -23,10 +23,10 @@ class NoDcc(Settings):
 
 
 class ReactiveDcc(Settings):
-    """A table from the busy ratio of the last 100 ms to the least interval (ETSI TS 102 687, table A.2).
+    """Reactive approach: minimum interval by channel busy ratio of the last 100 ms (ETSI TS 102 687, table A.2).
 
-    limits     upper bounds of the busy ratio, rising
-    intervals  least time between two messages up to each bound [s]
+    limits     upper bounds of the channel busy ratio, ascending
+    intervals  minimum time between two messages up to each bound [s]
     """
 
     kind: Literal["reactive"]
@@ -36,23 +36,24 @@ class ReactiveDcc(Settings):
     period: ClassVar[float] = 0.1
 
     @model_validator(mode="after")
-    def _a_table(self) -> ReactiveDcc:
+    def _check_table(self) -> ReactiveDcc:
         if len(self.limits) != len(self.intervals) or list(self.limits) != sorted(self.limits) or not self.limits:
-            raise ValueError("limits must rise, and each has one interval")
+            raise ValueError("limits must be ascending, with one value of intervals each")
         return self
 
     def interval_at(self, busy: Array) -> Array:
-        """Least intervals [s] at these busy ratios."""
+        """Return the minimum intervals [s] at these channel busy ratios."""
         rows = np.minimum(np.searchsorted(self.limits, busy), len(self.limits) - 1)
         return np.array(self.intervals)[rows]
 
 
 class Limeric(Settings):
-    """The adaptive approach: every station moves its share of the channel towards a common target (LIMERIC).
+    """Adaptive approach (LIMERIC): every station adapts its share of the channel to a common target.
 
     G. Bansal, J. Kenney, C. Rohrs: LIMERIC, IEEE Transactions on Vehicular Technology 62(9), 2013; parameters as in
-    ETSI TS 102 687, 5.4. Every 200 ms: busy ratio <- 0.5 busy ratio + 0.25 (now + before); share <- (1 - alpha) share +
-    beta (target - busy ratio), the step within the gains; a message of duration T is followed by T / share.
+    ETSI TS 102 687, 5.4. Update every 200 ms, with the step limited by the gains:
+    ratio <- 0.5 ratio + 0.25 (current + previous); share <- (1 - alpha) share + beta (target - ratio).
+    The interval after a message of duration T is T / share.
     """
 
     kind: Literal["limeric"]
@@ -69,19 +70,20 @@ class Limeric(Settings):
     period: ClassVar[float] = 0.2
 
     @model_validator(mode="after")
-    def _ranges(self) -> Limeric:
+    def _check_ranges(self) -> Limeric:
         for low, high in (("share_min", "share_max"), ("interval_min", "interval_max")):
             if getattr(self, low) > getattr(self, high):
-                raise ValueError(f"{low} {getattr(self, low):g} is above {high} {getattr(self, high):g}")
+                limit = getattr(self, high)
+                raise ValueError(f"{low} must be at most {high} (got {getattr(self, low):g}, above {limit:g})")
         return self
 
     def steady_share(self, busy: float) -> float:
-        """Where the share of a station settles while the busy ratio stays what it is."""
+        """Return the steady-state share of a station at a constant channel busy ratio."""
         gain = min(max(self.beta * (self.target - busy), self.gain_down), self.gain_up)
         return min(max(gain / self.alpha, self.share_min), self.share_max)
 
     def next_share(self, share: Array, busy: Array) -> Array:
-        """The share of each station after one step, at these filtered busy ratios."""
+        """Return the share of each station after one update, at these filtered channel busy ratios."""
         gain = np.clip(self.beta * (self.target - busy), self.gain_down, self.gain_up)
         return np.clip((1.0 - self.alpha) * share + gain, self.share_min, self.share_max)
 
@@ -90,9 +92,9 @@ CongestionControl = Annotated[NoDcc | ReactiveDcc | Limeric, Field(discriminator
 
 
 class DccGate:
-    """The least interval between two messages of each of N stations.
+    """DCC gate: minimum interval between two messages of each of N stations.
 
-    background  busy ratio by traffic that is not simulated; stations begin as if they had long been in it alone
+    background  channel busy ratio of traffic that is not simulated; stations start in its steady state
     """
 
     def __init__(self, control: NoDcc | ReactiveDcc | Limeric, count: int, background: float = 0.0) -> None:
@@ -104,8 +106,8 @@ class DccGate:
         alone = np.full(count, background)
         self.reactive = control.interval_at(alone) if isinstance(control, ReactiveDcc) else np.zeros(count)
 
-    def measured(self, busy: Array) -> None:
-        """The busy ratios (N,) of the last period of the control, by simulated stations."""
+    def update(self, busy: Array) -> None:
+        """Update with the channel busy ratios (N,) of the last period, caused by simulated stations."""
         busy = np.minimum(1.0, busy + self.background)
         if isinstance(self.control, ReactiveDcc):
             self.reactive = self.control.interval_at(busy)
@@ -115,22 +117,22 @@ class DccGate:
             self.share = self.control.next_share(self.share, self.filtered)
 
     def interval(self, station: int, duration: float) -> float:
-        """Least time from the start of a message of this duration to the start of the next [s]."""
+        """Return the minimum time from the start of a message of this duration to the start of the next [s]."""
         if isinstance(self.control, Limeric):
             wanted = duration / float(self.share[station])
             return min(max(wanted, self.control.interval_min), self.control.interval_max)
         return float(self.reactive[station])
 
-    def rearranged(self, rows: list[int | None]) -> DccGate:
-        """The same for other stations: each takes the state of its former row, or begins anew."""
+    def reordered(self, rows: list[int | None]) -> DccGate:
+        """Return the gate for reordered stations, each with the state of its former row or a new state."""
         gate = DccGate(self.control, len(rows), self.background)
         for row, old in enumerate(rows):
             if old is not None:
-                for mine, former in (
+                for values, former in (
                     (gate.share, self.share),
                     (gate.filtered, self.filtered),
                     (gate.before, self.before),
                     (gate.reactive, self.reactive),
                 ):
-                    mine[row] = former[old]
+                    values[row] = former[old]
         return gate

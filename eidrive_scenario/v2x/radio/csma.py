@@ -1,4 +1,4 @@
-"""Access of IEEE 802.11p: listen before talk, with a random wait after a busy medium (IEEE 802.11-2012, 9.19)."""
+"""Medium access of IEEE 802.11p: carrier sensing with random backoff (IEEE 802.11-2012, 9.19)."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
-from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.access import TOLERANCE, MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.congestion import DccGate
 
 SLOT = 13e-6
 """aSlotTime in 10 MHz [s]."""
 AIFS = 32e-6 + 6 * SLOT
 """SIFS and 6 slots: access category AC_BE in the OCB mode (IEEE 802.11-2012, table 8-106) [s]."""
-FEW = 6
-"""Up to so many stations, plain numbers are faster than arrays."""
+MAX_SCALAR = 6
+"""Maximum number of stations for scalar evaluation, which is then faster than arrays."""
 CONTENTION_WINDOW = 15
-"""aCWmin: broadcast messages wait 0 to 15 slots and are never repeated."""
+"""aCWmin: the backoff of broadcast messages is 0 to 15 slots, and they are never retransmitted."""
 
 
 class Csma(MediumAccess):
-    """A message goes out at once if the medium was free for AIFS; else after AIFS and a number of free slots.
+    """CSMA/CA: a message starts if the medium was idle for AIFS, or else after AIFS and a number of idle slots.
 
-    Whoever starts within one slot of another cannot have noticed that, and both are on the air together.
+    Stations that start within one slot of each other cannot sense each other, and their transmissions overlap.
     """
 
     def __init__(
@@ -35,11 +35,11 @@ class Csma(MediumAccess):
         super().__init__(names, queue, gate, sensing_dbm)
         self._seed = seed
         self._slots = np.full(len(names), math.nan)
-        """How many free slots the first message of each station waits for; NaN while it found no busy medium."""
+        """Remaining backoff of the first message of each station [slots]; NaN if it met no busy medium."""
         self._fixed = np.full(len(names), math.nan)
-        """Starts that no later transmission delays any more [s]."""
+        """Fixed starts, which no later transmission defers [s]; NaN if not fixed."""
         self.free_from = np.full(len(names), -math.inf)
-        """From when on each station finds the medium free, as far as is known [s]."""
+        """Time from which each station senses an idle medium, by the transmissions so far [s]."""
         self._keys = self._backoff_keys()
 
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
@@ -49,25 +49,25 @@ class Csma(MediumAccess):
             return started, dropped
         sensed = power >= self.sensing_dbm
         np.fill_diagonal(sensed, True)
-        nobody = np.full(len(self.names), math.inf)
+        no_starts = np.full(len(self.names), math.inf)
         while True:
-            starts = self.starts() if self.contending else nobody
+            starts = self.starts() if self.contending else no_starts
             row = int(np.argmin(starts)) if self.contending else 0
             start = float(starts[row])
-            if self._arrivals and self._arrivals[0].ready <= min(start, until - EARLY):
+            if self._arrivals and self._arrivals[0].ready <= min(start, until - TOLERANCE):
                 dropped += self._arrive(self._arrivals.popleft())
                 continue
-            if not start < until - EARLY:
+            if not start < until - TOLERANCE:
                 break
             self._measure(start)
             transmission = self._head[row]
             assert transmission is not None
             self._begin(row, transmission, start)
-            notice = sensed[row]
+            sensing = sensed[row]
             if transmission.gain is not None:
-                notice = power[row] + transmission.gain >= self.sensing_dbm
-                notice[row] = True
-            self._occupy(row, transmission, notice, starts)
+                sensing = power[row] + transmission.gain >= self.sensing_dbm
+                sensing[row] = True
+            self._occupy(row, transmission, sensing, starts)
             self._next(row)
             started.append(transmission)
         if math.isfinite(until):
@@ -78,25 +78,25 @@ class Csma(MediumAccess):
         return np.array([key(self._seed, "backoff", name) for name in self.names], dtype=np.uint64)
 
     def starts(self) -> Array:
-        """(N,) when the first message of each station would go on the air [s]; infinity where none waits."""
-        return self._starts_of_few() if len(self.names) <= FEW else self._starts_of_many()
+        """Return the predicted start of the first message of each station (N,) [s]; infinity for empty queues."""
+        return self._starts_scalar() if len(self.names) <= MAX_SCALAR else self._starts_array()
 
-    def _starts_of_few(self) -> Array:
-        """The same in plain numbers, one station after the other."""
+    def _starts_scalar(self) -> Array:
+        """Return `starts`, evaluated station by station."""
         free, slots, fixed = self.free_from.tolist(), self._slots.tolist(), self._fixed.tolist()
-        found = []
+        starts = []
         for row, ready in enumerate(self.ready.tolist()):
             if ready == math.inf:
-                found.append(math.inf)
+                starts.append(math.inf)
                 continue
             if math.isnan(slots[row]) and ready < free[row] + AIFS:
                 self._draw(np.array([row]))
                 slots[row] = float(self._slots[row])
             waited = ready if math.isnan(slots[row]) else max(ready, free[row]) + AIFS + slots[row] * SLOT
-            found.append(waited if math.isnan(fixed[row]) else fixed[row])
-        return np.array(found)
+            starts.append(waited if math.isnan(fixed[row]) else fixed[row])
+        return np.array(starts)
 
-    def _starts_of_many(self) -> Array:
+    def _starts_array(self) -> Array:
         met_busy = np.isnan(self._slots) & (self.ready < self.free_from + AIFS) & np.isfinite(self.ready)
         if met_busy.any():
             self._draw(np.flatnonzero(met_busy))
@@ -108,7 +108,7 @@ class Csma(MediumAccess):
         self._slots[row] = self._fixed[row] = math.nan
 
     def _occupy(self, row: int, transmission: Transmission, sensed: NDArray[np.bool_], starts: Array) -> None:
-        """Those in `sensed` find the medium busy with a message that has started; `starts` as they were before."""
+        """Mark the medium as busy for the stations in `sensed`; `starts` are the predictions before this start."""
         start, end = transmission.start, transmission.end
         self._period_busy += np.where(sensed, np.maximum(0.0, end - np.maximum(start, self.free_from)), 0.0)
         if self.contending > 1:
@@ -116,7 +116,10 @@ class Csma(MediumAccess):
         self.free_from[sensed] = np.maximum(self.free_from[sensed], end)
 
     def _count_down(self, row: int, start: float, sensed: NDArray[np.bool_], starts: Array) -> None:
-        """The others keep what is left of their slots, but for those who cannot have noticed the start yet."""
+        """Reduce the backoff of the other stations by the elapsed idle slots.
+
+        Stations that cannot have sensed the start yet keep their predicted start.
+        """
         others = sensed & np.isfinite(starts)
         others[row] = False
         unaware = others & (starts < start + SLOT)
@@ -126,12 +129,12 @@ class Csma(MediumAccess):
         self._slots[waiting] -= np.clip(counted[waiting], 0.0, self._slots[waiting])
 
     def reorder(self, rows: Sequence[int | None]) -> None:
-        self._slots, self._fixed = moved(self._slots, rows, math.nan), moved(self._fixed, rows, math.nan)
-        self.free_from = moved(self.free_from, rows, -math.inf)
+        self._slots, self._fixed = reorder_rows(self._slots, rows, math.nan), reorder_rows(self._fixed, rows, math.nan)
+        self.free_from = reorder_rows(self.free_from, rows, -math.inf)
         self._keys = self._backoff_keys()
 
     def _draw(self, rows: NDArray[np.int64]) -> None:
-        """How many free slots these stations wait for, anew for each message."""
+        """Draw the backoff of the first message of these stations [slots]."""
         heads = [self._head[row] for row in rows.tolist()]
         numbers = np.array([head.message.number for head in heads if head is not None])
         self._slots[rows] = np.floor(uniforms(self._keys[rows], numbers) * (CONTENTION_WINDOW + 1))

@@ -1,4 +1,4 @@
-"""Counts of many links at once; they go into the books of the links when somebody reads those."""
+"""Counters of many links in arrays, flushed into the counters of the links when statistics are requested."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from eidrive_scenario.v2x.statistics.links import Links
 Rows = NDArray[np.int64]
 
 _CLASSES = 41
-"""Classes of distance; the last one takes all beyond 1 km."""
+"""Number of distance classes; the last class contains all distances beyond 1 km."""
 
 
 class LinkCounterTable:
-    """For N stations, by row of sender and receiver."""
+    """Counters of the links between N stations, by row of sender and receiver."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
@@ -25,43 +25,45 @@ class LinkCounterTable:
         self._sent = np.zeros((count, count), dtype=np.int64)
         self._bytes = np.zeros((count, count), dtype=np.int64)
         self._causes = np.zeros((count, count, len(CAUSES)), dtype=np.int64)
-        self._fates = np.zeros((count, count, _CLASSES, 2), dtype=np.int64)
+        self._outcomes = np.zeros((count, count, _CLASSES, 2), dtype=np.int64)
 
     def send(self, row: int, receivers: Rows, size: int) -> None:
-        """A message of `size` bytes was said."""
+        """Count a sent message of `size` bytes."""
         self._sent[row, receivers] += 1
         self._bytes[row, receivers] += size
 
     def drop(self, row: int, receivers: Rows) -> None:
-        """A message never went on the air."""
+        """Count a message that was dropped before transmission."""
         self._causes[row, receivers, QUEUE] += 1
 
     def decide(self, senders: Rows, receivers: Rows, causes: Rows, distance: Array) -> None:
-        """Count outcomes of messages, one entry per message and receiver."""
-        link = senders * len(self.names) + receivers  # flat places: numpy counts at those ten times as fast
+        """Count outcomes of transmissions, one entry per message and receiver."""
+        link = senders * len(self.names) + receivers  # flat indices: np.add.at is ten times as fast
         np.add.at(self._causes.reshape(-1), link * len(CAUSES) + causes, 1)
         place = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
-        np.add.at(self._fates.reshape(-1), 2 * (link * _CLASSES + place) + (causes == DELIVERED), 1)
+        np.add.at(self._outcomes.reshape(-1), 2 * (link * _CLASSES + place) + (causes == DELIVERED), 1)
 
     def flush_into(self, links: Links) -> None:
-        """Carry everything over into the books, and begin anew."""
+        """Add the counts to the counters of the links and reset them."""
         senders, receivers = np.nonzero((self._sent > 0) | self._causes.any(axis=2))
-        books = [
+        counters = [
             links.counters(self.names[sender], self.names[receiver])
             for sender, receiver in zip(senders.tolist(), receivers.tolist(), strict=True)
         ]
         sent, size = (counts[senders, receivers].tolist() for counts in (self._sent, self._bytes))
-        for book, messages, length in zip(books, sent, size, strict=True):
-            book.sent += messages
-            book.bytes_sent += length
+        for counter, messages, length in zip(counters, sent, size, strict=True):
+            counter.sent += messages
+            counter.bytes_sent += length
         causes = self._causes[senders, receivers]
         causes[:, DELIVERED] = 0
-        found = np.nonzero(causes)
-        for place, code, number in zip(*(column.tolist() for column in (*found, causes[found])), strict=True):
-            books[place].count_loss(CAUSES[code], number)
-        fates = self._fates[senders, receivers]
-        where = np.nonzero(fates.any(axis=2))
-        for place, nearest, (lost, kept) in zip(*(column.tolist() for column in (*where, fates[where])), strict=True):
-            books[place].count_outcomes(nearest, lost + kept, kept)
-        for counts in (self._sent, self._bytes, self._causes, self._fates):
+        lost = np.nonzero(causes)
+        for place, code, number in zip(*(column.tolist() for column in (*lost, causes[lost])), strict=True):
+            counters[place].count_loss(CAUSES[code], number)
+        outcomes = self._outcomes[senders, receivers]
+        known = np.nonzero(outcomes.any(axis=2))
+        for place, bin_index, (losses, deliveries) in zip(
+            *(column.tolist() for column in (*known, outcomes[known])), strict=True
+        ):
+            counters[place].count_outcomes(bin_index, losses + deliveries, deliveries)
+        for counts in (self._sent, self._bytes, self._causes, self._outcomes):
             counts[...] = 0

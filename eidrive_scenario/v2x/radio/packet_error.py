@@ -1,4 +1,4 @@
-"""Packet errors by the ratio of signal to interference and noise: named curves with their sources."""
+"""Packet error curves by signal-to-interference-and-noise ratio, with their sources."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from eidrive_scenario.v2x.analytic import cv2x_mode4, ieee80211p
 
 @dataclass(frozen=True)
 class ErrorCurve:
-    """Packet error rate at ratios that rise [dB]; 1 below the first and `floor` above the last.
+    """Packet error rate at ascending ratios [dB]; 1 below the first and `floor` above the last.
 
-    size  of the packets for which it holds [bytes]; None: for all
+    size  packet size of the curve [bytes]; None: any size
     """
 
     ratios: tuple[float, ...]
@@ -27,9 +27,9 @@ class ErrorCurve:
     floor: float = 0.0
 
     def at(self, ratio_db: Array, size: float | Array) -> Array:
-        """Packet error rate of packets of `size` [bytes], broadcast.
+        """Return the packet error rate of packets of `size` [bytes], broadcast.
 
-        Other sizes than the curve's: 1 - (1 - PER)^(size / curve's size), as if the bytes failed independently.
+        Sizes other than that of the curve assume independent byte errors: 1 - (1 - PER)^(size / size of the curve).
         """
         errors = np.interp(ratio_db, self.ratios, self.errors, left=1.0, right=self.floor)
         if self.size is None:
@@ -38,7 +38,7 @@ class ErrorCurve:
         return scaled
 
     def of(self, ratio_db: float, size: float) -> float:
-        """The same for one packet."""
+        """Return the packet error rate of one packet."""
         if ratio_db < self.ratios[0]:
             error = 1.0
         elif ratio_db > self.ratios[-1]:
@@ -49,7 +49,7 @@ class ErrorCurve:
 
 
 def interpolated(x: float, places: Sequence[float], values: Sequence[float]) -> float:
-    """`numpy.interp` of one number: straight lines between places that rise, constant beyond their ends."""
+    """Return `numpy.interp` of one number: linear between ascending places, constant beyond their ends."""
     after = bisect_right(places, x)
     if after == 0:
         return values[0]
@@ -64,16 +64,16 @@ _GOUBET_RATIOS, _GOUBET_ERRORS = ieee80211p.FRAME_ERRORS
 
 _FREE_DISTANCE = 10
 _BIT_ERROR_WEIGHTS = (36, 211, 1404, 11633, 77433, 502690, 3322763, 21292910, 134365911)
-"""Of the convolutional code (133, 171) of rate 1/2, at Hamming distances 10, 12, …, 26 (P. Frenger et al., 1999)."""
+"""Weights of the convolutional code (133, 171) of rate 1/2 at Hamming distances 10 to 26 (P. Frenger et al., 1999)."""
 _NIST_SIZE = 100
 _NIST_RATIOS = tuple(round(3.0 + 0.05 * place, 2) for place in range(181))
 
 
 def nist_qpsk_errors(ratio_db: float, size: int) -> float:
-    """Packet error rate of QPSK with rate 1/2 (6 Mbit/s in 10 MHz) in white noise, for packets of `size` bytes.
+    """Return the packet error rate of QPSK with rate 1/2 (6 Mbit/s in 10 MHz) in white noise, for `size` in bytes.
 
     NIST model of ns-3 (G. Pei, T. Henderson: Validation of OFDM error rate model in ns-3, 2010): Chernoff and union
-    bound of the bit errors behind a Viterbi decoder with hard decisions, and bits that fail independently.
+    bound of the bit errors of a Viterbi decoder with hard decisions; bit errors are independent.
     """
     ratio = 10.0 ** (ratio_db / 10.0)
     raw = 0.5 * math.erfc(math.sqrt(ratio / 2.0))

@@ -1,4 +1,4 @@
-"""The settings of a radio."""
+"""Settings of the radio channel."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from eidrive_scenario.v2x.radio_environment import LOS
 
 Technology = Literal["80211p", "cv2x_mode4"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]
-"""Power at a receiver [dBm]."""
+"""Received power [dBm]."""
 Background = Annotated[Ieee80211pLoss | Cv2xMode4Loss, Field(discriminator="kind")]
 
 _SENSING = {"80211p": -85.0, "cv2x_mode4": -90.5}
@@ -33,12 +33,14 @@ _CURVES = {
     "cv2x_mode4": ("cv2x_r0.7",) * 3,
 }
 _IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu"}}
-"""What has no meaning to each technology."""
+"""Settings without effect, by technology."""
 
 
 class PacketErrors(Settings):
-    """Names of curves of packet errors by what stands between the antennas; `eidrive_scenario.v2x.radio.packet_error`
-    has them with their sources."""
+    """Names of packet error curves by line-of-sight state.
+
+    `eidrive_scenario.v2x.radio.packet_error` lists the curves with their sources.
+    """
 
     los: str
     nlosv: str
@@ -48,26 +50,28 @@ class PacketErrors(Settings):
     def _known(self) -> PacketErrors:
         for name in (self.los, self.nlosv, self.nlos):
             if name not in CURVES:
-                raise ValueError(f"no curve of packet errors {name!r}; {suggestion(name, CURVES)}")
+                raise ValueError(f"unknown packet error curve {name!r}; {suggestion(name, CURVES)}")
         return self
 
 
 class RadioProfile(ComposedProfile):
-    """A radio channel; `delay` and `loss` come on top of what the radio does.
+    """Settings of a radio channel; `delay` and `loss` apply in addition to the radio model.
 
-    technology     80211p (listen before talk) or cv2x_mode4 (resources kept for some messages)
+    technology     80211p (carrier sensing) or cv2x_mode4 (semi-persistent scheduling)
     frequency_ghz, tx_power_dbm, antenna_gain_dbi   carrier, transmitter, and gain of each of the two antennas
-    noise_dbm      in 10 MHz;  sensing_dbm  least power that is noticed, None is the technology's (-85, -90.5 dBm)
-    path_loss      which model, and its settings
-    line_of_sight  `rays` through the world, `random` after the probabilities of TR 37.885, `clear`
-    shadowing_db   standard deviation, None is the model's, 0 is no shadowing;  decorrelation  its distance [m]
-    fading         of each message at each receiver around the link budget
-    packet_errors  name of one curve, or a mapping from los, nlosv and nlos to one each; None is the technology's
-    data_rate_mbps of 802.11p;  mtu  largest frame [bytes]
-    jitter         from the tick to the moment when a message is ready: evenly up to this, anew for each message [s]
-    sidelink       resources of C-V2X Mode 4
-    queue          what waits at a sender;  congestion  control of the message rate
-    background     traffic that is not simulated, by one of the analytic models
+    noise_dbm      noise in 10 MHz [dBm];  sensing_dbm  minimum sensed power, None: that of the technology (-85 or
+                   -90.5 dBm)
+    path_loss      path loss model and its settings
+    line_of_sight  `rays` through the world, `random` by the probabilities of TR 37.885, `clear`
+    shadowing_db   standard deviation; None: that of the path loss model, 0: no shadowing
+    decorrelation  decorrelation distance of the shadowing [m]
+    fading         fading of each message at each receiver, relative to the link budget
+    packet_errors  name of one curve, or a mapping from los, nlosv and nlos to one each; None: that of the technology
+    data_rate_mbps data rate of 802.11p;  mtu  maximum frame size [bytes]
+    jitter         maximum of the uniform random time from the tick until a message is ready [s]
+    sidelink       resource pool and selection of C-V2X Mode 4
+    queue          transmit queue;  congestion  congestion control
+    background     background traffic that is not simulated, by one of the analytic models
     """
 
     model: Literal["radio"] = "radio"  # type: ignore[assignment]
@@ -93,45 +97,47 @@ class RadioProfile(ComposedProfile):
 
     @model_validator(mode="before")
     @classmethod
-    def _one_curve_for_all(cls, data: Any) -> Any:
+    def _expand_curve_name(cls, data: Any) -> Any:
         if isinstance(data, dict) and isinstance(data.get("packet_errors"), str):
             name = data["packet_errors"]
             return {**data, "packet_errors": {"los": name, "nlosv": name, "nlos": name}}
         return data
 
     @model_validator(mode="after")
-    def _fits(self) -> RadioProfile:
+    def _check_combination(self) -> RadioProfile:
         if self.data_rate_mbps not in BITS_PER_SYMBOL:
             rates = ", ".join(f"{rate:g}" for rate in BITS_PER_SYMBOL)
-            raise ValueError(f"data_rate_mbps is {self.data_rate_mbps:g}; known: {rates}")
+            raise ValueError(f"data_rate_mbps is not supported (got {self.data_rate_mbps:g}; expected one of {rates})")
         if self.own_perception:
-            raise ValueError("own_perception does not go with a radio: nobody hears its own antenna")
+            raise ValueError(
+                "own_perception has no effect with model radio (a station cannot receive its own messages)"
+            )
         if self.background is not None and self.background.kind != self.technology:
-            raise ValueError(f"the background is {self.background.kind}, the technology {self.technology}")
+            raise ValueError(f"background.kind must be {self.technology}, as technology (got {self.background.kind})")
         idle = self.model_fields_set & _IDLE[self.technology]
         if idle:
-            raise ValueError(f"{min(idle)} means nothing to {self.technology}")
+            raise ValueError(f"{min(idle)} has no effect with technology {self.technology}")
         return self
 
     @property
     def sensing(self) -> float:
-        """Least power that is noticed [dBm]."""
+        """Minimum sensed power [dBm]."""
         return _SENSING[self.technology] if self.sensing_dbm is None else self.sensing_dbm
 
     @property
     def noise(self) -> float:
-        """In the band of a message [dBm]; with C-V2X, of one in a single subchannel: 10 of 50 resource blocks."""
+        """Noise in the band of a message [dBm]; with C-V2X in one subchannel, 10 of 50 resource blocks."""
         return self.noise_in(1)
 
     def noise_in(self, width: int) -> float:
-        """In the band of a message in so many subchannels [dBm]."""
+        """Return the noise in the band of a message in `width` subchannels [dBm]."""
         if self.technology == "80211p":
             return self.noise_dbm
         return self.noise_dbm - 10.0 * float(np.log10(BLOCKS / self.sidelink.pssch_blocks(width)))
 
     @property
-    def most_subchannels(self) -> int:
-        """How many a message can take; 802.11p knows only one."""
+    def max_subchannels(self) -> int:
+        """Maximum number of subchannels of a message; 1 with 802.11p."""
         return 1 if self.technology == "80211p" else self.sidelink.subchannels
 
     @property
@@ -141,24 +147,24 @@ class RadioProfile(ComposedProfile):
 
     @property
     def curves(self) -> tuple[ErrorCurve, ErrorCurve, ErrorCurve]:
-        """Of packet errors with LOS, NLOSv and NLOS."""
+        """Packet error curves with LOS, NLOSv and NLOS."""
         chosen = self.packet_errors
         names = _CURVES[self.technology] if chosen is None else (chosen.los, chosen.nlosv, chosen.nlos)
         return CURVES[names[0]], CURVES[names[1]], CURVES[names[2]]
 
     def airtime(self, size: int) -> float:
-        """How long a message of `size` bytes is on the air [s]."""
+        """Return the duration of the transmission of a message of `size` bytes [s]."""
         if self.technology == "80211p":
             return ieee80211p_airtime(size, self.data_rate_mbps, self.mtu)
         return SUBFRAME * self.sidelink.extent(size)[1]
 
     def background_by_loss(self) -> tuple[ErrorTable, Array] | None:
-        """The table of the background traffic, and the open path loss at each of its distances [dB]."""
+        """Return the error table of the background traffic, and the LOS path loss at each of its distances [dB]."""
         if self.background is None:
             return None
         distance = np.arange(0.0, FARTHEST + STEP / 2.0, STEP)
         count = len(distance)
-        heights, nothing = np.full(count, 1.5), np.zeros(count, dtype=np.int64)
-        between = LinkGeometry(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), nothing)
-        open_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
-        return self.background.table(), np.maximum.accumulate(open_loss)
+        heights, no_vehicles = np.full(count, 1.5), np.zeros(count, dtype=np.int64)
+        between = LinkGeometry(distance, np.full(count, LOS), heights, heights, np.full(count, -np.inf), no_vehicles)
+        los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(count, 0.5))
+        return self.background.table(), np.maximum.accumulate(los_loss)

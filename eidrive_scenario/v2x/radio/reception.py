@@ -1,4 +1,4 @@
-"""Who receives what: for each message and station the signal, what disturbs it, and so the cause of loss."""
+"""Reception model: signal, interference and resulting cause of loss of each message at each station."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.arrays import Array, Bools
 from eidrive_scenario.v2x.analytic.table import ErrorTable
 from eidrive_scenario.v2x.counter_random import Keys, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import EARLY, Transmission
+from eidrive_scenario.v2x.radio.access import TOLERANCE, Transmission
 from eidrive_scenario.v2x.radio.budget import Budget
 from eidrive_scenario.v2x.radio.packet_error import ErrorCurve, interpolated
 
@@ -21,17 +21,17 @@ Codes = NDArray[np.int8]
 Rows = NDArray[np.int64]
 
 CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "collision", "queue")
-"""In the order in which they strike; codes in arrays are places here. `queue`: it never went on the air."""
+"""Causes of loss in order of precedence; codes in arrays are indices. `queue`: dropped before transmission."""
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, COLLISION, QUEUE = range(len(CAUSES))
-FEW = 12
-"""Up to so many receptions, plain numbers are faster than arrays."""
+MAX_SCALAR = 12
+"""Maximum number of receptions for scalar evaluation, which is then faster than arrays."""
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
-"""What traffic that is not simulated adds; signal strength is known, and so not among them."""
+"""Causes added by background traffic. Causes of signal strength are excluded, because the link budget has them."""
 
 
 @dataclass(frozen=True)
 class Receptions:
-    """T messages at N stations: code of the cause (T, N), signal to noise (T, N) [dB], and who sent (T,)."""
+    """Receptions of T messages at N stations: cause (T, N), signal-to-noise ratio (T, N) [dB], sender row (T,)."""
 
     causes: Codes
     snr: Array
@@ -40,12 +40,13 @@ class Receptions:
 
 @dataclass(frozen=True)
 class Receiver:
-    """What all receivers have in common.
+    """Parameters common to all receivers.
 
-    noises_dbm   noise in the band of a message in 1, 2, … subchannels;  sensing_dbm  the least power that is noticed
-    curves     packet error by code of the state of the line of sight
-    locks      whether a receiver stays with the message that came first (IEEE 802.11p), deaf to those that overlap it
-    background traffic that is not simulated, and the mean path loss over distance (D,) to which its table belongs
+    noises_dbm   noise in the band of a message in 1, 2, … subchannels [dBm]
+    sensing_dbm  minimum sensed power [dBm]
+    curves       packet error curves by code of the line-of-sight state
+    locks        whether a receiver locks to the earlier of overlapping messages (IEEE 802.11p)
+    background   background traffic, and the mean path loss (D,) at the distances of its table [dB]
     """
 
     noises_dbm: Sequence[float]
@@ -57,15 +58,16 @@ class Receiver:
     def receive(
         self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
-        """What becomes of the messages in `ended`; `on_air` has all that may overlap with them, themselves included.
+        """Return the receptions of the transmissions in `ended`.
 
-        power  (N, N) at which each station (column) receives each other (row) [dBm]
-        keys   (N, N) of the links, by sender and receiver
+        on_air  all transmissions that may overlap with them, including themselves
+        power   (N, N) received power by sender (row) and receiver (column) [dBm]
+        keys    (N, N) keys of the links, by sender and receiver
         """
-        few = len(ended) * len(power) <= FEW
-        return (self._receive_few if few else self._receive_many)(ended, on_air, power, budget, keys)
+        few = len(ended) * len(power) <= MAX_SCALAR
+        return (self._receive_scalar if few else self._receive_array)(ended, on_air, power, budget, keys)
 
-    def _receive_many(
+    def _receive_array(
         self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
         rows = np.array([budget.rows[entry.message.sender] for entry in on_air], dtype=np.int64)
@@ -74,9 +76,9 @@ class Receiver:
         start, end = (np.array([getattr(entry, name) for entry in on_air]) for name in ("start", "end"))
         first = np.array([entry.first_band for entry in on_air])
         last = first + np.array([entry.bands for entry in on_air])
-        together = (start[None, :] < end[own, None] - EARLY) & (start[own, None] < end[None, :] - EARLY)
-        together[np.arange(len(own)), own] = False
-        same_band = together & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
+        overlapping = (start[None, :] < end[own, None] - TOLERANCE) & (start[own, None] < end[None, :] - TOLERANCE)
+        overlapping[np.arange(len(own)), own] = False
+        same_band = overlapping & (first[None, :] < last[own, None]) & (first[own, None] < last[None, :])
 
         senders = rows[own]
         received = power[rows]
@@ -97,7 +99,7 @@ class Receiver:
         if int(last.max() - first.min()) > 1:
             common = np.minimum(last[None, :], last[own, None]) - np.maximum(first[None, :], first[own, None])
             shares = common / (last - first)
-        interference, busy, deaf = self._together(together, same_band, shares, start, own, rows, received)
+        interference, busy, half_duplex = self._interference(overlapping, same_band, shares, start, own, rows, received)
         if same_band.any():
             disturbed = signal - 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + interference)
             causes[draws < self._errors(disturbed, states, sizes)] = COLLISION
@@ -109,15 +111,15 @@ class Receiver:
         causes[draws < lost_alone] = PROPAGATION
         causes[busy] = BUSY
         causes[signal < self.sensing_dbm] = SENSING
-        causes[deaf] = HALF_DUPLEX
+        causes[half_duplex] = HALF_DUPLEX
         if self.background is not None:
             self._add_background(causes, budget.mean_loss[senders], keys[senders], numbers)
         return Receptions(causes, snr, senders)
 
-    def _receive_few(
+    def _receive_scalar(
         self, ended: Sequence[Transmission], on_air: Sequence[Transmission], power: Array, budget: Budget, keys: Keys
     ) -> Receptions:
-        """The same in plain numbers, one reception after the other."""
+        """Return the receptions, evaluated one by one."""
         powers, links = power.tolist(), keys.tolist()
         faded = {
             id(entry): powers[budget.rows[entry.message.sender]]
@@ -129,10 +131,10 @@ class Receiver:
         senders = [budget.rows[entry.message.sender] for entry in ended]
         causes, ratios = [], []
         for entry, sender in zip(ended, senders, strict=True):
-            together = [other for other in on_air if other is not entry and _overlap(other, entry)]
-            talking = {budget.rows[other.message.sender] for other in together}
+            overlapping = [other for other in on_air if other is not entry and _overlap(other, entry)]
+            transmitting = {budget.rows[other.message.sender] for other in overlapping}
             disturbing = sorted(
-                (other for other in together if _common_share(other, entry) > 0.0),
+                (other for other in overlapping if _common_share(other, entry) > 0.0),
                 key=lambda other: budget.rows[other.message.sender],
             )
             shares = [(faded[id(other)], _common_share(other, entry)) for other in disturbing]
@@ -140,11 +142,11 @@ class Receiver:
             noise_dbm = self.noises_dbm[entry.bands - 1]
             controls = None if entry.control is None else entry.control.tolist()
             number, size = entry.message.number, entry.message.size
-            found = []
+            entry_causes = []
             for station, signal in enumerate(faded[id(entry)]):
                 curve, draw = self.curves[states[sender][station]], uniform(links[sender][station], number)
                 cause = DELIVERED
-                if station in talking:
+                if station in transmitting:
                     cause = HALF_DUPLEX
                 elif signal < self.sensing_dbm:
                     cause = SENSING
@@ -160,13 +162,13 @@ class Receiver:
                     cause = COLLISION if draw < curve.of(signal - floor, size) else DELIVERED
                 if self.background is not None:
                     cause = self._in_background(cause, mean_loss[sender][station], links[sender][station], number)
-                found.append(cause)
-            causes.append(found)
+                entry_causes.append(cause)
+            causes.append(entry_causes)
             ratios.append([signal - noise_dbm for signal in faded[id(entry)]])
         return Receptions(np.array(causes, dtype=np.int8), np.array(ratios), np.array(senders, dtype=np.int64))
 
     def _in_background(self, cause: int, mean_loss: float, link: int, number: int) -> int:
-        """`_add_background` for one reception."""
+        """Return `_add_background` for one reception."""
         losses, distances, given = self._background_lists
         distance = interpolated(mean_loss, losses, distances)
         for salt, code, probabilities in given:
@@ -177,15 +179,15 @@ class Receiver:
 
     @cached_property
     def _background_lists(self) -> tuple[list[float], list[float], list[tuple[int, int, list[float]]]]:
-        """The background's path loss, distances, and salt, code and probabilities of each cause."""
+        """Path loss and distances of the background traffic, and salt, code and probabilities of each cause."""
         assert self.background is not None
         table, loss_at = self.background
-        given = [(salt, BACKGROUND[cause], table.given[cause].tolist()) for salt, cause in _salted(table)]
+        given = [(salt, BACKGROUND[cause], table.given[cause].tolist()) for salt, cause in _salted_causes(table)]
         return loss_at.tolist(), table.distance.tolist(), given
 
-    def _together(
+    def _interference(
         self,
-        together: Bools,
+        overlapping: Bools,
         same_band: Bools,
         shares: Array | None,
         start: Array,
@@ -193,17 +195,18 @@ class Receiver:
         rows: Rows,
         received: Array,
     ) -> tuple[Array, Bools, Bools]:
-        """Of each message at each station: the interference [mW], whether the receiver is taken by an earlier message,
-        and whether it talks itself. Sums go in the order of the stations, not as a library of matrices likes it.
+        """Return interference [mW], whether the receiver is locked to an earlier message, and whether it transmits.
 
-        shares    (T, A) of the power of each interferer that falls into the band of a message; None: all of it
-        received  (A, N) power of each message on the air at each station [dBm]
+        Results are (T, N). Sums follow the order of the stations, which makes them independent of the BLAS library.
+
+        shares    (T, A) share of the power of each interferer in the band of a message; None: 1
+        received  (A, N) received power of each transmission at each station [dBm]
         """
         shape = (len(own), received.shape[1])
-        interference, busy, deaf = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        interference, busy, half_duplex = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         milliwatts, sensed = 10.0 ** (received / 10.0), received >= self.sensing_dbm
-        for place in np.flatnonzero(together.any(axis=1)).tolist():
-            deaf[place, rows[together[place]]] = True
+        for place in np.flatnonzero(overlapping.any(axis=1)).tolist():
+            half_duplex[place, rows[overlapping[place]]] = True
             others = np.flatnonzero(same_band[place])
             if len(others):
                 others = others[np.argsort(rows[others], kind="stable")]
@@ -214,7 +217,7 @@ class Receiver:
                 if self.locks:
                     earlier = others[start[others] < start[own[place]]]
                     busy[place] = sensed[earlier].any(axis=0)
-        return interference, busy, deaf
+        return interference, busy, half_duplex
 
     def _errors(self, ratio: Array, states: NDArray[np.int64], sizes: Array) -> Array:
         lowest, highest = int(states.min()), int(states.max())
@@ -223,10 +226,10 @@ class Receiver:
         return np.choose(states, [curve.at(ratio, sizes) for curve in self.curves])
 
     def _add_background(self, causes: Codes, mean_loss: Array, keys: Keys, numbers: NDArray[np.int64]) -> None:
-        """Losses by vehicles that are not simulated, at the distance at which their model has this path loss."""
+        """Add losses by background traffic, at the distance where its model has this path loss."""
         assert self.background is not None
         table, loss_at = self.background
-        given = _salted(table)
+        given = _salted_causes(table)
         distance = np.interp(mean_loss, loss_at, table.distance)
         salts = np.array([salt for salt, _ in given], dtype=np.uint64)
         draws = uniforms(keys + salts[:, None, None], numbers)
@@ -236,16 +239,16 @@ class Receiver:
             causes[(own < probability) & ((causes == DELIVERED) | (causes > code))] = code
 
 
-def _salted(table: ErrorTable) -> list[tuple[int, str]]:
-    """The causes that background traffic adds, each with what tells its draws from others of the link."""
+def _salted_causes(table: ErrorTable) -> list[tuple[int, str]]:
+    """Return the causes of background traffic, each with the salt of its random numbers."""
     return [(salt, cause) for salt, cause in enumerate(BACKGROUND, start=1) if cause in table.given]
 
 
 def _overlap(first: Transmission, second: Transmission) -> bool:
-    return first.start < second.end - EARLY and second.start < first.end - EARLY
+    return first.start < second.end - TOLERANCE and second.start < first.end - TOLERANCE
 
 
 def _common_share(interferer: Transmission, entry: Transmission) -> float:
-    """The share of the power of an interferer that falls into the band of a message."""
+    """Return the share of the power of an interferer in the band of a message."""
     last = min(interferer.first_band + interferer.bands, entry.first_band + entry.bands)
     return max(0, last - max(interferer.first_band, entry.first_band)) / interferer.bands

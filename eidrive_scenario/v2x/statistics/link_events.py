@@ -1,4 +1,4 @@
-"""What became of the messages of one tick: a sequence of events, which are made when somebody looks at them."""
+"""Outcomes of the transmissions of one tick: a sequence whose events are created on first access."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Places = NDArray[np.int64]
 
 
 class OutcomeColumns(NamedTuple):
-    """E fates of messages in columns, each as the attribute of LinkEvent with that name says.
+    """Outcomes of E transmissions in columns, named after the attributes of `LinkEvent`.
 
-    names      of stations;  senders, receivers   (E,) places in `names`
-    outcomes   (outcome, reason);  outcome   (E,) places in `outcomes`
-    number, size   (E,);  sent, arrives   (E,) [s]; what is lost arrives at infinity
+    names      names of stations;  senders, receivers   (E,) indices into `names`
+    outcomes   pairs of outcome and reason;  outcome   (E,) indices into `outcomes`
+    number, size   (E,);  sent, arrives   (E,) [s]; `arrives` is infinity for lost messages
     """
 
     names: tuple[str, ...]
@@ -45,20 +45,20 @@ class OutcomeBlock(ABC):
 
     @abstractmethod
     def columns(self) -> OutcomeColumns:
-        """The same in arrays, in the same order."""
+        """Return the outcomes as arrays, in the order of iteration."""
 
 
 class LinkEvents(Sequence[LinkEvent]):
-    """Events of which most are made at the first look; what works on arrays need not look.
+    """Sequence of events that are created on first access. Code that works on arrays reads `parts` instead.
 
-    It is equal to any tuple, list or LinkEvents of the same events in the same order. A channel may as well return a
-    plain list of events: whoever reads `parts` takes any other sequence as the only part.
+    It is equal to any tuple, list or LinkEvents of the same events in the same order. A channel may also return a
+    plain list of events, which is then the only part.
     """
 
     def __init__(self, parts: Iterable[Sequence[LinkEvent] | OutcomeBlock]) -> None:
         self.parts: tuple[Sequence[LinkEvent] | OutcomeBlock, ...] = tuple(part for part in parts if len(part))
         self._number = sum(map(len, self.parts))
-        self._made: tuple[LinkEvent, ...] | None = None
+        self._created: tuple[LinkEvent, ...] | None = None
 
     def __len__(self) -> int:
         return self._number
@@ -85,6 +85,6 @@ class LinkEvents(Sequence[LinkEvent]):
         return f"LinkEvents({list(self._events())!r})"
 
     def _events(self) -> tuple[LinkEvent, ...]:
-        if self._made is None:
-            self._made = tuple(event for part in self.parts for event in part)
-        return self._made
+        if self._created is None:
+            self._created = tuple(event for part in self.parts for event in part)
+        return self._created

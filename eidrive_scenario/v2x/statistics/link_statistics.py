@@ -1,4 +1,4 @@
-"""The books of one link: what was sent, heard and lost, how late, and how old the newest information is."""
+"""Statistics of one link: sent, received and lost messages, delays, and age of information."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 from eidrive_scenario.v2x.statistics.reception_log import ReceptionStatistics
 
 DISTANCE_BIN = 25.0
-"""Width of the classes of distance between antennas in which receptions are counted [m]."""
+"""Width of the distance classes in which outcomes are counted [m]."""
 
 
 @dataclass(frozen=True)
 class LinkStatistics:
-    """The books of one link; sent = received + lost + in_flight at any time.
+    """Statistics of one link; sent = received + lost + in_flight at any time.
 
-    lost_by     how many were lost, by reason
-    mean_delay, max_delay  from sending to arrival, over what was received [s]; None before that
-    age         of the newest information at the receiver now, since it was said [s]
-    mean_age, p95_age, peak_age   average and 95th percentile over time, and mean over the maxima just before each
-                update, since the first arrival [s]
-    reception   (nearest distance of the class [m], messages whose outcome is known, delivered messages)
-    channel_busy_ratio  share of time in which the receiver measures a busy channel; None if the channel has none
+    lost_by     number of lost messages, by reason
+    mean_delay, max_delay  from sending to arrival of received messages [s]; None before the first reception
+    age         age of information at the receiver: time since generation of the newest received message [s]
+    mean_age, p95_age, peak_age   mean and 95th percentile over time, and mean age immediately before an update,
+                since the first reception [s]
+    reception   by distance class: lower bound [m], messages whose outcome is known, delivered messages
+    channel_busy_ratio  share of time in which the receiver measures a busy channel; None if the model has none
     """
 
     sent: int
@@ -41,7 +41,7 @@ class LinkStatistics:
     channel_busy_ratio: float | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """For `--json`: times in s, sizes in bytes."""
+        """Return the fields for `--json`: times in seconds, sizes in bytes."""
         written = asdict(self)
         written["reception"] = [
             {"from_m": nearest, "messages": messages, "delivery_ratio": delivered / messages}
@@ -52,7 +52,7 @@ class LinkStatistics:
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What is written down of one link as it is used; what was heard stands in the ReceptionLog of all links."""
+    """Counters of one link. Receptions are counted in the `ReceptionLog` of all links."""
 
     sent: int = 0
     lost: int = 0
@@ -60,39 +60,39 @@ class LinkCounters:
     lost_by: dict[str, int] = field(default_factory=dict)
     outcomes_by_distance: dict[int, int] = field(default_factory=dict)
     deliveries_by_distance: dict[int, int] = field(default_factory=dict)
-    """By class of distance: how many fates are known, and how many of them are deliveries."""
+    """Number of known outcomes and of deliveries, by distance class."""
 
     def count_loss(self, reason: str, count: int = 1) -> None:
-        """Messages were lost."""
+        """Count lost messages."""
         self.lost += count
         self.lost_by[reason] = self.lost_by.get(reason, 0) + count
 
     def count_outcome(self, distance: float, delivered: bool) -> None:
-        """The fate of a message over this distance [m] is known."""
+        """Count the outcome of a message over this distance [m]."""
         self.count_outcomes(int(distance // DISTANCE_BIN), 1, int(delivered))
 
     def count_outcomes(self, place: int, known: int, delivered: int) -> None:
-        """So many fates are known in this class of distance, and so many of them are deliveries."""
+        """Count known outcomes and deliveries in a distance class."""
         self.outcomes_by_distance[place] = self.outcomes_by_distance.get(place, 0) + known
         self.deliveries_by_distance[place] = self.deliveries_by_distance.get(place, 0) + delivered
 
     def statistics(
-        self, now: float, heard: ReceptionStatistics | None, channel_busy_ratio: float | None = None
+        self, now: float, receptions: ReceptionStatistics | None, channel_busy_ratio: float | None = None
     ) -> LinkStatistics:
-        """The books as they stand; `heard` is None where nothing was yet."""
-        received = 0 if heard is None else heard.received
+        """Return the statistics at `now` [s]; `receptions` is None before the first reception."""
+        received = 0 if receptions is None else receptions.received
         return LinkStatistics(
             sent=self.sent,
             received=received,
             lost=self.lost,
             in_flight=self.sent - received - self.lost,
             bytes_sent=self.bytes_sent,
-            mean_delay=None if heard is None else heard.delay_sum / received,
-            max_delay=None if heard is None else heard.delay_max,
-            age=None if heard is None else now - heard.newest_generation_time,
-            mean_age=None if heard is None else heard.mean_age,
-            peak_age=None if heard is None else heard.peak_age,
-            p95_age=None if heard is None else heard.p95_age,
+            mean_delay=None if receptions is None else receptions.delay_sum / received,
+            max_delay=None if receptions is None else receptions.delay_max,
+            age=None if receptions is None else now - receptions.newest_generation_time,
+            mean_age=None if receptions is None else receptions.mean_age,
+            peak_age=None if receptions is None else receptions.peak_age,
+            p95_age=None if receptions is None else receptions.p95_age,
             lost_by=dict(sorted(self.lost_by.items())),
             reception=tuple(
                 (DISTANCE_BIN * place, known, self.deliveries_by_distance[place])

@@ -1,4 +1,4 @@
-"""The links between stations: what is on its way, what has arrived, and the books kept of it."""
+"""Links between stations: messages in flight, receptions and link statistics."""
 
 from __future__ import annotations
 
@@ -14,56 +14,61 @@ __all__ = ["TIME_TOLERANCE", "LinkStatistics", "Links"]
 
 
 class Links:
-    """Holds messages back until they have arrived. The rule of causality is here and nowhere else:
+    """Queues of messages in flight. This class alone enforces causality.
 
-    a message is given out at the first call with now >= arrival and now > sending, never before, and once.
+    A message is delivered once, at the first call with now >= arrival and now > sending.
     """
 
     def __init__(self) -> None:
         self._queues: dict[str, list[Entry]] = {}
-        self._books: dict[str, dict[str, LinkCounters]] = {}
+        self._counters: dict[str, dict[str, LinkCounters]] = {}
         """By receiver and sender."""
-        self._hearings = ReceptionLog()
+        self._reception_log = ReceptionLog()
 
     def counters(self, sender: str, receiver: str) -> LinkCounters:
-        """The book of a link, opened if there is none."""
-        books = self._books.get(receiver)
-        if books is None:
-            books = self._books[receiver] = {}
-        book = books.get(sender)
-        if book is None:
-            book = books[sender] = LinkCounters()
-        return book
+        """Return the counters of a link; create them if the link is new."""
+        by_sender = self._counters.get(receiver)
+        if by_sender is None:
+            by_sender = self._counters[receiver] = {}
+        counters = by_sender.get(sender)
+        if counters is None:
+            counters = by_sender[sender] = LinkCounters()
+        return counters
 
     def enqueue_delivery(
         self, message: Message, receiver: str, now: float, delay: float, distance: float | None = None
     ) -> LinkEvent:
-        """Send a message that arrives `delay` [s] after `now`, over this distance between antennas [m]."""
+        """Send a message that arrives `delay` [s] after `now`, over this distance between antennas [m].
+
+        Raise ValueError unless the delay is a finite number of at least 0 s.
+        """
         try:
             valid = 0.0 <= delay < math.inf
         except TypeError:
             valid = False
         if not valid:
-            raise ValueError(f"the delay of a message to {receiver!r} is {delay} (expected seconds from 0 on, finite)")
+            raise ValueError(
+                f"delay of a message to {receiver!r} is invalid (got {delay}; expected at least 0 s, finite)"
+            )
         arrives = now + delay
         self.enqueue((arrives, message.sender, message.number, now, ReceivedMessage(message, arrives)), receiver)
-        book = self._enter(message, receiver)
+        counters = self._count_sent(message, receiver)
         if distance is not None:
-            book.count_outcome(distance, True)
+            counters.count_outcome(distance, True)
         return LinkEvent(message.sender, receiver, message.number, now, "delivered", arrives, "", message.size)
 
     def record_loss(
         self, message: Message, receiver: str, now: float, reason: str, distance: float | None = None
     ) -> LinkEvent:
-        """Send a message that never arrives."""
-        book = self._enter(message, receiver)
-        book.count_loss(reason)
+        """Send a message that is lost for this reason."""
+        counters = self._count_sent(message, receiver)
+        counters.count_loss(reason)
         if distance is not None:
-            book.count_outcome(distance, False)
+            counters.count_outcome(distance, False)
         return LinkEvent(message.sender, receiver, message.number, now, "lost", None, reason, message.size)
 
     def enqueue(self, entry: Entry, *receivers: str) -> None:
-        """Put a message on its way whose sending is in the books."""
+        """Add a message in flight that is already counted as sent."""
         queues = self._queues
         for receiver in receivers:
             if receiver in queues:
@@ -71,14 +76,14 @@ class Links:
             else:
                 queues[receiver] = [entry]
 
-    def _enter(self, message: Message, receiver: str) -> LinkCounters:
-        book = self.counters(message.sender, receiver)
-        book.sent += 1
-        book.bytes_sent += message.size
-        return book
+    def _count_sent(self, message: Message, receiver: str) -> LinkCounters:
+        counters = self.counters(message.sender, receiver)
+        counters.sent += 1
+        counters.bytes_sent += message.size
+        return counters
 
     def deliver(self, receiver: str, now: float) -> tuple[ReceivedMessage, ...]:
-        """What has arrived by `now`, each message once, in order of arrival, then of sender and number."""
+        """Return messages that have arrived by `now`, each once, by time of arrival, sender and number."""
         queue = self._queues.get(receiver)
         if not queue:
             return ()
@@ -91,26 +96,26 @@ class Links:
         else:
             queue[:] = [entry for entry in queue if entry[0] > latest or entry[3] > oldest]
         due.sort()
-        self._hearings.record(receiver, due)
+        self._reception_log.record(receiver, due)
         return tuple([entry[4] for entry in due])
 
     def in_flight(self) -> int:
-        """How many messages are on their way, over all links."""
+        """Return the number of messages in flight on all links."""
         return sum(len(queue) for queue in self._queues.values())
 
     def statistics(
         self, now: float, channel_busy_ratio: Callable[[str], float | None] = lambda station: None
     ) -> dict[tuple[str, str], LinkStatistics]:
-        """The books of every link, by (sender, receiver), at `now` [s], in alphabetical order.
+        """Return the statistics of every link at `now` [s], by (sender, receiver) in alphabetical order.
 
-        `channel_busy_ratio` says how busy a station found the channel.
+        `channel_busy_ratio` returns the channel busy ratio that a station measures.
         """
-        heard = self._hearings.statistics_by_link(now)
-        links = sorted((sender, receiver) for receiver, books in self._books.items() for sender in books)
-        busy = {receiver: channel_busy_ratio(receiver) for receiver in self._books}
+        receptions = self._reception_log.statistics_by_link(now)
+        links = sorted((sender, receiver) for receiver, senders in self._counters.items() for sender in senders)
+        busy = {receiver: channel_busy_ratio(receiver) for receiver in self._counters}
         return {
-            (sender, receiver): self._books[receiver][sender].statistics(
-                now, heard.get((sender, receiver)), busy[receiver]
+            (sender, receiver): self._counters[receiver][sender].statistics(
+                now, receptions.get((sender, receiver)), busy[receiver]
             )
             for sender, receiver in links
         }

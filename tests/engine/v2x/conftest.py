@@ -1,4 +1,4 @@
-"""Lets the tests of the channels share their stations."""
+"""Import path of the modules that channel tests share."""
 
 from __future__ import annotations
 

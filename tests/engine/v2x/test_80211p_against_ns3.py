@@ -1,4 +1,4 @@
-"""IEEE 802.11p on the simulated medium against ns-3: broadcast PDR over distance, without and with Nakagami fading."""
+"""Comparison of simulated IEEE 802.11p with ns-3: broadcast PDR over distance, without and with Nakagami fading."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from radio_talk import message, radio
+from radio_traffic import message, radio
 
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
@@ -32,7 +32,7 @@ MESSAGES, DT = 3000, 0.02
 
 
 def delivery_ratio(fading: str, distances: list[float], packet_errors: str) -> NDArray[np.float64]:
-    """PDR of one sender at receivers in these distances [m]; 36 bytes of headers come on top of the payload."""
+    """Return the PDR of one sender at these distances [m]; headers add 36 bytes to the payload."""
     carrier = radio(1, **PROFILE, fading=FADING[fading], packet_errors=packet_errors)
     places = {"sender": (0.0, 0.0, 1.5), **{f"{meters:04.0f}": (meters, 0.0, 1.5) for meters in distances}}
     receivers = [name for name in places if name != "sender"]
@@ -46,13 +46,13 @@ def delivery_ratio(fading: str, distances: list[float], packet_errors: str) -> N
 
 
 def reach(distances: list[float], ratios: NDArray[np.float64], level: float) -> float:
-    """Distance at which the PDR falls to `level` [m]."""
+    """Return the distance at which the PDR falls to `level` [m]."""
     return float(np.interp(-level, -np.asarray(ratios), distances))
 
 
 @pytest.mark.parametrize("fading", FADING)
-def test_80211p_broadcasts_reach_as_far_as_in_ns3(fading: str) -> None:
-    """With the same model of packet errors: PDR within 0.03, distances of 90, 50 and 10 % within 5 %."""
+def test_80211p_delivery_ratio_over_distance_agrees_with_ns3(fading: str) -> None:
+    """With equal packet error models: PDR within 0.03, distances of 90, 50 and 10 % within 5 %."""
     table = NS3[fading]
     ratios = delivery_ratio(fading, table["distance_m"], "80211p_nist")
     assert ratios == pytest.approx(np.array(table["pdr"]), abs=0.03)
@@ -62,9 +62,11 @@ def test_80211p_broadcasts_reach_as_far_as_in_ns3(fading: str) -> None:
 
 
 @pytest.mark.parametrize("fading", FADING)
-def test_measured_packet_errors_reach_farther_than_ns3_by_their_lower_ratio(fading: str) -> None:
-    """The default curve (WiLabV2Xsim, soft decisions) has half of the errors at 1.08 dB, NIST's at 5.99 dB with 336
-    bytes: at an exponent of 2.5 that is a factor of 10^(4.91 / 25) = 1.57 in the distance of 50 %."""
+def test_80211p_range_with_default_curve_exceeds_ns3_by_the_snr_difference(fading: str) -> None:
+    """The error rate is 50 % at 1.08 dB with the default curve (WiLabV2Xsim, soft decisions), at 5.99 dB with NIST.
+
+    For 336 bytes and an exponent of 2.5 this is a factor of 10^(4.91 / 25) = 1.57 in the distance of 50 %.
+    """
     distances = [float(meters) for meters in range(100, 1500, 25)]
     expected = reach(NS3[fading]["distance_m"], np.array(NS3[fading]["pdr"]), 0.5) * 10.0 ** (4.91 / 25.0)
     ratios = delivery_ratio(fading, distances, "80211p_highway_los")

@@ -1,4 +1,4 @@
-"""Both analytic models against golden numbers, and what must hold whatever the numbers are."""
+"""Analytic models: comparison with reference values, and general properties."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 
 
 @pytest.mark.parametrize("golden", GOLDEN["ieee80211p"], ids=lambda g: f"{g['veh_per_m']}-{g['rate_hz']}-{g['bytes']}")
-def test_802_11p_gives_the_golden_curves(golden: dict[str, Any]) -> None:
+def test_ieee80211p_errors_equal_reference_curves(golden: dict[str, Any]) -> None:
     table = ieee80211p_errors(
         DISTANCE,
         density=golden["veh_per_m"],
@@ -38,7 +38,7 @@ def test_802_11p_gives_the_golden_curves(golden: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("golden", GOLDEN["cv2x_mode4"], ids=lambda g: f"{g['veh_per_m']}-{g['rate_hz']}")
-def test_c_v2x_mode_4_gives_the_golden_curves(golden: dict[str, Any]) -> None:
+def test_cv2x_mode4_errors_equal_reference_curves(golden: dict[str, Any]) -> None:
     table = cv2x_mode4_errors(
         DISTANCE,
         density=golden["veh_per_m"],
@@ -54,7 +54,7 @@ def test_c_v2x_mode_4_gives_the_golden_curves(golden: dict[str, Any]) -> None:
             assert table.errors[cause] == pytest.approx(golden[key], abs=TOLERANCE), cause
 
 
-def test_more_vehicles_cost_delivery_at_every_distance() -> None:
+def test_delivery_ratio_falls_with_density_at_every_distance() -> None:
     sparse, dense = (Ieee80211pLoss(kind="80211p", density=density).table() for density in (0.03, 0.12))
     assert np.all(dense.delivery_ratio <= sparse.delivery_ratio)
     assert dense.channel_busy_ratio > sparse.channel_busy_ratio
@@ -76,7 +76,7 @@ def test_more_vehicles_cost_delivery_at_every_distance() -> None:
     ],
     ids=str,
 )
-def test_whatever_the_models_take_they_give_probabilities(settings: dict[str, Any]) -> None:
+def test_analytic_models_return_probabilities_over_their_range(settings: dict[str, Any]) -> None:
     model = Ieee80211pLoss if settings["kind"] == "80211p" else Cv2xMode4Loss
     table = model.model_validate(settings).table()
     assert 0.0 <= table.channel_busy_ratio <= 0.85
@@ -85,41 +85,43 @@ def test_whatever_the_models_take_they_give_probabilities(settings: dict[str, An
         assert probability.max() <= 1.0 + 1e-9
 
 
-def test_more_than_the_models_can_tell_of_is_refused() -> None:
-    """The fit of the busy ratio of 802.11p turns down at 0.913 / (2 · 0.2481) times the channel: 0.3 cars per meter, 25
-    messages a second and 2.08 ms for each, over the 584 m in which one is sensed, are 9.1. Mode 4 needs a fifth to
-    choose from."""
-    with pytest.raises(ValueError, match=r"need 9\.1\d* times the time there is; the model holds up to 1.84: lower"):
+def test_analytic_models_beyond_their_range_raise() -> None:
+    """The fit of 802.11p decreases beyond an offered load of 0.913 / (2 · 0.2481).
+
+    Mode 4 requires a fifth of the resources as candidates. 0.3 cars per meter, 25 messages per second of 2.08 ms each,
+    sensed over 584 m, are an offered load of 9.1.
+    """
+    with pytest.raises(ValueError, match=r"offered load .*\(got 9\.1\d*; expected at most 1.84\)"):
         Ieee80211pLoss(kind="80211p", density=0.3, rate=25, size=1500)
-    with pytest.raises(ValueError, match=r"keep 0.8\d* of the resources, and the model holds while 0.2 are left"):
+    with pytest.raises(ValueError, match=r"reserved share .*\(got 0.8\d*; expected at most 0.8\)"):
         Cv2xMode4Loss(kind="cv2x_mode4", density=0.23, rate=25)
 
 
-def test_causes_share_the_draw_in_their_order() -> None:
-    """Draws spread evenly over (0, 1) meet each cause as often as the table says, and none as often as it delivers."""
+def test_error_table_cause_has_the_probabilities_of_the_table() -> None:
+    """Equidistant draws over (0, 1) select each cause, and delivery, with its probability."""
     table = Ieee80211pLoss(kind="80211p", density=0.12, rate=25, size=500).table()
     draws = (np.arange(20000) + 0.5) / 20000
-    met = [table.cause(150.0, float(draw)) for draw in draws]
+    causes = [table.cause(150.0, float(draw)) for draw in draws]
     place = list(table.distance).index(150.0)
     for cause, probability in table.errors.items():
-        assert met.count(cause) / 20000 == pytest.approx(probability[place], abs=1e-4)
-    assert met.count(None) / 20000 == pytest.approx(table.delivery_ratio[place], abs=1e-4)
+        assert causes.count(cause) / 20000 == pytest.approx(probability[place], abs=1e-4)
+    assert causes.count(None) / 20000 == pytest.approx(table.delivery_ratio[place], abs=1e-4)
     assert table.cause(5000.0, 0.999) == "sensing"
 
 
-def test_airtime_of_the_model() -> None:
+def test_airtime_of_the_analytic_model() -> None:
     """40 µs and (B + 30) bytes at 6 Mbit/s: 220 · 8 / 6 = 293.33 µs."""
     assert airtime(190, 6e6) == pytest.approx(333.333e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("power", [-31.0, 51.0, 1000.0, 1e308])
 @pytest.mark.parametrize("kind", ["80211p", "cv2x_mode4"])
-def test_model_with_power_beyond_that_of_the_radio_is_refused(kind: str, power: float) -> None:
+def test_analytic_loss_with_power_out_of_range_raises(kind: str, power: float) -> None:
     model = Ieee80211pLoss if kind == "80211p" else Cv2xMode4Loss
     with pytest.raises(SettingError, match="'power_dbm'"):
         parse_settings(model, {"kind": kind, "density": 0.06, "power_dbm": power})
 
 
-def test_model_of_cv2x_with_more_packets_than_subframes_is_refused() -> None:
+def test_cv2x_mode4_loss_with_more_packets_than_subframes_raises() -> None:
     with pytest.raises(SettingError, match="'rate' is 1001"):
         parse_settings(Cv2xMode4Loss, {"kind": "cv2x_mode4", "density": 0.06, "rate": 1001})

@@ -1,4 +1,4 @@
-"""Encoded messages, with a tiny module of our own."""
+"""ASN.1 encoding of messages, with a small test module."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def message(kind: str, count: int, x: float = 10.0) -> Message:
     return Message("Ego", 4, 2.0, state, seen, 0, kind, tuple(range(7, 7 + count)))  # type: ignore[arg-type]
 
 
-def test_a_cpm_says_what_is_in_it_in_the_frame_of_the_sender() -> None:
-    """Heading along y: an object 15 m further along y is 15 m ahead, and moves ahead with 3 m/s."""
+def test_encoder_writes_cpm_objects_in_the_frame_of_the_sender() -> None:
+    """With heading along y, an object 15 m further along y is 15 m ahead and moves ahead at 3 m/s."""
     encoder = Asn1Encoder([TINY], ["cpm"])
     decoded = encoder.decode("cpm", encoder.encode(message("cpm", 2)))
     assert decoded["header"]["messageID"] == 14
@@ -42,7 +42,7 @@ def test_a_cpm_says_what_is_in_it_in_the_frame_of_the_sender() -> None:
     assert first["xSpeed"]["value"] == 300
 
 
-def test_a_cam_says_where_its_sender_is() -> None:
+def test_encoder_writes_cam_with_position_and_speed_of_the_sender() -> None:
     encoder = Asn1Encoder([TINY], ["cam"])
     short, long = (encoder.encode(message("cam", 1), low_frequency=low) for low in (False, True))
     assert len(long) > len(short)
@@ -55,34 +55,34 @@ def test_a_cam_says_where_its_sender_is() -> None:
     assert fast["speed"]["speedValue"] == 800
 
 
-def test_a_roadside_unit_says_that_it_is_one_and_neither_speed_nor_heading() -> None:
+def test_encoder_writes_roadside_unit_without_speed_and_heading() -> None:
     encoder = Asn1Encoder([TINY], ["cam", "cpm"], station="misc")
-    said = message("cam", 1)
-    said = replace(said, detections=replace(said.detections, classes=("misc",)))
-    cam = encoder.decode("cam", encoder.encode(said, low_frequency=True))["cam"]["camParameters"]
+    own = message("cam", 1)
+    own = replace(own, detections=replace(own.detections, classes=("misc",)))
+    cam = encoder.decode("cam", encoder.encode(own, low_frequency=True))["cam"]["camParameters"]
     assert cam["basicContainer"]["stationType"] == 15
     assert cam["highFrequencyContainer"] == ("rsuContainerHighFrequency", {})
     assert "lowFrequencyContainer" not in cam
     cpm = encoder.decode("cpm", encoder.encode(message("cpm", 1)))["cpm"]["cpmParameters"]
     assert cpm["managementContainer"]["stationType"] == 15
-    said_by = {name: cpm_value(message("cpm", 1), 0, name)["cpm"]["cpmParameters"] for name in ("misc", "truck")}
-    assert ["stationDataContainer" in parameters for parameters in said_by.values()] == [False, True]
+    by_class = {name: cpm_value(message("cpm", 1), 0, name)["cpm"]["cpmParameters"] for name in ("misc", "truck")}
+    assert ["stationDataContainer" in parameters for parameters in by_class.values()] == [False, True]
 
 
-def test_each_object_takes_its_bits() -> None:
-    """An object of the tiny module has 8 + 12 + 2 (19 + 7) + 15 + 7 bits = 94."""
+def test_encoder_uses_the_number_of_bits_of_each_object() -> None:
+    """An object of the test module has 8 + 12 + 2 (19 + 7) + 15 + 7 = 94 bits."""
     encoder = Asn1Encoder([TINY], ["cpm"])
     sizes = [len(encoder.encode(message("cpm", count))) for count in (1, 9, 17)]
     assert sizes[1] - sizes[0] == sizes[2] - sizes[1] == 94
 
 
-def test_values_beyond_the_range_of_the_field_are_cut() -> None:
+def test_encoder_limits_values_to_the_range_of_the_field() -> None:
     encoder = Asn1Encoder([TINY], ["cpm"])
     decoded = encoder.decode("cpm", encoder.encode(message("cpm", 1, x=1e5)))
     assert decoded["cpm"]["cpmParameters"]["perceivedObjectContainer"][0]["yDistance"]["value"] == -132768
 
 
-def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
+def test_encoder_with_invalid_modules_raises_with_source_and_reason(tmp_path: Path) -> None:
     place = {"source": "scenario.xosc", "line": 7}
     with pytest.raises(SettingError, match=r"scenario.xosc:7: no ASN.1 module .*gone.asn1"):
         Asn1Encoder([tmp_path / "gone.asn1"], ["cpm"], **place)  # type: ignore[arg-type]
@@ -92,14 +92,14 @@ def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
         Asn1Encoder([broken], ["cpm"], **place)  # type: ignore[arg-type]
     other = tmp_path / "other.asn1"
     other.write_text("Other DEFINITIONS ::= BEGIN CAM ::= INTEGER END")
-    with pytest.raises(SettingError, match="have no type 'CPM', which a cpm needs"):
+    with pytest.raises(SettingError, match="do not define type 'CPM', which messages of kind cpm require"):
         Asn1Encoder([other], ["cam", "cpm"], **place)  # type: ignore[arg-type]
-    with pytest.raises(SettingError, match=r"scenario.xosc:7: the ASN.1 modules take no cam: "):
+    with pytest.raises(SettingError, match=r"scenario.xosc:7: ASN.1 modules cannot encode a cam: "):
         Asn1Encoder([other], ["cam"], **place)  # type: ignore[arg-type]
-    asks_for_more = tmp_path / "more.asn1"
-    asks_for_more.write_text(TINY.read_text().replace("exteriorLights BIT", "gear INTEGER (0..7), exteriorLights BIT"))
-    with pytest.raises(SettingError, match=r"no cam: .*member 'gear' not found …; docs/channels.md"):
-        Asn1Encoder([asks_for_more], ["cam"])
+    more = tmp_path / "more.asn1"
+    more.write_text(TINY.read_text().replace("exteriorLights BIT", "gear INTEGER (0..7), exteriorLights BIT"))
+    with pytest.raises(SettingError, match=r"cannot encode a cam: .*member 'gear' not found …; docs/channels.md"):
+        Asn1Encoder([more], ["cam"])
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_wrong_modules_say_what_is_wrong(tmp_path: Path) -> None:
     ],
     ids=str,
 )
-def test_encoder_of_a_hostile_module_is_refused(tmp_path: Path, types: str) -> None:
+def test_encoder_with_hostile_module_raises(tmp_path: Path, types: str) -> None:
     path = tmp_path / "hostile.asn"
     path.write_text(f"M DEFINITIONS AUTOMATIC TAGS ::= BEGIN\n{types}\nEND\n")
     with pytest.raises(SettingError) as caught:

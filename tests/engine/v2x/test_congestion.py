@@ -1,4 +1,4 @@
-"""Congestion control: the table, and LIMERIC's fixed points."""
+"""Congestion control: reactive table, and fixed points of LIMERIC."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from eidrive_scenario.v2x.radio.congestion import DccGate, Limeric, NoDcc, React
 
 
 @pytest.mark.parametrize(("stations", "busy"), [(25, 0.4435), (50, 0.5368), (100, 0.6000), (200, 0.6375)])
-def test_limeric_settles_where_its_equation_says(stations: int, busy: float) -> None:
-    """share = 0.000816 / (0.016 + 0.0012 K), busy ratio = K share, from either end of the range of shares."""
+def test_limeric_converges_to_its_fixed_point(stations: int, busy: float) -> None:
+    """Fixed point share = 0.000816 / (0.016 + 0.0012 K), busy ratio = K share, from both ends of the range."""
     control = Limeric(kind="limeric")
     for start in (control.share_min, control.share_max):
         gate = DccGate(control, 1)
         gate.share[:] = start
         for _ in range(600):
-            gate.measured(np.minimum(1.0, stations * gate.share))
+            gate.update(np.minimum(1.0, stations * gate.share))
         assert stations * gate.share[0] == pytest.approx(busy, abs=1e-4)
         assert gate.share[0] == pytest.approx(0.000816 / (0.016 + 0.0012 * stations), rel=1e-3)
 
 
-def test_stations_begin_where_the_traffic_around_them_has_brought_them() -> None:
-    """Alone: 0.0005 / 0.016 is above the largest share. At 60 % busy: 0.0012 · 0.08 / 0.016. At 77 %: the least."""
+def test_dcc_gate_starts_in_the_steady_state_of_the_background() -> None:
+    """Idle: 0.0005 / 0.016 exceeds the maximum share. 60 % busy: 0.0012 · 0.08 / 0.016. 77 % busy: minimum."""
     limeric = Limeric(kind="limeric")
     shares = [DccGate(limeric, 1, busy).share[0] for busy in (0.0, 0.6, 0.77)]
     assert shares == pytest.approx([0.03, 0.006, 0.0006])
     for busy in (0.0, 0.6, 0.77):
         gate = DccGate(limeric, 1, busy)
         for _ in range(50):
-            gate.measured(np.zeros(1))
-        assert gate.share[0] == pytest.approx(limeric.steady_share(busy)), "nothing moves while nobody else talks"
+            gate.update(np.zeros(1))
+        assert gate.share[0] == pytest.approx(limeric.steady_share(busy)), "the background alone is a steady state"
     assert DccGate(ReactiveDcc(kind="reactive"), 1, 0.35).interval(0, 0.001) == 0.4
 
 
@@ -45,19 +45,19 @@ def test_limeric_keeps_intervals_within_their_bounds() -> None:
 @pytest.mark.parametrize(
     ("busy", "interval"), [(0.0, 0.1), (0.2, 0.1), (0.25, 0.2), (0.35, 0.4), (0.45, 0.5), (0.9, 1.0)]
 )
-def test_the_reactive_table(busy: float, interval: float) -> None:
+def test_reactive_dcc_interval_by_busy_ratio(busy: float, interval: float) -> None:
     gate = DccGate(ReactiveDcc(kind="reactive"), 2)
-    gate.measured(np.array([busy, 0.0]))
+    gate.update(np.array([busy, 0.0]))
     assert gate.interval(0, 0.001) == interval
     assert gate.interval(1, 0.001) == 0.1
 
 
-def test_without_control_nobody_waits() -> None:
+def test_no_dcc_interval_is_zero() -> None:
     assert DccGate(NoDcc(), 1).interval(0, 0.001) == 0.0
 
 
-def test_a_table_must_be_one() -> None:
-    with pytest.raises(ValueError, match="limits must rise"):
+def test_reactive_dcc_with_invalid_table_raises() -> None:
+    with pytest.raises(ValueError, match="limits must be ascending"):
         ReactiveDcc(kind="reactive", limits=(0.3, 0.2), intervals=(0.1, 0.2))
-    with pytest.raises(ValueError, match="limits must rise"):
+    with pytest.raises(ValueError, match="limits must be ascending"):
         ReactiveDcc(kind="reactive", limits=(0.3,), intervals=(0.1, 0.2))

@@ -1,11 +1,12 @@
-"""C-V2X Mode 4 on the simulated medium against the analytic model of Gonzalez-Martín et al. (IEEE TVT 2019).
+"""Comparison of simulated C-V2X Mode 4 with the analytic model of Gonzalez-Martín et al. (IEEE TVT 2019).
 
-Stations stand on a straight road of 2 km, each with 10 messages of 190 bytes per second; 600 m in its middle count.
-The medium has the assumptions of the model as settings: WINNER+ B1 with antennas of 1.5 m over an environment of 0 m,
-shadowing of 3 dB, QPSK 0.7, 20 dBm without antenna gain, detection and busy ratio from -90.5 dBm on.
+Stations on a straight road of 2 km each send 10 messages of 190 bytes per second; the middle 600 m are evaluated. The
+settings match the assumptions of the model: WINNER+ B1 with antennas of 1.5 m and an environment height of 0 m,
+shadowing of 3 dB, QPSK 0.7, 20 dBm without antenna gain, sensing and channel busy ratio from -90.5 dBm.
 
-What differs: the medium has a control channel that can fail, measures S-RSSI below -90.5 dBm too (so that stations
-avoid the resources of those whom they do not decode), and the shadowing of a link stays while both stand still.
+Differences: the control channel of the simulation can fail. The simulation also measures S-RSSI below -90.5 dBm, so
+that stations avoid resources of stations that they do not decode. The shadowing of a link of stationary stations is
+constant.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from radio_talk import message, radio
+from radio_traffic import message, radio
 
 from eidrive_scenario.v2x.radio.access import Transmission
 from eidrive_scenario.v2x.radio.events import ReceptionBlock
@@ -46,7 +47,7 @@ PROFILE: dict[str, Any] = {
 
 @dataclass
 class Counts:
-    """Of the middle of the road after the warm-up: outcomes by distance, and busy ratios, measured and counted."""
+    """Outcomes by distance and channel busy ratios, measured and counted, of the evaluated stations after warm-up."""
 
     outcomes: dict[int, Counter[str]] = field(default_factory=lambda: {distance: Counter() for distance in DISTANCES})
     channel_busy_ratio: float = 0.0
@@ -103,7 +104,7 @@ def simulate(density: float, seed: int) -> Counts:
 
 
 def occupied(sent: list[Transmission], power: Any, row: int, since: float, until: float) -> float:
-    """Share of subchannels and subframes whose total power a station can sense, where it did not transmit itself."""
+    """Return the share of resources whose total power a station can sense in subframes without own transmission."""
     total: defaultdict[tuple[int, int], float] = defaultdict(float)
     own = set()
     for entry in sent:
@@ -114,12 +115,12 @@ def occupied(sent: list[Transmission], power: Any, row: int, since: float, until
             else:
                 total[subframe, entry.first_band] += 10.0 ** (power[sender] / 10.0)
     used = sum(signal > 10.0 ** (SENSED / 10.0) for (subframe, _), signal in total.items() if subframe not in own)
-    return used / (4 * (1000 * (until - since) - len(own)))
+    return float(used) / (4 * (1000 * (until - since) - len(own)))
 
 
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("golden", GOLDEN["cv2x_mode4"], ids=lambda golden: str(golden["veh_per_m"]))
-def test_mode_4_medium_delivers_as_the_analytic_model(golden: dict[str, Any]) -> None:
+def test_mode_4_delivery_ratio_agrees_with_the_analytic_model(golden: dict[str, Any]) -> None:
     counts = simulate(golden["veh_per_m"], seed=1) + simulate(golden["veh_per_m"], seed=2)
     expected = dict(zip(GOLDEN["distance_m"], golden["pdr"], strict=True))
     for distance in DISTANCES:

@@ -1,11 +1,11 @@
-"""Fast fading: its distribution, and what it is drawn for."""
+"""Fast fading: distribution, and effect on reception and carrier sensing."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from radio_talk import message, radio, talk
+from radio_traffic import exchange, message, radio
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.propagation.fading import Nakagami
@@ -23,14 +23,14 @@ def test_nakagami_power_has_mean_1_and_variance_1_over_m(m: float) -> None:
     assert power.var() == pytest.approx(1.0 / m, rel=5e-3)
 
 
-def test_nakagami_with_m_1_is_rayleigh_fading() -> None:
+def test_nakagami_gain_with_m_1_is_rayleigh_fading() -> None:
     """The power is exponential: -ln(1 - u)."""
     gain = Nakagami(kind="nakagami", m=(1.0,)).gain_db(np.zeros(3), np.array([0.1, 0.5, 0.9]))
     assert gain == pytest.approx(10.0 * np.log10(-np.log([0.9, 0.5, 0.1])))
 
 
 def test_nakagami_shape_follows_the_distance() -> None:
-    """ns-3's default: 1.5 below 80 m, 0.75 from there on."""
+    """Default of ns-3: 1.5 below 80 m, 0.75 from 80 m."""
     fading = Nakagami(kind="nakagami", m=(1.5, 0.75), distances=(80.0,))
     one, other = (Nakagami(kind="nakagami", m=(m,)) for m in (1.5, 0.75))
     distance, draws = np.array([0.0, 79.9, 80.0, 500.0]), np.full(4, 0.1)
@@ -42,7 +42,7 @@ def test_nakagami_shape_follows_the_distance() -> None:
     "invalid",
     [{"m": 0.4}, {"m": [1, 2]}, {"m": 1, "distances": [80]}, {"m": [1, 2, 3], "distances": [200, 80]}, {}, {"m": "a"}],
 )
-def test_nakagami_settings_that_mean_nothing_are_an_error(invalid: dict[str, object]) -> None:
+def test_nakagami_invalid_settings_raise(invalid: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         RadioProfile.model_validate({"fading": {"kind": "nakagami", **invalid}})
 
@@ -64,7 +64,7 @@ def test_fading_changes_the_signal_of_each_message_and_not_the_path_loss(technol
 
 
 def test_fading_applies_to_carrier_sensing() -> None:
-    """Mean power 3 dB below the threshold: Rayleigh fading lifts e^-2 = 13.5 % of the messages above it."""
+    """With a mean power 3 dB below the threshold, Rayleigh fading lifts e^-2 = 13.5 % of the messages above it."""
     places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
     mean = 29.0 - (47.8588 + 50.0)
     carrier = radio(1, fading={"kind": "nakagami", "m": 1}, sensing_dbm=mean + 3.0103, **QUIET)
@@ -76,12 +76,12 @@ def test_fading_applies_to_carrier_sensing() -> None:
     )
 
 
-def test_fading_shifts_no_other_draw() -> None:
-    """With and without fading the shadowing and the start of each message are the same."""
+def test_fading_does_not_change_other_random_numbers() -> None:
+    """Shadowing and start of each message are equal with and without fading."""
     places = {name: (40.0 * row, 0.0, 1.5) for row, name in enumerate("ABCD")}
     path = {"kind": "tr37885"}
     runs = [
-        talk(radio(3, fading=fading, path_loss=path, sensing_dbm=-200.0), places, 30, speed=5.0)[0]
+        exchange(radio(3, fading=fading, path_loss=path, sensing_dbm=-200.0), places, 30, speed=5.0)[0]
         for fading in ({"kind": "none"}, {"kind": "nakagami", "m": 2})
     ]
     losses = [{(e.sender, e.receiver, e.number): e.path_loss_db for e in events} for events in runs]

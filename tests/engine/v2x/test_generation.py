@@ -1,4 +1,4 @@
-"""When messages are due: the triggers of CAM and CPM, worked out by hand from the standards' rules."""
+"""Generation rules of CAM and CPM, with expectations derived by hand from the standards."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def cams_at_constant_speed(speed: float, dt: float = DT) -> list[float]:
 
 @pytest.mark.parametrize(("speed", "milliseconds"), [(10, 500), (15, 300), (50, 100), (3, 1000), (0, 1000), (4.5, 900)])
 def test_cam_intervals_at_constant_speed(speed: float, milliseconds: int) -> None:
-    """(floor(4 / 0.1 v) + 1) 100 ms, from 100 to 1000: at 10 m/s, 4.0 m after 400 ms are not more than 4 m."""
+    """Closed form (floor(4 / 0.1 v) + 1) 100 ms, limited to 100 to 1000: 4.0 m at 10 m/s do not exceed 4 m."""
     expected = min(max((math.floor(4 / (0.1 * speed)) + 1) * 100, 100), 1000) if speed else 1000
     assert expected == milliseconds
     for dt in (0.05, 0.02, 0.1):
@@ -43,38 +43,38 @@ def test_cam_intervals_at_constant_speed(speed: float, milliseconds: int) -> Non
         assert set(found[1:]) == {milliseconds / 1000}, dt
 
 
-def test_a_heading_across_the_end_of_the_circle_is_a_small_change() -> None:
-    """From 179.5 to -179.5 degrees is one degree, no trigger; six degrees are one."""
+def test_cam_heading_change_across_180_degrees_is_wrapped() -> None:
+    """A change from 179.5 to -179.5 degrees is one degree and no trigger; six degrees trigger."""
     rules = CamGenerationRules()
     assert rules.is_due(state(0.0, yaw=math.radians(179.5)), 0.0)
     assert not rules.is_due(state(0.1, yaw=math.radians(-179.5)), 0.1)
     assert rules.is_due(state(0.2, yaw=math.radians(-174.5)), 0.2)
 
 
-def test_a_change_of_speed_triggers_and_half_a_meter_per_second_does_not() -> None:
+def test_cam_speed_change_triggers_above_half_a_meter_per_second() -> None:
     rules = CamGenerationRules()
     assert rules.is_due(state(0.0, speed=10.0), 0.0)
     assert not rules.is_due(state(0.1, speed=10.5), 0.1)
     assert rules.is_due(state(0.2, speed=10.51), 0.2)
 
 
-def test_no_cam_comes_sooner_than_its_shortest_interval() -> None:
+def test_cam_interval_is_at_least_the_shortest_interval() -> None:
     rules = CamGenerationRules()
     assert rules.is_due(state(0.0), 0.0)
     assert not rules.is_due(state(0.05, x=100.0), 0.05)
     assert rules.is_due(state(0.1, x=100.0), 0.1)
-    assert not rules.is_due(state(0.2, x=200.0), 0.2, shortest=0.3), "congestion control asks for more"
+    assert not rules.is_due(state(0.2, x=200.0), 0.2, shortest=0.3), "congestion control requires more"
     assert rules.is_due(state(0.4, x=200.0), 0.4, shortest=0.3)
 
 
-def test_the_interval_of_a_trigger_is_kept_for_three_cams() -> None:
-    """A jump 0.3 s after a CAM: the next three follow at 0.3 s, then it is 1 s again (N_GenCam = 3)."""
+def test_cam_interval_of_a_trigger_is_kept_for_three_messages() -> None:
+    """After a trigger at 0.3 s the next three CAMs follow at 0.3 s, then at 1 s (N_GenCam = 3)."""
     rules = CamGenerationRules()
     sent = [t / 10 for t in range(45) if rules.is_due(state(t / 10, x=5.0 if t >= 3 else 0.0), t / 10)]
     assert sent == pytest.approx([0.0, 0.3, 0.6, 0.9, 1.2, 2.2, 3.2, 4.2])
 
 
-def test_the_low_frequency_container_comes_every_half_second_at_most() -> None:
+def test_cam_low_frequency_container_is_sent_every_half_second() -> None:
     rules = CamGenerationRules()
     carried = [t / 10 for t in range(20) if rules.low_frequency(t / 10)]
     assert carried == pytest.approx([0.0, 0.5, 1.0, 1.5])
@@ -82,7 +82,7 @@ def test_the_low_frequency_container_comes_every_half_second_at_most() -> None:
 
 
 def objects(time: float, *rows: tuple[float, float, float, str], scores: tuple[float, ...] = ()) -> Detections:
-    """Rows of x, speed along x, yaw, class."""
+    """Return detections from rows of x, speed along the heading, yaw, class."""
     count = len(rows)
     boxes = np.array([[x, 10.0 * n, 0.8, 4.5, 1.8, 1.5, yaw] for n, (x, _, yaw, _) in enumerate(rows)]).reshape(-1, 7)
     velocity = np.array([[v * math.cos(yaw), v * math.sin(yaw)] for _, v, yaw, _ in rows]).reshape(-1, 2)
@@ -95,7 +95,7 @@ def run(rules: CpmGenerationRules, now: float, seen: Detections) -> CpmContents 
     return rules.contents(seen, tuple(range(len(seen))), now)
 
 
-def test_a_standing_vehicle_comes_once_a_second_and_the_sensors_too() -> None:
+def test_cpm_of_stationary_vehicle_is_sent_once_per_second_with_sensors() -> None:
     rules = CpmGenerationRules()
     found = {t / 10: run(rules, t / 10, objects(t / 10, (5.0, 0.0, 0.0, "car"))) for t in range(25)}
     sent = {time: contents for time, contents in found.items() if contents is not None}
@@ -104,7 +104,7 @@ def test_a_standing_vehicle_comes_once_a_second_and_the_sensors_too() -> None:
 
 
 @pytest.mark.parametrize(("speed", "interval"), [(10.0, 0.5), (15.0, 0.3), (45.0, 0.1)])
-def test_a_moving_vehicle_comes_when_it_has_moved_more_than_4_m(speed: float, interval: float) -> None:
+def test_cpm_includes_vehicles_that_moved_more_than_4_m(speed: float, interval: float) -> None:
     rules = CpmGenerationRules()
     times = [
         t / 10
@@ -114,7 +114,7 @@ def test_a_moving_vehicle_comes_when_it_has_moved_more_than_4_m(speed: float, in
     assert set(intervals(times)) == {interval}
 
 
-def test_speed_direction_and_newness_put_a_vehicle_into_the_next_message() -> None:
+def test_cpm_includes_new_vehicles_and_changes_of_speed_and_direction() -> None:
     rules = CpmGenerationRules()
     assert run(rules, 0.0, objects(0.0, (0.0, 5.0, math.radians(179.0), "car"))) == CpmContents((0,), True)
     assert run(rules, 0.1, objects(0.1, (0.0, 5.5, math.radians(179.0), "car"))) is None
@@ -125,76 +125,76 @@ def test_speed_direction_and_newness_put_a_vehicle_into_the_next_message() -> No
     assert run(rules, 0.5, two) == CpmContents((1,), False)
 
 
-def test_pedestrians_and_cyclists_come_all_together() -> None:
+def test_cpm_includes_all_pedestrians_and_cyclists_together() -> None:
     rules = CpmGenerationRules()
     walker, rider = (0.0, 1.0, 0.0, "pedestrian"), (9.0, 4.0, 0.0, "bicycle")
     assert run(rules, 0.0, objects(0.0, walker)) == CpmContents((0,), True)
     assert run(rules, 0.2, objects(0.2, walker)) is None
-    joined = run(rules, 0.3, objects(0.3, walker, rider))
-    assert joined is not None
-    assert sorted(joined.rows) == [0, 1]
+    both = run(rules, 0.3, objects(0.3, walker, rider))
+    assert both is not None
+    assert sorted(both.rows) == [0, 1]
     assert run(rules, 0.7, objects(0.7, walker, rider)) is None
     again = run(rules, 0.8, objects(0.8, walker, rider))
     assert again is not None
     assert sorted(again.rows) == [0, 1]
 
 
-def test_poorly_perceived_objects_are_left_out() -> None:
+def test_cpm_omits_objects_of_low_perception_quality() -> None:
     assert [quality(score) for score in (0.0, 0.2, 0.23, 0.24, 1.0)] == [0, 3, 3, 4, 15]
     seen = objects(0.0, (0.0, 0.0, 0.0, "car"), (9.0, 0.0, 0.0, "car"), scores=(0.23, 0.24))
     assert run(CpmGenerationRules(), 0.0, seen) == CpmContents((1,), True)
 
 
-def test_new_objects_come_before_those_that_have_changed_most() -> None:
+def test_cpm_sorts_new_objects_before_changed_ones() -> None:
     rules = CpmGenerationRules()
     run(rules, 0.0, objects(0.0, (0.0, 0.0, 0.0, "car"), (0.0, 0.0, 0.0, "car")))
     later = objects(0.5, (4.5, 0.0, 0.0, "car"), (8.0, 0.0, 0.0, "car"), (0.0, 0.0, 0.0, "car"))
     assert run(rules, 0.5, later) == CpmContents((2, 1, 0), False)
 
 
-def test_no_object_and_no_sensor_to_tell_of_is_no_message() -> None:
+def test_cpm_without_objects_and_sensors_is_not_sent() -> None:
     rules = CpmGenerationRules()
     assert run(rules, 0.0, Detections(0.0)) == CpmContents((), True)
     assert run(rules, 0.5, Detections(0.5)) is None
     assert run(rules, 1.0, Detections(1.0)) == CpmContents((), True)
 
 
-def test_objects_keep_their_numbers_without_a_tracker() -> None:
-    """Two cars that pass each other at 15 m/s, listed in another order each time; a third comes and goes."""
-    numbering = ObjectIdAssigner()
+def test_object_ids_without_tracker_are_constant() -> None:
+    """Two cars pass each other at 15 m/s, in alternating order of rows; a third car appears later."""
+    assigner = ObjectIdAssigner()
     for tick in range(40):
         time = tick * 0.1
-        forth, back = (-30.0 + 15.0 * time, 15.0, 0.0, "car"), (30.0 - 15.0 * time, 15.0, math.pi, "car")
-        rows = [forth, back] if tick % 2 else [back, forth]
+        forward, backward = (-30.0 + 15.0 * time, 15.0, 0.0, "car"), (30.0 - 15.0 * time, 15.0, math.pi, "car")
+        rows = [forward, backward] if tick % 2 else [backward, forward]
         seen = objects(time, *rows)
         seen.boxes[:, 1] = [0.0, 3.5] if tick % 2 else [3.5, 0.0]
-        numbers = numbering.assign_ids(seen)
+        numbers = assigner.assign_ids(seen)
         if tick == 0:
-            back_number, forth_number = numbers
-        assert numbers == ((forth_number, back_number) if tick % 2 else (back_number, forth_number))
-    assert numbering.assign_ids(objects(4.0, (500.0, 0.0, 0.0, "car"))) == (2,)
+            backward_id, forward_id = numbers
+        assert numbers == ((forward_id, backward_id) if tick % 2 else (backward_id, forward_id))
+    assert assigner.assign_ids(objects(4.0, (500.0, 0.0, 0.0, "car"))) == (2,)
 
 
-def test_numbers_of_a_tracker_are_taken_over() -> None:
+def test_object_ids_of_a_tracker_are_kept() -> None:
     seen = objects(0.0, (0.0, 0.0, 0.0, "car"), (9.0, 0.0, 0.0, "car"))
     tracked = Detections(0.0, seen.boxes, seen.scores, seen.classes, seen.velocity, seen.covariance, (7, 3))
     assert ObjectIdAssigner().assign_ids(tracked) == (7, 3)
 
 
-def test_sizes_and_what_fits_into_a_message() -> None:
+def test_objects_that_fit_are_the_maximum_below_the_mtu() -> None:
     assert cpm_size(3, 1, 100) == 121 + 4 * 35 + 100
     assert objects_that_fit(1400, 0) == 36
     assert cpm_size(36, 0) <= 1400 < cpm_size(37, 0)
     assert objects_that_fit(200, 3, 150) == 1
 
 
-def test_a_clock_moves_the_time_stamps_and_nothing_else() -> None:
+def test_station_clock_shifts_timestamps_only() -> None:
     sender, receiver = StationClock(offset=0.02, drift=1e-4), StationClock(offset=-0.01)
-    told = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121)
-    stamped = sender.with_station_timestamps(told, 100.0)
+    message = Message("A", 0, 100.0, state(100.0), Detections(99.9), 121)
+    stamped = sender.with_station_timestamps(message, 100.0)
     assert stamped.generated == 100.0
     assert stamped.state.time == pytest.approx(100.03)
     assert stamped.detections.time == pytest.approx(99.93)
-    taken = receiver.with_local_timestamps(stamped, 100.2)
-    assert taken.detections.time == pytest.approx(99.94), "30 ms from the sender, 10 ms more from the receiver"
-    assert StationClock().with_station_timestamps(told, 100.0) is told
+    local = receiver.with_local_timestamps(stamped, 100.2)
+    assert local.detections.time == pytest.approx(99.94), "30 ms by the sender, 10 ms by the receiver"
+    assert StationClock().with_station_timestamps(message, 100.0) is message

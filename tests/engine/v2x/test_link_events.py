@@ -1,4 +1,4 @@
-"""Outcomes in columns: iteration yields the same events as a plain list, with the same hash."""
+"""Outcomes in columns: equality with event lists, and trace hash."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ NAMES = [f"station {number}" for number in range(12)]
 
 
 def ticks(**profile: Any) -> list[LinkEvents]:
-    """What a radio told in each of ten ticks in which twelve stations said something; the last of them then left."""
+    """Return the events of ten ticks with messages of twelve stations; the last station leaves after seven."""
     carrier = RadioChannel(RadioProfile.model_validate(profile), 3)
-    told = []
+    collected = []
     for tick in range(10):
         now = DT * tick
         present = NAMES if tick < 7 else NAMES[:-1]
@@ -41,8 +41,8 @@ def ticks(**profile: Any) -> list[LinkEvents]:
         ]
         events = carrier.transmit(outbox, now)
         assert isinstance(events, LinkEvents)
-        told.append(events)
-    return told
+        collected.append(events)
+    return collected
 
 
 def fingerprint(links: Sequence[LinkEvent]) -> str:
@@ -65,22 +65,22 @@ PROFILES: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
-def test_columns_say_what_events_say(profile: dict[str, Any]) -> None:
+def test_columns_of_outcome_blocks_equal_their_events(profile: dict[str, Any]) -> None:
     reasons = set()
-    for told in ticks(**profile):
-        for block in told.parts:
+    for links in ticks(**profile):
+        for block in links.parts:
             if not isinstance(block, OutcomeBlock):
                 continue
-            fates, events = block.columns(), list(block)
+            columns, events = block.columns(), list(block)
             assert len(events) == len(block) > 0
-            assert [fates.names[row] for row in fates.senders.tolist()] == [event.sender for event in events]
-            assert [fates.names[row] for row in fates.receivers.tolist()] == [event.receiver for event in events]
-            outcomes = [fates.outcomes[code] for code in fates.outcome.tolist()]
+            assert [columns.names[row] for row in columns.senders.tolist()] == [event.sender for event in events]
+            assert [columns.names[row] for row in columns.receivers.tolist()] == [event.receiver for event in events]
+            outcomes = [columns.outcomes[code] for code in columns.outcome.tolist()]
             assert outcomes == [(event.outcome, event.reason) for event in events]
-            assert fates.number.tolist() == [event.number for event in events]
-            assert fates.sent.tolist() == [event.sent for event in events]
-            assert fates.size.tolist() == [event.size for event in events]
-            assert [None if arrives == np.inf else arrives for arrives in fates.arrives.tolist()] == [
+            assert columns.number.tolist() == [event.number for event in events]
+            assert columns.sent.tolist() == [event.sent for event in events]
+            assert columns.size.tolist() == [event.size for event in events]
+            assert [None if arrives == np.inf else arrives for arrives in columns.arrives.tolist()] == [
                 event.arrives for event in events
             ]
             reasons |= {event.reason for event in events}
@@ -88,29 +88,29 @@ def test_columns_say_what_events_say(profile: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
-def test_the_hash_does_not_tell_columns_from_plain_events(profile: dict[str, Any]) -> None:
-    """A channel of somebody else may return a list."""
+def test_trace_hash_of_columns_and_event_lists_is_equal(profile: dict[str, Any]) -> None:
+    """Third-party channels may return a list."""
     prints = set()
-    for told in ticks(**profile):
-        assert fingerprint(told) == fingerprint(list(told)) == fingerprint(tuple(told))
-        prints.add(fingerprint(told))
-        if len(told) > 1:
-            assert fingerprint(told[1:]) != fingerprint(told) != fingerprint(told[::-1])
+    for links in ticks(**profile):
+        assert fingerprint(links) == fingerprint(list(links)) == fingerprint(tuple(links))
+        prints.add(fingerprint(links))
+        if len(links) > 1:
+            assert fingerprint(links[1:]) != fingerprint(links) != fingerprint(links[::-1])
     assert len(prints) == 10
 
 
-def test_it_is_a_sequence_like_any_other() -> None:
-    told = ticks(queue={"length": 1}, jitter=0.2)[5]
+def test_link_events_compare_and_index_like_a_list() -> None:
+    links = ticks(queue={"length": 1}, jitter=0.2)[5]
     again = ticks(queue={"length": 1}, jitter=0.2)[5]
-    plain = list(told)
-    assert told == plain == told
-    assert told == tuple(plain)
-    assert tuple(plain) == told
-    assert told == again
-    assert hash(told) == hash(again)
-    assert told != plain[1:]
-    assert told != ticks(queue={"length": 1}, jitter=0.2)[4]
-    assert told[0] is told[0]
-    assert told[-1] == plain[-1]
-    assert list(told[2:4]) == plain[2:4]
+    plain = list(links)
+    assert links == plain == links
+    assert links == tuple(plain)
+    assert tuple(plain) == links
+    assert links == again
+    assert hash(links) == hash(again)
+    assert links != plain[1:]
+    assert links != ticks(queue={"length": 1}, jitter=0.2)[4]
+    assert links[0] is links[0]
+    assert links[-1] == plain[-1]
+    assert list(links[2:4]) == plain[2:4]
     assert not LinkEvents([[], []])

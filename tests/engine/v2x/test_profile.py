@@ -1,4 +1,4 @@
-"""Channel profiles: the library's, a person's, and wrong ones."""
+"""Channel profiles: library profiles, custom profiles and invalid ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def composed(source: object, folders: tuple[Path, ...] = (LIBRARY,)) -> Composed
     return profile
 
 
-def test_every_profile_of_the_library_makes_a_channel() -> None:
+def test_build_channel_of_every_library_profile_has_its_model() -> None:
     names = profile_names(LIBRARY)
     assert {"none", "ideal", "latency_300ms", "error_30pct", "paper_latency_300ms", "paper_error_30pct"} <= set(names)
     assert {"80211p_urban", "cv2x_highway", "5g_uu", "bursty", "congested"} <= set(names)
@@ -41,12 +41,12 @@ def test_every_profile_of_the_library_makes_a_channel() -> None:
 
 
 @pytest.mark.parametrize("setting", ["mean: 1.0e-300, sd: 0.1", "mean: 0.1, sd: 1.0e+300"])
-def test_lognormal_delay_whose_ratio_overflows_is_refused(setting: str) -> None:
+def test_lognormal_delay_with_overflowing_ratio_raises(setting: str) -> None:
     with pytest.raises(SettingError, match="delay"):
         composed(f"{{delay: {{kind: lognormal, {setting}}}}}")
 
 
-def test_the_paper_s_settings() -> None:
+def test_library_profiles_have_the_settings_of_the_paper() -> None:
     assert composed("latency_300ms").delay == ConstantDelay(seconds=0.3)
     assert composed("latency_300ms").loss == NoLoss()
     assert composed("error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="link")
@@ -55,7 +55,7 @@ def test_the_paper_s_settings() -> None:
     assert composed("paper_error_30pct").loss == BernoulliLoss(kind="bernoulli", probability=0.3, scope="frame")
 
 
-def test_a_profile_may_be_a_mapping_a_yaml_text_or_a_file(tmp_path: Path) -> None:
+def test_load_profile_accepts_mapping_yaml_text_and_file(tmp_path: Path) -> None:
     text = "{delay: {kind: constant, seconds: 0.1}, own_perception: true}"
     file = tmp_path / "mine.yaml"
     file.write_text("delay:\n  kind: constant\n  seconds: 0.1\nown_perception: true\n")
@@ -67,21 +67,27 @@ def test_a_profile_may_be_a_mapping_a_yaml_text_or_a_file(tmp_path: Path) -> Non
         assert profile.name == name
 
 
-WRONG = [
+INVALID = [
     ("latency_300", "no channel profile 'latency_300'; did you mean 'latency_300ms'?"),
     ("{los: {kind: none}}", "unknown setting 'los'; did you mean 'loss'?"),
     ("{delay: {kind: constant, second: 0.3}}", "unknown setting 'delay.constant.second'; did you mean 'seconds'?"),
     ("{delay: {kind: constnt}}", "setting 'delay.kind' is 'constnt'; did you mean 'constant'?"),
     ("{delay: {kind: constant, seconds: -1}}", "'delay.constant.seconds' is -1"),
-    ("{delay: {kind: uniform, minimum: 2, maximum: 1}}", "maximum 1 lies below minimum 2"),
-    ("{delay: {kind: shifted_gamma, minimum: 2, mean: 1}}", "mean 1 lies below minimum 2"),
-    ("{delay: {kind: truncated_normal, mean: 9, sd: 0.1, maximum: 1}}", "falls between minimum and maximum"),
+    ("{delay: {kind: uniform, minimum: 2, maximum: 1}}", "maximum must be at least minimum (got 1, below 2)"),
+    ("{delay: {kind: shifted_gamma, minimum: 2, mean: 1}}", "mean must be at least minimum (got 1, below 2)"),
+    (
+        "{delay: {kind: truncated_normal, mean: 9, sd: 0.1, maximum: 1}}",
+        "minimum and maximum must enclose part of the distribution",
+    ),
     ("{loss: {kind: bernoulli, probability: 1.5}}", "'loss.bernoulli.probability' is 1.5"),
-    ("{delay: {kind: trace, seconds: [0.1], unit: ms}}", "unit belongs to a file; the list of seconds has none"),
-    ("{model: radio, sidelink: {interval: 0.05}}", "sidelink means nothing to 80211p"),
-    ("{model: radio, technology: cv2x_mode4, data_rate_mbps: 12}", "data_rate_mbps means nothing to cv2x_mode4"),
+    ("{delay: {kind: trace, seconds: [0.1], unit: ms}}", "unit requires file and has no effect with seconds"),
+    ("{model: radio, sidelink: {interval: 0.05}}", "sidelink has no effect with technology 80211p"),
+    (
+        "{model: radio, technology: cv2x_mode4, data_rate_mbps: 12}",
+        "data_rate_mbps has no effect with technology cv2x_mode4",
+    ),
     ("{model: compsed}", "unknown channel model 'compsed'; did you mean 'composed'?"),
-    ("[1, {2: 3}]", "a channel profile is a mapping"),
+    ("[1, {2: 3}]", "channel profile is not a mapping (got list)"),
     ("{a: [}", "not valid YAML"),
     ("{[a]: 1}", "not valid YAML: a key is a single word"),
     ("{name: 2001-13-45}", "not valid YAML: month must be in 1..12"),
@@ -89,24 +95,24 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("source", "message"), WRONG, ids=[row[0][:60] for row in WRONG])
-def test_a_wrong_profile_says_where_and_what_would_be_right(source: str, message: str) -> None:
+@pytest.mark.parametrize(("source", "message"), INVALID, ids=[row[0][:60] for row in INVALID])
+def test_load_profile_invalid_text_raises_with_position_and_hint(source: str, message: str) -> None:
     with pytest.raises(SettingError) as caught:
         load_profile(source, [LIBRARY], origin="scenario.xosc", line=12)
     assert str(caught.value).startswith("scenario.xosc:12: ")
     assert message in str(caught.value)
 
 
-def test_a_file_that_is_no_profile_and_a_text_that_is_no_path(tmp_path: Path) -> None:
+def test_load_profile_of_other_file_or_long_text_raises(tmp_path: Path) -> None:
     file = tmp_path / "mine.txt"
     file.write_text("model: composed\n")
-    with pytest.raises(SettingError, match=r"mine.txt' is no channel profile; give one that ends in .yaml"):
+    with pytest.raises(SettingError, match=r"mine.txt' is not a channel profile; expected a file name in .yaml"):
         load_profile(str(file), [LIBRARY])
     with pytest.raises(SettingError, match="no channel profile 'xxx"):
         load_profile("x" * 300, [LIBRARY])
 
 
-def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
+def test_load_profile_invalid_file_raises_with_path_and_line(tmp_path: Path) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text("model: composed\nloss:\n  kind: bernoulli\nspeed: 3\n")
     with pytest.raises(SettingError) as caught:
@@ -117,7 +123,7 @@ def test_a_wrong_file_is_named_with_the_line(tmp_path: Path) -> None:
     ]
     empty = tmp_path / "empty.yaml"
     empty.write_text("")
-    with pytest.raises(SettingError, match="it is empty"):
+    with pytest.raises(SettingError, match="got an empty file"):
         load_profile(empty)
 
 
@@ -138,10 +144,10 @@ background:
 """
 
 
-def test_each_wrong_key_is_told_with_its_own_line_however_deep_it_stands(tmp_path: Path) -> None:
+def test_load_profile_reports_each_invalid_key_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "deep.yaml"
     file.write_text(DEEP)
-    told = {
+    expected = {
         4: "unknown setting 'path_loss.tr37885.enviroment'; did you mean 'environment'?",
         7: "setting 'congestion.reactive.limits.2' is 1.4; input should be less than or equal to 1",
         9: "setting 'delay.kind' is missing; "
@@ -152,42 +158,44 @@ def test_each_wrong_key_is_told_with_its_own_line_however_deep_it_stands(tmp_pat
     with pytest.raises(SettingError) as caught:
         load_profile(file)
     assert {str(diagnostic) for diagnostic in caught.value.diagnostics} == {
-        f"{file}:{line}: {told[line]}" for line in told
+        f"{file}:{line}: {expected[line]}" for line in expected
     }
     with pytest.raises(SettingError) as caught:
         load_profile("\n  " + DEEP.replace("\n", "\n  "), origin="scenario.xosc", line=40)
-    assert {diagnostic.line for diagnostic in caught.value.diagnostics} == {40 + line for line in told}
+    assert {diagnostic.line for diagnostic in caught.value.diagnostics} == {40 + line for line in expected}
 
 
 @pytest.mark.parametrize(
-    ("rows", "more", "words"),
+    ("rows", "more", "message"),
     [
         (None, "", "cannot read .*measured.csv: No such file"),
         ("", "", "measured.csv is empty"),
         ("delay\n", "", "measured.csv has no delays"),
-        ("delay\n0.1\n\n-0.2\n", "", r"measured.csv:4: a delay is negative"),
-        ("delay\n0.1\nsoon\n", "", r"measured.csv:3: column 0 holds no delay"),
+        ("delay\n0.1\n\n-0.2\n", "", r"measured.csv:4: delay is negative"),
+        ("delay\n0.1\nsoon\n", "", r"measured.csv:3: column 0 is not a delay"),
         ("delay\n0.1\n", "column: late", "has no column 'late' in its first row"),
-        ("delay\n0.1\n", "column: 1", "has no column 1; it has 1, from 0 on"),
-        ("delay\n0.1\n", "column: -1", "has no column -1; it has 1, from 0 on"),
+        ("delay\n0.1\n", "column: 1", r"has no column 1 \(expected 0 to 0\)"),
+        ("delay\n0.1\n", "column: -1", r"has no column -1 \(expected 0 to 0\)"),
         ("delay\n0.1\n", "unit: min", "'delay.trace.unit' is 'min'; input should be 's' or 'ms'"),
         ("delay\n0.1\n", "unit: [ms]", r"'delay.trace.unit' is \['ms'\]; input should be 's' or 'ms'"),
-        ("delay\n0.1\n", "column: [1]", r"the column is \[1\]; give its name, or its number from 0 on"),
-        ("delay\n0.1\n", "column: 0.5", "the column is 0.5; give its name"),
+        ("delay\n0.1\n", "column: [1]", r"column is invalid \(got \[1\]; expected a name or an index from 0\)"),
+        ("delay\n0.1\n", "column: 0.5", r"column is invalid \(got 0.5; expected a name"),
         ("delay\n" + 200_000 * "1" + "\n", "", "cannot read .*measured.csv: field larger than field limit"),
     ],
 )
-def test_a_measured_trace_that_is_none(tmp_path: Path, rows: str | None, more: str, words: str) -> None:
+def test_load_profile_with_invalid_delay_trace_raises(
+    tmp_path: Path, rows: str | None, more: str, message: str
+) -> None:
     if rows is not None:
         (tmp_path / "measured.csv").write_text(rows)
     file = tmp_path / "mine.yaml"
     file.write_text(f"delay:\n  kind: trace\n  file: measured.csv\n  {more}\n")
-    with pytest.raises(SettingError, match=words):
+    with pytest.raises(SettingError, match=message):
         load_profile(file)
 
 
-def test_a_file_that_is_not_there() -> None:
+def test_load_profile_missing_file_raises_with_suggestion() -> None:
     with pytest.raises(SettingError, match=r"--channel: no file 'latency_300mss.yaml'; did you mean 'latency_300ms'\?"):
         load_profile("latency_300mss.yaml", [LIBRARY], origin="--channel")
-    with pytest.raises(SettingError, match="--channel: the channel has no name"):
+    with pytest.raises(SettingError, match="--channel: channel name is empty"):
         load_profile(" ", [LIBRARY], origin="--channel")

@@ -1,4 +1,4 @@
-"""Path loss, airtime and packet errors against published values."""
+"""Path loss, airtime and packet error rates compared with published values."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def between(state: int, distance: float, top: float = 3.0, lower: float = 1.6, u
     return LinkGeometry(np.array([distance]), np.array([state]), heights[0], heights[1], heights[2], vehicles)
 
 
-def test_tr_37_885_gives_the_vectors_of_ns_3() -> None:
-    """ns-3's three-gpp-v2v tests at 5 GHz."""
+def test_path_loss_of_tr_37_885_equals_ns_3() -> None:
+    """Values of the three-gpp-v2v tests of ns-3 at 5 GHz."""
     assert urban_los(D, 5.0) == pytest.approx([68.1913, 84.8913, 101.5913], abs=1e-4)
     assert highway_los(D, 5.0) == pytest.approx([66.3794, 86.3794, 106.3794], abs=1e-4)
     assert building_nlos(D, 5.0) == pytest.approx([80.0605, 110.0605, 140.0605], abs=1e-4)
 
 
-def test_at_5_9_ghz_over_100_m() -> None:
+def test_path_loss_of_tr_37_885_at_100_m() -> None:
     at = np.array([100.0])
     assert urban_los(at, 5.9)[0] == pytest.approx(86.20, abs=0.005)
     assert highway_los(at, 5.9)[0] == pytest.approx(87.82, abs=0.005)
@@ -48,14 +48,14 @@ def test_at_5_9_ghz_over_100_m() -> None:
 @pytest.mark.parametrize(
     ("environment_height", "break_point", "loss"), [(1.0, 19.7, 112.1), (0.5, 78.5, 101.7), (0.0, 177, 95.6)]
 )
-def test_winner_b1_hangs_on_the_environment_height(environment_height: float, break_point: float, loss: float) -> None:
+def test_winner_b1_depends_on_environment_height(environment_height: float, break_point: float, loss: float) -> None:
     height = 1.5 - environment_height
     frequency = 5.9
     assert 4 * height**2 * frequency * 1e9 / 3e8 == pytest.approx(break_point, rel=0.01)
     assert winner_b1(np.array([200.0]), frequency, height, height)[0] == pytest.approx(loss, abs=0.1)
 
 
-def test_winner_b1_is_never_below_free_space_and_flat_below_3_m() -> None:
+def test_winner_b1_is_at_least_free_space_and_constant_below_3_m() -> None:
     distance = np.linspace(0.0, 1000.0, 400)
     loss = winner_b1(distance, 5.9, 1.5, 1.5)
     free = 20 * np.log10(np.maximum(distance, 3.0)) + 46.4 + 20 * math.log10(5.9 / 5)
@@ -63,8 +63,8 @@ def test_winner_b1_is_never_below_free_space_and_flat_below_3_m() -> None:
     assert len(set(loss[distance < 3.0])) == 1
 
 
-def test_loss_by_vehicles_in_between() -> None:
-    """Below both antennas none; above both 9 dB; between them 5 dB; more from 541 m on (15 lg d > 41)."""
+def test_blockage_moments_by_height_of_the_blocking_vehicle() -> None:
+    """No loss below both antennas, 9 dB above both, 5 dB between them; more beyond 541 m (15 lg d > 41)."""
     near, far = np.array([50.0]), np.array([1000.0])
     one = np.ones(1)
     assert [m[0] for m in blockage_moments(near, 2.0 * one, 3.0 * one, 1.6 * one)] == [0.0, 0.0]
@@ -74,7 +74,7 @@ def test_loss_by_vehicles_in_between() -> None:
 
 
 @pytest.mark.parametrize("environment", ["urban", "highway"])
-def test_states_of_the_line_of_sight_differ_by_the_model_s_loss(environment: str) -> None:
+def test_path_loss_by_line_of_sight_state_differs_by_the_model_loss(environment: str) -> None:
     model = Tr37885.model_validate({"environment": environment, "blockage": "mean"})
     half = np.array([0.5])
     clear, behind, hidden = (float(model.loss(between(s, 60.0), 5.9, half)[0]) for s in (LOS, NLOSV, NLOS))
@@ -82,8 +82,8 @@ def test_states_of_the_line_of_sight_differ_by_the_model_s_loss(environment: str
     assert hidden == pytest.approx(float(building_nlos(np.array([60.0]), 5.9)[0]))
 
 
-def test_the_loss_by_vehicles_has_the_report_s_mean_and_spread() -> None:
-    """Moments by the midpoint rule over the draws; the normal reading is cut at 0 dB, 2.3 % of it."""
+def test_blockage_loss_has_mean_and_spread_of_tr_37_885() -> None:
+    """Moments by the midpoint rule; the normal distribution is truncated at 0 dB, which affects 2.3 %."""
     draws = (np.arange(20000) + 0.5) / 20000
     one = np.ones(20000)
     states = np.full(20000, NLOSV)
@@ -96,7 +96,7 @@ def test_the_loss_by_vehicles_has_the_report_s_mean_and_spread() -> None:
         assert extra.min() >= 0.0
 
 
-def test_winner_b1_adds_a_loss_for_each_vehicle() -> None:
+def test_winner_b1_adds_a_loss_per_vehicle() -> None:
     model = WinnerB1(kind="winner_b1")
     half = np.array([0.5])
     clear, behind = (float(model.loss(between(s, 60.0), 5.9, half)[0]) for s in (LOS, NLOSV))
@@ -104,7 +104,7 @@ def test_winner_b1_adds_a_loss_for_each_vehicle() -> None:
     assert float(model.loss(between(NLOS, 60.0), 5.9, half)[0]) > behind
 
 
-def test_probability_of_a_line_of_sight() -> None:
+def test_probability_of_los_equals_tr_37_885() -> None:
     distance = np.array([50.0, 100.0, 200.0, 300.0])
     assert probability_of_los(distance, "urban") == pytest.approx([0.5938, 0.3358, 0.1074, 0.0343], abs=5e-5)
     assert probability_of_los(distance, "highway") == pytest.approx([0.9246, 0.8403, 0.7034, 0.6084], abs=5e-5)
@@ -113,19 +113,19 @@ def test_probability_of_a_line_of_sight() -> None:
 @pytest.mark.parametrize(
     ("size", "milliseconds"), [(190, 0.304), (300, 0.448), (500, 0.712), (800, 1.112), (1100, 1.512), (1400, 1.912)]
 )
-def test_airtime_of_802_11p_at_6_mbit_s(size: int, milliseconds: float) -> None:
+def test_ieee80211p_airtime_at_6_mbit_s(size: int, milliseconds: float) -> None:
     assert ieee80211p_airtime(size, 6.0, 1400) == pytest.approx(milliseconds * 1e-3, abs=1e-9)
 
 
-def test_a_message_above_the_mtu_goes_in_several_frames() -> None:
+def test_airtime_of_a_message_above_the_mtu_is_that_of_several_frames() -> None:
     assert fragments(3000, 1400) == (1400, 1400, 200)
     assert fragments(1400, 1400) == (1400,)
     assert fragments(0, 1400) == (0,)
     assert ieee80211p_airtime(2800, 6.0, 1400) == pytest.approx(2 * 1.912e-3)
 
 
-def test_reception_over_distance_without_interference() -> None:
-    """Mean over 4 dB of shadowing, TR 37.885 urban NLOS, 23 dBm with 3 dBi twice, -95 dBm noise, highway LOS curve."""
+def test_delivery_ratio_over_distance_without_interference() -> None:
+    """Mean over 4 dB of shadowing: TR 37.885 urban NLOS, 23 dBm, two antennas of 3 dBi, -95 dBm noise, LOS curve."""
     curve = CURVES["80211p_highway_los"]
     shadow = np.linspace(-20.0, 20.0, 4001)
     weight = np.exp(-0.5 * (shadow / 4.0) ** 2)
@@ -136,7 +136,7 @@ def test_reception_over_distance_without_interference() -> None:
         assert float(np.sum(weight * (1.0 - curve.at(snr, 350)))) == pytest.approx(expected, abs=0.001)
 
 
-def test_curves_of_packet_errors_fall_and_larger_packets_err_more() -> None:
+def test_packet_error_curves_decrease_and_larger_packets_have_more_errors() -> None:
     ratios = np.linspace(-10.0, 40.0, 501)
     for name, curve in CURVES.items():
         errors = curve.at(ratios, 350)
@@ -151,21 +151,21 @@ def test_curves_of_packet_errors_fall_and_larger_packets_err_more() -> None:
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_one_packet_errs_as_many(name: str) -> None:
+def test_packet_error_curve_scalar_and_array_evaluation_agree(name: str) -> None:
     ratios = np.linspace(-5.0, 25.0, 301)
     for size in (100.0, 350.0, 1400.0):
         one_by_one = [CURVES[name].of(ratio, size) for ratio in ratios.tolist()]
         assert one_by_one == pytest.approx(CURVES[name].at(ratios, size).tolist(), abs=1e-12)
 
 
-def test_one_draw_is_that_of_many_to_the_bit() -> None:
+def test_uniform_and_uniforms_agree_to_the_bit() -> None:
     keys = np.array([0, 1, 2**63, 2**64 - 1, 0x9E3779B97F4A7C15], dtype=np.uint64)
     for count in (-1, 0, 1, 12345678):
         assert [uniform(key, count) for key in keys.tolist()] == uniforms(keys, count).tolist()
 
 
-def test_log_distance_starts_from_free_space_at_its_reference() -> None:
-    """20 lg(4 pi 5.9e9 / 3e8) = 47.86 dB at 1 m; 25 dB per decade, ns-3's 46.6777 dB is that of 5.15 GHz."""
+def test_log_distance_equals_free_space_at_its_reference_distance() -> None:
+    """20 lg(4 pi 5.9e9 / 3e8) = 47.86 dB at 1 m, 25 dB per decade; 46.6777 dB of ns-3 applies to 5.15 GHz."""
     assert free_space(1.0, 5.9) == pytest.approx(47.86, abs=0.005)
     assert free_space(1.0, 5.15) == pytest.approx(46.6777, abs=0.01)
     model = LogDistance(kind="log_distance", exponent=2.5)
@@ -176,7 +176,7 @@ def test_log_distance_starts_from_free_space_at_its_reference() -> None:
     assert [given.loss_of(Link(d, LOS, 1.6, 1.6, 0.0, 0), 5.9, 0.5) for d in (1, 10, 100)] == [60, 60, 90]
 
 
-def test_nist_errors_of_qpsk_are_those_of_ns_3() -> None:
+def test_nist_packet_errors_of_qpsk_equal_ns_3() -> None:
     """ns-3 3.44 delivers 0.9825, 0.5325 and 0.231 of 20,000 packets of 336 bytes at 7.08, 6.05 and 5.80 dB."""
     curve = CURVES["80211p_nist"]
     ratios = np.array([23.0 - 47.86 - 25.0 * math.log10(meters) + 96.975 for meters in (400, 440, 450)])

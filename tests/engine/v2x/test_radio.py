@@ -1,4 +1,4 @@
-"""The radio channel: causality, order, symmetry, and what bodies and distance do to a message."""
+"""Radio channel: causality, order of stations, symmetry, blockage and distance."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from radio_talk import DT, QUIET, Place, message, radio, talk
+from radio_traffic import DT, QUIET, Place, exchange, message, radio
 
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
@@ -40,42 +40,42 @@ PROFILES: list[dict[str, object]] = [
 
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(PROFILES), st.integers(0, 5), st.sampled_from([(300,), (121, 3000)]), st.floats(0, 40))
-def test_nothing_is_heard_before_its_time_nor_twice_and_nothing_vanishes(
+def test_radio_channel_delivers_each_message_once_after_arrival_and_counts_all(
     profile: dict[str, object], seed: int, sizes: tuple[int, ...], speed: float
 ) -> None:
     carrier = radio(seed, **profile)
-    events, heard = talk(carrier, ROW, 30, speed=speed, sizes=sizes)
+    events, deliveries = exchange(carrier, ROW, 30, speed=speed, sizes=sizes)
     now = 30 * DT
-    fates = {(event.sender, event.receiver, event.number): event for event in events}
-    assert len(fates) == len(events), "each fate is told once"
-    for receiver, time, received in heard:
-        event = fates.pop((received.message.sender, receiver, received.message.number))
+    outcomes = {(event.sender, event.receiver, event.number): event for event in events}
+    assert len(outcomes) == len(events), "each outcome is returned once"
+    for receiver, time, received in deliveries:
+        event = outcomes.pop((received.message.sender, receiver, received.message.number))
         assert event.outcome == "delivered"
         assert event.arrives == received.arrived
         assert event.sent < event.arrives <= time + 1e-9
         assert event.path_loss_db is not None
     carrier.update_environment(RadioEnvironment(ROW))
-    books = carrier.statistics(now).values()
-    assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
-    assert all(sum(book.lost_by.values()) == book.lost for book in books)
-    assert sum(book.sent for book in books) == 30 * 5 * 4
-    assert sum(book.received for book in books) == len(heard)
-    assert sum(book.lost for book in books) == sum(event.outcome == "lost" for event in events)
-    assert sum(book.in_flight for book in books) == carrier.in_flight()
+    statistics = carrier.statistics(now).values()
+    assert all(link.sent == link.received + link.lost + link.in_flight for link in statistics)
+    assert all(sum(link.lost_by.values()) == link.lost for link in statistics)
+    assert sum(link.sent for link in statistics) == 30 * 5 * 4
+    assert sum(link.received for link in statistics) == len(deliveries)
+    assert sum(link.lost for link in statistics) == sum(event.outcome == "lost" for event in events)
+    assert sum(link.in_flight for link in statistics) == carrier.in_flight()
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
-def test_the_order_of_the_stations_does_not_matter(profile: dict[str, object]) -> None:
-    def fates(places: dict[str, Place]) -> set[LinkEvent]:
-        return set(talk(radio(3, **profile), places, 30, sizes=(200, 800))[0])
+def test_radio_channel_with_reversed_stations_returns_equal_outcomes(profile: dict[str, object]) -> None:
+    def outcomes(places: dict[str, Place]) -> set[LinkEvent]:
+        return set(exchange(radio(3, **profile), places, 30, sizes=(200, 800))[0])
 
-    forth = fates(ROW)
-    assert fates(dict(reversed(ROW.items()))) == forth
-    assert len(forth) > 300
+    forward = outcomes(ROW)
+    assert outcomes(dict(reversed(ROW.items()))) == forward
+    assert len(forward) > 300
 
 
 def mixed_sight(pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
-    """By the letters of the stations: open, behind a truck, or behind a building."""
+    """Return LOS, NLOSv behind a truck, or NLOS, depending on the letters of the stations."""
     states = np.array([(ord(first) + 2 * ord(second)) % 3 for first, second in pairs], dtype=np.int64)
     heights = np.where(states == NLOSV, 3.0, -np.inf)
     return LineOfSightStates(states, heights, {ray: ("Truck",) for ray in np.flatnonzero(states == NLOSV).tolist()})
@@ -83,65 +83,65 @@ def mixed_sight(pairs: Sequence[tuple[str, str]]) -> LineOfSightStates:
 
 @pytest.mark.parametrize(("path_loss", "power"), [("tr37885", 5), ("winner_b1", 20), ("log_distance", 20)])
 @pytest.mark.parametrize("profile", PROFILES, ids=range(len(PROFILES)))
-def test_a_few_links_in_plain_numbers_fare_as_in_arrays(
+def test_radio_channel_scalar_and_array_evaluation_return_equal_outcomes(
     monkeypatch: pytest.MonkeyPatch, profile: dict[str, object], path_loss: str, power: float
 ) -> None:
-    def told() -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
+    def outcomes() -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
         near = {name: (110.0 * place, 2.0 * place, 1.6) for place, name in enumerate("ABCD")}
         carrier = radio(3, **{"path_loss": {"kind": path_loss}, "tx_power_dbm": power, **profile, "jitter": 0.01})
-        return talk(carrier, near, 60, speed=9.0, sizes=(200, 900), sight=mixed_sight)
+        return exchange(carrier, near, 60, speed=9.0, sizes=(200, 900), sight=mixed_sight)
 
-    (few, heard_few) = told()
-    monkeypatch.setattr(budget, "FEW", 0)
-    monkeypatch.setattr(reception, "FEW", 0)
-    monkeypatch.setattr(csma, "FEW", 0)
-    (many, heard_many) = told()
-    assert len(few) == len(many) > 400
-    assert len({event.reason for event in few}) > 2
-    for one, other in zip(few, many, strict=True):
+    scalar, scalar_deliveries = outcomes()
+    monkeypatch.setattr(budget, "MAX_SCALAR", 0)
+    monkeypatch.setattr(reception, "MAX_SCALAR", 0)
+    monkeypatch.setattr(csma, "MAX_SCALAR", 0)
+    array, array_deliveries = outcomes()
+    assert len(scalar) == len(array) > 400
+    assert len({event.reason for event in scalar}) > 2
+    for one, other in zip(scalar, array, strict=True):
         assert replace(one, path_loss_db=None, snr_db=None) == replace(other, path_loss_db=None, snr_db=None)
         if one.reason not in ("queue", "loss", "burst"):
             assert (one.path_loss_db, one.snr_db) == pytest.approx((other.path_loss_db, other.snr_db), abs=1e-9)
-    assert [(name, at, said.arrived) for name, at, said in heard_few] == [
-        (name, at, said.arrived) for name, at, said in heard_many
+    assert [(name, at, received.arrived) for name, at, received in scalar_deliveries] == [
+        (name, at, received.arrived) for name, at, received in array_deliveries
     ]
 
 
-def test_who_talks_shifts_no_draw_of_the_others() -> None:
-    """The shadowing between A and B is the same whether C talks in each tick, or nobody does but for one message."""
+def test_shadowing_of_a_link_is_independent_of_other_transmissions() -> None:
+    """The shadowing between A and B is equal if C transmits in each tick and if only two messages are sent."""
 
-    def seen(talking: Sequence[str], ticks: Sequence[int]) -> dict[int, float | None]:
-        carrier, told = radio(7), []
+    def path_losses(senders: Sequence[str], ticks: Sequence[int]) -> dict[int, float | None]:
+        carrier, events = radio(7), []
         for tick in range(40):
             now = DT * tick
             places = {name: (30.0 * row + 5.0 * row * now, 0.0, 1.5) for row, name in enumerate("ABC")}
             carrier.update_environment(RadioEnvironment(places))
             for name in places:
                 carrier.deliver(name, now)
-            says = [name for name in places if name in talking or (name == "A" and tick in ticks)]
-            told += list(carrier.transmit([(message(name, tick, now), ["B"]) for name in says if name != "B"], now))
-        return {event.number: event.path_loss_db for event in told if event.sender == "A"}
+            active = [name for name in places if name in senders or (name == "A" and tick in ticks)]
+            events += list(carrier.transmit([(message(name, tick, now), ["B"]) for name in active if name != "B"], now))
+        return {event.number: event.path_loss_db for event in events if event.sender == "A"}
 
-    alone, among_others = seen((), (10, 25)), seen("AC", ())
+    alone, among_others = path_losses((), (10, 25)), path_losses("AC", ())
     assert set(alone) == {10, 25}
     assert all(among_others[number] == loss for number, loss in alone.items())
     assert len(set(among_others.values())) > 30
 
 
-def test_without_reordering_messages_wait_for_those_before() -> None:
+def test_radio_channel_without_reordering_delays_messages_behind_earlier_ones() -> None:
     delay = {"delay": {"kind": "uniform", "minimum": 0.0, "maximum": 0.5}}
     arrivals = {}
     for reordering in (True, False):
         carrier = radio(2, reordering=reordering, **delay, **QUIET)
-        events, _ = talk(carrier, {"A": (0.0, 0.0, 1.5), "B": (30.0, 0.0, 1.5)}, 100)
+        events, _ = exchange(carrier, {"A": (0.0, 0.0, 1.5), "B": (30.0, 0.0, 1.5)}, 100)
         arrivals[reordering] = [event.arrives for event in events if event.sender == "A" and event.arrives is not None]
     assert arrivals[True] != sorted(arrivals[True])
     assert arrivals[False] == sorted(arrivals[False])
     assert all(late >= early for late, early in zip(arrivals[False], arrivals[True], strict=True))
 
 
-def test_who_joins_late_measures_its_own_time() -> None:
-    """Half of the run is over when C joins: the channel is as busy for it as for the others."""
+def test_channel_busy_ratio_of_a_late_station_covers_its_own_time() -> None:
+    """C enters in the middle of the run and measures the same channel busy ratio as the others."""
     carrier = radio(1, **QUIET)
     for tick in range(200):
         now = DT * tick
@@ -154,31 +154,33 @@ def test_who_joins_late_measures_its_own_time() -> None:
 
 
 @pytest.mark.parametrize("profile", PROFILES[:7:6], ids=["80211p", "cv2x"])
-def test_a_turned_and_a_mirrored_scene_have_the_same_fates(profile: dict[str, object]) -> None:
-    def fates(turn: Any) -> list[tuple[object, ...]]:
+def test_radio_channel_in_rotated_and_mirrored_scene_returns_equal_outcomes(profile: dict[str, object]) -> None:
+    def outcomes(turn: Any) -> list[tuple[object, ...]]:
         places = {name: turn(*place) for name, place in ROW.items()}
         return sorted(
-            (e.sender, e.receiver, e.number, e.outcome, e.reason) for e in talk(radio(2, **profile), places, 40)[0]
+            (e.sender, e.receiver, e.number, e.outcome, e.reason) for e in exchange(radio(2, **profile), places, 40)[0]
         )
 
     cos, sin = math.cos(0.7), math.sin(0.7)
-    straight = fates(lambda x, y, z: (x, y, z))
-    assert fates(lambda x, y, z: (cos * x - sin * y + 9.0, sin * x + cos * y, z)) == straight
-    assert fates(lambda x, y, z: (x, -y, z)) == straight
+    original = outcomes(lambda x, y, z: (x, y, z))
+    assert outcomes(lambda x, y, z: (cos * x - sin * y + 9.0, sin * x + cos * y, z)) == original
+    assert outcomes(lambda x, y, z: (x, -y, z)) == original
 
 
 @pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
-def test_a_turned_lattice_of_equal_distances_has_the_same_fates(technology: str) -> None:
-    """Equal powers stay equal, though the distances of the turned places differ in their last digits."""
+def test_radio_channel_on_rotated_lattice_returns_equal_outcomes(technology: str) -> None:
+    """Equal powers stay equal although the distances of the rotated positions differ in their last digits."""
 
-    def fates(angle: float) -> list[tuple[object, ...]]:
+    def outcomes(angle: float) -> list[tuple[object, ...]]:
         cos, sin = math.cos(angle), math.sin(angle)
         lattice = {f"{x}{y}": (400.0 * x, 400.0 * y) for x in range(4) for y in range(4)}
         places = {name: (cos * x - sin * y, sin * x + cos * y, 1.5) for name, (x, y) in lattice.items()}
-        events = talk(radio(2, **QUIET, technology=technology, sensing_dbm=-95.0), places, 40, sizes=(190,), dt=0.1)[0]
+        events = exchange(
+            radio(2, **QUIET, technology=technology, sensing_dbm=-95.0), places, 40, sizes=(190,), dt=0.1
+        )[0]
         return sorted((e.sender, e.receiver, e.number, e.outcome, e.reason, e.arrives or 0.0) for e in events)
 
-    assert fates(0.7) == fates(0.0)
+    assert outcomes(0.7) == outcomes(0.0)
 
 
 def behind(state: int, top: float = 3.3) -> Any:
@@ -191,11 +193,11 @@ def behind(state: int, top: float = 3.3) -> Any:
 
 
 @pytest.mark.parametrize(("rsu", "loss"), [(1.6, 9.0), (5.0, 5.0), (3.2, 9.0)])
-def test_a_truck_between_the_antennas_costs_the_model_s_loss(rsu: float, loss: float) -> None:
-    """TR 37.885 for a truck of 3.3 m: 9 dB where both antennas are lower, 5 dB where one looks over it."""
+def test_path_loss_with_blocking_truck_rises_by_the_tr_37_885_loss(rsu: float, loss: float) -> None:
+    """TR 37.885 for a truck of 3.3 m: 9 dB if both antennas are lower, 5 dB if one is higher."""
     places = {"Ego": (0.0, 0.0, 1.5), "RSU": (60.0, 0.0, rsu)}
     profile = {"shadowing_db": 0, "path_loss": {"kind": "tr37885", "blockage": "mean"}}
-    events = {state: talk(radio(1, **profile), places, 20, sight=behind(state))[0] for state in (LOS, NLOSV, NLOS)}
+    events = {state: exchange(radio(1, **profile), places, 20, sight=behind(state))[0] for state in (LOS, NLOSV, NLOS)}
     clear, blocked = (events[state][0] for state in (LOS, NLOSV))
     assert (clear.los, clear.blockers) == ("los", ())
     assert (blocked.los, blocked.blockers) == ("nlosv", ("Firetruck",))
@@ -206,11 +208,11 @@ def test_a_truck_between_the_antennas_costs_the_model_s_loss(rsu: float, loss: f
     assert clear.snr_db == pytest.approx(29.0 - clear.path_loss_db + 95.0)  # type: ignore[operator]
 
 
-def test_reception_falls_with_distance_and_a_message_out_of_reach_is_not_sensed() -> None:
+def test_delivery_ratio_falls_with_distance_down_to_lost_by_sensing() -> None:
     kept = []
     for distance in (20.0, 1000.0, 2000.0, 4000.0, 30000.0):
         places = {"A": (0.0, 0.0, 1.5), "B": (distance, 0.0, 1.5)}
-        events, _ = talk(radio(4, path_loss={"kind": "tr37885", "environment": "urban"}), places, 300, speed=10.0)
+        events, _ = exchange(radio(4, path_loss={"kind": "tr37885", "environment": "urban"}), places, 300, speed=10.0)
         kept.append(np.mean([event.outcome == "delivered" for event in events]))
     assert all(nearer >= farther for nearer, farther in pairwise(kept))
     assert kept[0] == 1.0
@@ -218,8 +220,8 @@ def test_reception_falls_with_distance_and_a_message_out_of_reach_is_not_sensed(
     assert {event.reason for event in events} <= {"sensing", "half_duplex"}
 
 
-def test_shadowing_is_the_same_both_ways_and_correlated_over_the_way() -> None:
-    """Over 5 m with a decorrelation distance of 10 m, e^(-1/2) is left; over many links and steps."""
+def test_shadowing_is_symmetric_and_correlated_over_covered_distance() -> None:
+    """Over 5 m with a decorrelation distance of 10 m the correlation is e^(-1/2)."""
     budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear", decorrelation=10.0)
     names = [f"{n:02}" for n in range(30)]
     series = []
@@ -231,14 +233,14 @@ def test_shadowing_is_the_same_both_ways_and_correlated_over_the_way() -> None:
         series.append(shadow[0, 1:])
         if step == 0:
             still = shadow[1:, 1:]
-        assert np.array_equal(shadow[1:, 1:], still), "nothing moved between the others"
+        assert np.array_equal(shadow[1:, 1:], still), "the other stations do not move"
     values = np.array(series)
     assert values.std() == pytest.approx(3.0, abs=0.3)
     lagged = np.mean(values[1:] * values[:-1]) / np.mean(values**2)
     assert lagged == pytest.approx(math.exp(-0.5), abs=0.06)
 
 
-def test_a_pair_keeps_its_shadowing_when_others_come_and_go() -> None:
+def test_shadowing_of_a_pair_is_kept_while_other_stations_change() -> None:
     budget = LinkBudget(Tr37885(), seed=1, frequency_ghz=5.9, line_of_sight="clear")
     two = {"B": (0.0, 0.0, 1.5), "D": (50.0, 0.0, 1.5)}
     loss = budget.at(RadioEnvironment(two)).loss[0, 1]
@@ -247,7 +249,7 @@ def test_a_pair_keeps_its_shadowing_when_others_come_and_go() -> None:
     assert budget.at(RadioEnvironment(two)).loss[0, 1] == loss
 
 
-def test_stations_that_leave_take_their_messages_with_them() -> None:
+def test_radio_channel_messages_of_removed_stations_are_lost_as_absent() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5), "C": (90.0, 0.0, 1.5)}
     carrier = radio(1, jitter=0.04)
     carrier.update_environment(RadioEnvironment(places))
@@ -259,26 +261,26 @@ def test_stations_that_leave_take_their_messages_with_them() -> None:
     assert {link: event.reason for link, event in events.items()} == {
         ("A", "B"): "absent", ("A", "C"): "", ("B", "A"): "absent", ("B", "C"): "absent",
     }  # fmt: skip
-    books = carrier.statistics(0.05)
-    assert all(book.sent == book.received + book.lost + book.in_flight == 1 for book in books.values())
+    statistics = carrier.statistics(0.05)
+    assert all(link.sent == link.received + link.lost + link.in_flight == 1 for link in statistics.values())
 
 
-def test_a_radio_that_is_replaced_hands_over_what_waits() -> None:
+def test_continue_from_radio_channel_keeps_its_queued_messages() -> None:
     places = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
     old = radio(1, jitter=0.04)
     old.update_environment(RadioEnvironment(places))
     old.transmit([(message("A", 0, 0.0), ["B"])], 0.0)
     new = ComposedChannel(ComposedProfile.model_validate({"loss": {"kind": "bernoulli", "probability": 1.0}}), 1)
     new.continue_from(old)
-    told = new.transmit([(message("A", 1, 0.05), ["B"])], 0.05)
-    assert [(event.number, event.outcome) for event in told] == [(0, "delivered"), (1, "lost")]
+    events = new.transmit([(message("A", 1, 0.05), ["B"])], 0.05)
+    assert [(event.number, event.outcome) for event in events] == [(0, "delivered"), (1, "lost")]
     assert [received.message.number for received in new.deliver("B", 0.1)] == [0]
-    book = new.statistics(0.1)["A", "B"]
-    assert (book.sent, book.received, book.lost, book.in_flight) == (2, 1, 1, 0)
+    link = new.statistics(0.1)["A", "B"]
+    assert (link.sent, link.received, link.lost, link.in_flight) == (2, 1, 1, 0)
 
 
-def test_who_was_never_placed_cannot_send() -> None:
-    with pytest.raises(ValueError, match="was not told where 'A' is"):
+def test_transmit_of_a_station_without_antenna_position_raises() -> None:
+    with pytest.raises(ValueError, match="station 'A' has no antenna position"):
         radio().transmit([(message("A", 0, 0.0), ["B"])], 0.0)
 
 
@@ -299,8 +301,8 @@ def test_who_was_never_placed_cannot_send() -> None:
         {"congestion": {"kind": "limeric", "interval_max": 1e300}},
     ],
 )
-def test_radio_profile_absurd_value_is_refused(technology: str, setting: dict[str, Any]) -> None:
-    """These overflowed, or kept the end of a run waiting for as long as they say."""
+def test_radio_profile_with_value_out_of_range_raises(technology: str, setting: dict[str, Any]) -> None:
+    """Such values caused overflows or extended the end of a run by their duration."""
     with pytest.raises(ValueError, match=r"(less|greater) than or equal"):
         radio(technology=technology, **setting)
 
@@ -308,29 +310,29 @@ def test_radio_profile_absurd_value_is_refused(technology: str, setting: dict[st
 @pytest.mark.parametrize("discipline", ["fifo", "lcfs"])
 @pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4"])
 def test_radio_channel_each_message_has_one_outcome_per_receiver(technology: str, discipline: str) -> None:
-    """Stations come and go while they have more to say than the medium carries; what is received is told as such."""
-    everybody: dict[str, Place] = {f"S{n}": (30.0 * n, 0.0, 1.5) for n in range(8)}
+    """Stations enter and leave while the offered load exceeds the capacity of the medium."""
+    all_places: dict[str, Place] = {f"S{n}": (30.0 * n, 0.0, 1.5) for n in range(8)}
     carrier = radio(1, **QUIET, technology=technology, queue={"discipline": discipline, "length": 3})
-    said: list[tuple[str, int, str]] = []
-    heard: list[tuple[str, int, str]] = []
+    sent_messages: list[tuple[str, int, str]] = []
+    deliveries: list[tuple[str, int, str]] = []
     events: list[LinkEvent] = []
     for tick in range(100):
         now = DT * tick
-        places = {name: place for row, (name, place) in enumerate(everybody.items()) if (tick // 3) % (row + 2) != 1}
+        places = {name: place for row, (name, place) in enumerate(all_places.items()) if (tick // 3) % (row + 2) != 1}
         carrier.update_environment(RadioEnvironment(places))
         for name in places:
-            heard += [(r.message.sender, r.message.number, name) for r in carrier.deliver(name, now)]
+            deliveries += [(r.message.sender, r.message.number, name) for r in carrier.deliver(name, now)]
         outbox = [
             (message(name, 2 * tick + part, now, (190, 900, 2500)[tick % 3]), [n for n in places if n != name])
             for name in places
             for part in (0, 1)
         ]
-        said += [(sent.sender, sent.number, receiver) for sent, receivers in outbox for receiver in receivers]
+        sent_messages += [(m.sender, m.number, receiver) for m, receivers in outbox for receiver in receivers]
         events += carrier.transmit(outbox, now)
     carrier.finalize()
     events += carrier.drain_events()
-    assert sorted((event.sender, event.number, event.receiver) for event in events) == sorted(said)
+    assert sorted((event.sender, event.number, event.receiver) for event in events) == sorted(sent_messages)
     delivered = {(e.sender, e.number, e.receiver) for e in events if e.outcome == "delivered"}
-    assert len(heard) == len(set(heard)) > 0
-    assert set(heard) <= delivered
+    assert len(deliveries) == len(set(deliveries)) > 0
+    assert set(deliveries) <= delivered
     assert {event.reason for event in events} >= {"", "absent", "half_duplex", "collision"}

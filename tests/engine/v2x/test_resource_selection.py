@@ -1,4 +1,4 @@
-"""Sensing-based resource selection (3GPP TS 36.213, 14.1.1.6), step by step, with resources counted by hand."""
+"""Sensing-based resource selection (3GPP TS 36.213, 14.1.1.6), with resources counted by hand."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ REQUEST = Request(now=NOW, first=NOW + 1, last=NOW + 100, width=1, length=1, int
 def sensed(
     *, rssi: dict[tuple[int, int], float] | None = None, own: tuple[int, ...] = (), sci: Any = (), bands: int = BANDS
 ) -> Sensed:
-    """S-RSSI by (subframe, subchannel), own subframes, and decoded SCI as (subframe, subchannel, width, RSRP)."""
+    """Return sensing results from S-RSSI by (subframe, subchannel), own subframes and decoded SCI.
+
+    sci  rows of (subframe, subchannel, width, RSRP)
+    """
     power, monitored = np.zeros((WINDOW, bands), dtype=np.float32), np.ones(WINDOW, dtype=np.bool_)
     for (subframe, band), value in (rssi or {}).items():
         power[subframe % WINDOW, band] = value
@@ -33,53 +36,55 @@ def sensed(
 
 
 def reported(request: Request, history: Sensed, seed: int = 1) -> set[tuple[int, int]]:
-    """(subframe, first subchannel) of what is reported."""
+    """Return the reported resources as (subframe, first subchannel)."""
     places = history.rssi.shape[1] - request.width + 1
     order: NDArray[np.float64] = generator(seed, "order").random(request.starts * places)
     return {(request.first + index // places, index % places) for index in candidates(request, history, order).tolist()}
 
 
-def everything(request: Request, history: Sensed) -> set[tuple[int, int]]:
+def reported_for_any_order(request: Request, history: Sensed) -> set[tuple[int, int]]:
     """Return the resources that are reported for any order of equal ones."""
     return set().union(*(reported(request, history, seed) for seed in range(60)))
 
 
 def test_candidates_without_history_are_a_fifth_of_all_resources() -> None:
     assert len(reported(REQUEST, sensed())) == 80
-    assert everything(REQUEST, sensed()) == {(NOW + 1 + y, x) for y in range(100) for x in range(4)}
+    assert reported_for_any_order(REQUEST, sensed()) == {(NOW + 1 + y, x) for y in range(100) for x in range(4)}
 
 
 def test_candidates_exclude_the_next_use_of_a_decoded_reservation() -> None:
-    """SCI in subframe 4950, subchannels 1 and 2: they are taken in 5050."""
-    left = everything(REQUEST, sensed(sci=[(4950, 1, 2, -100.0)]))
+    """SCI in subframe 4950 reserves subchannels 1 and 2 in 5050."""
+    left = reported_for_any_order(REQUEST, sensed(sci=[(4950, 1, 2, -100.0)]))
     assert {(5050, x) for x in range(4)} & left == {(5050, 0), (5050, 3)}
     assert len(left) == 398
 
 
-def test_candidates_ignore_a_reservation_that_is_over() -> None:
+def test_candidates_ignore_expired_reservations() -> None:
     """SCI in subframe 4850 reserves 4950, which has passed."""
-    assert len(everything(REQUEST, sensed(sci=[(4850, 1, 1, -100.0)]))) == 400
+    assert len(reported_for_any_order(REQUEST, sensed(sci=[(4850, 1, 1, -100.0)]))) == 400
 
 
 @pytest.mark.parametrize(("rsrp", "left"), [(-109.0, 399), (-110.0, 400), (-111.0, 400)])
-def test_candidates_keep_reservations_that_do_not_exceed_the_rsrp_threshold(rsrp: float, left: int) -> None:
-    assert len(everything(replace(REQUEST, threshold=-110.0), sensed(sci=[(4950, 1, 1, rsrp)]))) == left
+def test_candidates_include_reservations_up_to_the_rsrp_threshold(rsrp: float, left: int) -> None:
+    assert len(reported_for_any_order(replace(REQUEST, threshold=-110.0), sensed(sci=[(4950, 1, 1, rsrp)]))) == left
 
 
-def test_candidates_exclude_subframes_that_were_not_monitored() -> None:
-    left = everything(REQUEST, sensed(own=(4930, 4830)))
+def test_candidates_exclude_unmonitored_subframes() -> None:
+    left = reported_for_any_order(REQUEST, sensed(own=(4930, 4830)))
     assert {subframe for subframe, _ in left} == set(range(5001, 5101)) - {5030}
 
 
 def test_rsrp_threshold_rises_in_steps_of_3_db_until_a_fifth_remains() -> None:
-    """All 400 resources are reserved: subframe y at -120 + 0.5 (y - 5001) dBm. The 20th weakest subframe has -110.5
-    dBm, and the first threshold of -128, -125, … that is not below is -110: 21 subframes remain."""
+    """All 400 resources are reserved, subframe y at -120 + 0.5 (y - 5001) dBm.
+
+    The 20th weakest subframe has -110.5 dBm. The lowest threshold of -128, -125, … above it is -110: 21 remain.
+    """
     sci = [(4901 + y, 0, 4, -120.0 + 0.5 * y) for y in range(100)]
-    assert {subframe for subframe, _ in everything(REQUEST, sensed(sci=sci))} == set(range(5001, 5022))
+    assert {subframe for subframe, _ in reported_for_any_order(REQUEST, sensed(sci=sci))} == set(range(5001, 5022))
 
 
 def test_candidates_have_the_lowest_average_rssi_of_the_last_second() -> None:
-    """Resources are noisy once in ten intervals (0.5) or in each (1): 79 others are quiet, one of the former joins."""
+    """79 resources are quiet; of the others, one has a mean of 0.5 and is selected before those with 1."""
     quiet = {(5001 + k // 4, k % 4) for k in range(79)}
     rssi = {}
     for y in range(5001, 5101):
@@ -91,38 +96,42 @@ def test_candidates_have_the_lowest_average_rssi_of_the_last_second() -> None:
     assert reported(REQUEST, sensed(rssi=rssi)) == quiet | {(5090, 2)}
 
 
-def test_average_rssi_leaves_out_subframes_that_were_not_monitored() -> None:
-    """Measured in 1 of 10 intervals only: the mean of that is above what others have in half of theirs."""
+def test_average_rssi_excludes_unmonitored_subframes() -> None:
+    """A resource monitored in 1 of 10 intervals has the mean of this interval, 1, above 0.6 of the others."""
     rssi = {(5001 + y - 100 * j, x): 0.6 for y in range(100) for x in range(4) for j in range(1, 11)}
     rssi |= {(5050 - 100 * j, 0): 1.0 for j in range(1, 11)}
     own = tuple(5050 - 100 * j for j in range(2, 11))
-    assert (5050, 0) not in everything(REQUEST, sensed(rssi=rssi, own=own))
+    assert (5050, 0) not in reported_for_any_order(REQUEST, sensed(rssi=rssi, own=own))
 
 
-def test_short_intervals_are_projected_and_averaged_at_their_own_distance() -> None:
-    """At 20 ms, an SCI in 4990 announces 5010 (q = 1), and its repetitions fall on the same candidate."""
+def test_candidates_of_short_intervals_use_their_own_period() -> None:
+    """At 20 ms, an SCI in 4990 reserves 5010 (q = 1), and its repetitions coincide with the same candidate."""
     request = replace(REQUEST, last=NOW + 20, interval=20)
-    left = everything(request, sensed(sci=[(4990, 0, 1, -90.0)]))
+    left = reported_for_any_order(request, sensed(sci=[(4990, 0, 1, -90.0)]))
     assert {(5001 + y, x) for y in range(20) for x in range(4)} - left == {(5010, 0)}
     rssi = {(5001 + y - 20 * j, x): 1.0 for y in range(20) for x in range(4) for j in range(1, 51) if (y, x) != (7, 3)}
     assert (5008, 3) in reported(request, sensed(rssi=rssi))
 
 
-def test_long_intervals_exclude_only_uses_within_the_selection_window() -> None:
-    """At 200 ms, an SCI in 4850 announces 5050; one in 4950 announces 5150, after the window of 100 ms."""
-    left = everything(replace(REQUEST, interval=200), sensed(sci=[(4850, 0, 1, -90.0), (4950, 1, 1, -90.0)]))
+def test_candidates_of_long_intervals_exclude_uses_within_the_selection_window() -> None:
+    """At 200 ms, an SCI in 4850 reserves 5050; an SCI in 4950 reserves 5150, beyond the window of 100 ms."""
+    left = reported_for_any_order(
+        replace(REQUEST, interval=200), sensed(sci=[(4850, 0, 1, -90.0), (4950, 1, 1, -90.0)])
+    )
     assert {(5001 + y, x) for y in range(100) for x in range(4)} - left == {(5050, 0)}
 
 
 @pytest.mark.parametrize(("width", "length", "count"), [(2, 1, 300), (4, 1, 100), (4, 3, 98), (1, 120, 4)])
-def test_larger_messages_have_contiguous_candidates(width: int, length: int, count: int) -> None:
+def test_candidates_of_larger_messages_are_contiguous(width: int, length: int, count: int) -> None:
     request = replace(REQUEST, width=width, length=length)
-    assert len(everything(request, sensed())) == count
-    left = everything(request, sensed(sci=[(4950, 1, 1, -90.0)]))
-    blocked = {(y, x) for y, x in everything(request, sensed()) if y <= 5050 < y + length and x <= 1 < x + width}
-    assert left == everything(request, sensed()) - blocked
+    assert len(reported_for_any_order(request, sensed())) == count
+    left = reported_for_any_order(request, sensed(sci=[(4950, 1, 1, -90.0)]))
+    blocked = {
+        (y, x) for y, x in reported_for_any_order(request, sensed()) if y <= 5050 < y + length and x <= 1 < x + width
+    }
+    assert left == reported_for_any_order(request, sensed()) - blocked
 
 
-def test_candidates_come_back_where_nothing_was_monitored() -> None:
-    """A station that transmitted in each subframe of the interval still finds a resource."""
+def test_candidates_without_monitored_subframes_are_not_empty() -> None:
+    """A station that transmitted in each subframe of the interval still selects a resource."""
     assert len(reported(REQUEST, sensed(own=tuple(range(4900, 5000))))) == 80

@@ -1,4 +1,4 @@
-"""C-V2X Mode 4: semi-persistent scheduling, the resources that stations use and how long."""
+"""C-V2X Mode 4: semi-persistent scheduling and use of resources."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from radio_talk import message, radio
-from sidelink_air import MODE_4, TWO, Air, many
+from radio_traffic import message, radio
+from sidelink_traffic import MODE_4, TWO, Air, many
 
 from eidrive_scenario.v2x.radio.sidelink.settings import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -17,16 +17,16 @@ from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 @pytest.mark.parametrize(
     ("interval", "low", "high"), [(0.02, 25, 75), (0.05, 10, 30), (0.1, 5, 15), (0.2, 5, 15), (1.0, 5, 15)]
 )
-def test_reselection_counter_has_the_range_of_its_interval(interval: float, low: int, high: int) -> None:
+def test_reselection_counter_range_depends_on_the_interval(interval: float, low: int, high: int) -> None:
     """3GPP TS 36.321, 5.14.1.1."""
     assert SidelinkSettings(interval=interval).counter_range == (low, high)
 
 
 @pytest.mark.parametrize(("interval", "tick"), [(0.02, 0.01), (0.05, 0.05), (0.1, 0.1)])
-def test_resources_are_used_once_per_interval_for_the_reselection_counter(interval: float, tick: float) -> None:
+def test_resource_is_used_once_per_interval_for_the_reselection_counter(interval: float, tick: float) -> None:
     air = Air(radio(3, **MODE_4, sidelink={"interval": interval}), TWO, tick)
     air.run(800 * interval, {"A": round(interval / tick)})
-    runs = Counter()
+    runs: Counter[str] = Counter()
     lengths, length = [], 1
     for first, second in pairwise(air.of("A")):
         same = (round(1000 * (second.start - first.start)), second.first_band) == (
@@ -43,18 +43,18 @@ def test_resources_are_used_once_per_interval_for_the_reselection_counter(interv
     assert np.mean(lengths) == pytest.approx((low + high) / 2.0, rel=0.15)
 
 
-def test_last_transmission_on_a_resource_announces_no_further_use() -> None:
-    """3GPP TS 36.213, table 14.2.1-2: the reservation is 0 where the resource is not kept."""
+def test_last_transmission_on_a_resource_makes_no_reservation() -> None:
+    """3GPP TS 36.213, table 14.2.1-2: the reservation is 0 if the resource is not kept."""
     transmissions = Air(radio(3, **MODE_4), TWO, 0.1).run(60.0, {"A": 1}).of("A")
     for first, second in pairwise(transmissions[:-1]):
         kept = (round(1000 * (second.start - first.start)), second.first_band) == (100, first.first_band)
-        assert first.reserves == kept or (kept and not first.reserves), "a new resource may happen to be the old one"
+        assert first.reserves == kept or (kept and not first.reserves), "a new resource can equal the previous one"
         assert kept or not first.reserves
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.4, 0.8])
-def test_resources_are_kept_with_the_probability_that_was_set(keep: float) -> None:
-    """On average 10 uses per counter, and 1 / (1 - keep) counters on each resource."""
+def test_resource_is_kept_with_the_set_probability(keep: float) -> None:
+    """A counter has a mean of 10 uses, and a resource 1 / (1 - keep) counters."""
     air = Air(radio(5, **MODE_4, sidelink={"resource_keep_probability": keep}), TWO, 0.1).run(300.0, {"A": 1})
     changes = sum(not entry.reserves for entry in air.of("A"))
     assert len(air.of("A")) / changes == pytest.approx(10.0 / (1.0 - keep), rel=0.2)
@@ -63,7 +63,7 @@ def test_resources_are_kept_with_the_probability_that_was_set(keep: float) -> No
 @pytest.mark.parametrize(
     ("size", "width", "length"), [(190, 1, 1), (191, 2, 1), (760, 4, 1), (761, 4, 2), (3000, 4, 4)]
 )
-def test_messages_occupy_the_subchannels_and_subframes_that_they_need(size: int, width: int, length: int) -> None:
+def test_message_occupies_subchannels_and_subframes_by_its_size(size: int, width: int, length: int) -> None:
     air = Air(radio(3, **MODE_4), TWO).run(5.0, {"A": 2}, (size,))
     assert len(air.of("A")) > 45
     assert {(e.bands, round(1000 * e.duration)) for e in air.of("A")} == {(width, length)}
@@ -71,8 +71,8 @@ def test_messages_occupy_the_subchannels_and_subframes_that_they_need(size: int,
     assert all(event.outcome == "delivered" for event in air.events)
 
 
-def test_larger_message_than_the_resource_makes_the_station_select_anew() -> None:
-    """190 and 380 bytes in turn: the resource grows once, and small messages go on it too."""
+def test_message_larger_than_the_resource_triggers_a_new_selection() -> None:
+    """With alternating 190 and 380 bytes the resource grows once; small messages also use it."""
     air = Air(radio(3, **MODE_4), TWO).run(30.0, {"A": 2}, (190, 190, 380, 380))
     widths = [entry.bands for entry in air.of("A")]
     assert set(widths) == {1, 2}
@@ -80,8 +80,8 @@ def test_larger_message_than_the_resource_makes_the_station_select_anew() -> Non
     assert all(entry.bands >= -(-entry.message.size // 190) for entry in air.of("A"))
 
 
-def test_message_over_several_ticks_and_intervals_does_not_overlap_the_next() -> None:
-    """100 kB take 132 subframes, more than the interval of 100 ms."""
+def test_message_longer_than_the_interval_does_not_overlap_the_next() -> None:
+    """100 kB occupy 132 subframes, more than the interval of 100 ms."""
     air = Air(radio(3, **MODE_4, queue={"discipline": "lcfs"}), TWO).run(5.0, {"A": 1}, (100_000,))
     transmissions = air.of("A")
     assert len(transmissions) > 20
@@ -90,8 +90,8 @@ def test_message_over_several_ticks_and_intervals_does_not_overlap_the_next() ->
 
 
 @pytest.mark.parametrize("latency", [0.02, 0.1, 0.3])
-def test_messages_wait_no_longer_than_the_latency_requirement(latency: float) -> None:
-    """At 5 Hz and an interval of 200 ms, shifted against each other in each third message."""
+def test_message_delay_respects_the_latency_requirement(latency: float) -> None:
+    """Messages at 5 Hz with an interval of 200 ms, with an offset in each third message."""
     carrier = radio(3, **MODE_4, sidelink={"interval": 0.2, "latency": latency, "selection_window": min(latency, 0.1)})
     waits = []
     for tick in range(600):
@@ -105,7 +105,7 @@ def test_messages_wait_no_longer_than_the_latency_requirement(latency: float) ->
     assert max(waits) > 0.6 * latency
 
 
-def test_resource_is_given_up_after_a_second_without_use() -> None:
+def test_resource_is_released_after_a_second_without_use() -> None:
     air = Air(radio(3, **MODE_4), TWO)
     air.run(0.3, {"A": 2}).run(1.5, {}).run(0.3, {"A": 2})
     first, last = air.of("A")[0], air.of("A")[-1]
@@ -113,16 +113,16 @@ def test_resource_is_given_up_after_a_second_without_use() -> None:
 
 
 @pytest.mark.parametrize(("limit", "kept"), [(None, True), (9, True), (4, True), (3, False), (1, False)])
-def test_resource_is_given_up_after_so_many_unused_opportunities(limit: int | None, kept: bool) -> None:
-    """Messages with a gap of 400 ms: three opportunities are not used in between."""
+def test_resource_is_released_after_the_set_number_of_unused_opportunities(limit: int | None, kept: bool) -> None:
+    """A gap of 400 ms between messages leaves three opportunities unused."""
     air = Air(radio(3, **MODE_4, sidelink={"reselect_after": limit}), TWO, 0.1)
     air.run(0.1, {"A": 1}).run(0.3, {}).run(0.3, {"A": 1})
     first, second = air.of("A")[:2]
     assert ((second.start - first.start) == pytest.approx(0.4)) is kept
 
 
-def test_ticks_of_any_length_give_the_same_resources() -> None:
-    """Ten messages a second from stations that stand still: a step of 10 ms or of 100 ms makes no difference."""
+def test_resources_are_independent_of_the_time_step() -> None:
+    """Stationary stations with ten messages per second, with time steps of 10 to 100 ms."""
     found = []
     for dt in (0.01, 0.02, 0.05, 0.1):
         places = many(20)

@@ -1,18 +1,19 @@
-"""C-V2X Mode 4: collisions, half duplex, the control channel, and statistics of links."""
+"""C-V2X Mode 4: collisions, half-duplex operation, control channel, and link statistics."""
 
 from __future__ import annotations
 
 from collections import Counter
 
 import pytest
-from radio_talk import DT, message, radio
-from sidelink_air import MODE_4, Air, many
+from radio_traffic import DT, message, radio
+from sidelink_traffic import MODE_4, Air, many
 
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
-def test_stations_that_sense_each_other_hardly_collide() -> None:
-    """60 stations for 400 resources: after the first seconds only those collide that select in the same 100 ms."""
+def test_collisions_between_sensing_stations_are_rare() -> None:
+    """60 stations share 400 resources: after the first seconds only selections in the same 100 ms collide."""
     places = many(60)
     air = Air(radio(5, **MODE_4), places, 0.1, listeners=4).run(30.0, dict.fromkeys(places, 1))
     late = [event for event in air.events if event.sent > 4.0]
@@ -22,8 +23,8 @@ def test_stations_that_sense_each_other_hardly_collide() -> None:
     assert reasons["half_duplex"] / len(late) == pytest.approx(0.01, abs=0.008)
 
 
-def test_stations_do_not_receive_in_subframes_in_which_they_transmit() -> None:
-    """Two stations whose resources share a subframe lose the messages of each other, in both directions."""
+def test_half_duplex_stations_do_not_receive_while_transmitting() -> None:
+    """Two stations with resources in the same subframe lose the messages of each other in both directions."""
     air = Air(radio(5, **MODE_4), many(10), 0.1).run(40.0, dict.fromkeys(many(10), 1))
     subframe = {(e.message.sender, e.message.number): round(1000 * e.start) for e in air.transmissions}
     sent = {(sender, start) for (sender, _), start in subframe.items()}
@@ -34,22 +35,23 @@ def test_stations_do_not_receive_in_subframes_in_which_they_transmit() -> None:
 
 
 def test_message_without_decoded_control_information_is_lost() -> None:
-    """From 100 to 2,900 m: a station that does not decode the control information does not receive the message."""
+    """Receivers at 100 to 2,900 m: without decoded control information a message is not received."""
     places = {"A": (0.0, 0.0, 1.5), **{f"R{n}": (100.0 * n, 0.0, 1.5) for n in range(1, 30)}}
-    robust, deaf = (
+    robust, weak = (
         Air(radio(1, **MODE_4, tx_power_dbm=5, sidelink={"pscch_errors": curve}), places, 0.1).run(20.0, {"A": 1})
         for curve in ("pscch", "80211p_goubet")
     )
-    delivered = [sum(e.outcome == "delivered" for e in air.events) for air in (robust, deaf)]
+    delivered = [sum(e.outcome == "delivered" for e in air.events) for air in (robust, weak)]
     assert delivered[1] < delivered[0]
-    assert {e.reason for e in deaf.events} <= {"", "propagation", "sensing"}
+    assert {e.reason for e in weak.events} <= {"", "propagation", "sensing"}
 
 
-def test_link_statistics_with_joining_and_leaving_stations_are_complete() -> None:
-    """Every fourth tick another station comes or goes; nothing vanishes, and resources of the others stay."""
+def test_link_statistics_with_entering_and_leaving_stations_are_complete() -> None:
+    """A station enters or leaves every fourth tick; every message is counted."""
     carrier = radio(2, **MODE_4, queue={"discipline": "lcfs"})
     all_places = many(12, 20.0)
-    events, sent = [], 0
+    events: list[LinkEvent] = []
+    sent = 0
     for tick in range(240):
         now = DT * tick
         places = {name: place for row, (name, place) in enumerate(all_places.items()) if (tick // 4) % (row + 2) != 1}
@@ -61,7 +63,7 @@ def test_link_statistics_with_joining_and_leaving_stations_are_complete() -> Non
         ]
         sent += sum(len(receivers) for _, receivers in outbox)
         events += carrier.transmit(outbox, now)
-    books = carrier.statistics(240 * DT).values()
-    assert sum(book.sent for book in books) == sent
-    assert all(book.sent == book.received + book.lost + book.in_flight for book in books)
+    statistics = carrier.statistics(240 * DT).values()
+    assert sum(link.sent for link in statistics) == sent
+    assert all(link.sent == link.received + link.lost + link.in_flight for link in statistics)
     assert {event.reason for event in events} >= {"", "absent", "queue", "half_duplex"}

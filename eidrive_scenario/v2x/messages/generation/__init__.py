@@ -1,1 +1,1 @@
-"""When a station says something, and what it puts into the message."""
+"""Message generation rules and message contents."""

@@ -1,4 +1,4 @@
-"""Numbers by which a station tells its objects apart from message to message."""
+"""Object ids that identify the objects of a station across messages."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from scipy.optimize import linear_sum_assignment
 from eidrive_scenario.detections import Detections
 
 GATE = 3.0
-"""An object farther than this from where one was expected is another one [m]."""
+"""Maximum distance between an object and the predicted position of the same object [m]."""
 KEPT = 2.0
-"""So long an object keeps its number while nobody sees it [s]."""
+"""Duration for which an object that is not detected keeps its id [s]."""
 
 
 class ObjectIdAssigner:
-    """The numbers of the tracker where there is one; else of the nearest that was seen before, moved on."""
+    """Assignment of object ids: those of the tracker, or else of the nearest predicted earlier object."""
 
     def __init__(self) -> None:
         self._next = 0
         self._known: dict[int, tuple[float, float, float, float, float]] = {}
 
     def assign_ids(self, detections: Detections) -> Sequence[int]:
-        """One per row."""
+        """Return one object id per row."""
         if detections.tracks or not len(detections):
             return detections.tracks
         now = detections.time
         self._known = {number: last for number, last in self._known.items() if now - last[0] <= KEPT}
         places = detections.boxes[:, :2]
-        found: list[int | None] = [None] * len(detections)
+        assigned: list[int | None] = [None] * len(detections)
         known = list(self._known)
         if known:
-            expected = np.array([self._expected(number, now) for number in known])
+            expected = np.array([self._predict(number, now) for number in known])
             apart = np.linalg.norm(places[:, None] - expected[None, :], axis=2)
             rows, columns = linear_sum_assignment(np.minimum(apart, 10.0 * GATE))
             for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
                 if apart[row, column] <= GATE:
-                    found[row] = known[column]
+                    assigned[row] = known[column]
         numbers = []
-        for row, number in enumerate(found):
+        for row, number in enumerate(assigned):
             if number is None:
                 number, self._next = self._next, self._next + 1
             x, y = places[row].tolist()
@@ -49,6 +49,6 @@ class ObjectIdAssigner:
             numbers.append(number)
         return tuple(numbers)
 
-    def _expected(self, number: int, now: float) -> tuple[float, float]:
+    def _predict(self, number: int, now: float) -> tuple[float, float]:
         time, x, y, vx, vy = self._known[number]
         return x + vx * (now - time), y + vy * (now - time)

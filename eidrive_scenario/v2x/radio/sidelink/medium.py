@@ -1,4 +1,7 @@
-"""Access of C-V2X Mode 4: sensing-based semi-persistent scheduling (3GPP TS 36.213, 14.1.1.6; TS 36.321, 5.14.1.1)."""
+"""Medium access of C-V2X Mode 4: sensing-based semi-persistent scheduling.
+
+Source: 3GPP TS 36.213, 14.1.1.6, and TS 36.321, 5.14.1.1.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import numpy as np
 
 from eidrive_scenario.arrays import Array
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
-from eidrive_scenario.v2x.radio.access import EARLY, MediumAccess, QueueSettings, Transmission, moved
+from eidrive_scenario.v2x.radio.access import TOLERANCE, MediumAccess, QueueSettings, Transmission, reorder_rows
 from eidrive_scenario.v2x.radio.airtime import SUBFRAME
 from eidrive_scenario.v2x.radio.congestion import DccGate
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION, Codes
@@ -21,18 +24,18 @@ from eidrive_scenario.v2x.radio.sidelink.sensing import SensingHistory
 from eidrive_scenario.v2x.radio.sidelink.settings import BLOCKS, SidelinkSettings
 
 SUBCARRIERS = 12
-"""Of one resource block."""
+"""Number of subcarriers of one resource block."""
 ATTEMPTS_PER_COUNT = 10
 """C_resel is ten times the reselection counter (3GPP TS 36.213, 14.1.1.4B)."""
 UNUSED = 1.0
-"""A resource that was not used for so long is given up [s] (3GPP TS 36.321, 5.14.1.1)."""
+"""Maximum time for which an unused resource stays reserved [s] (3GPP TS 36.321, 5.14.1.1)."""
 
 
 @dataclass
 class Grant:
-    """The resource that a station has reserved: it was or will be used first in `subframe`, then once per interval.
+    """Resource reserved by a station: first used in `subframe`, then once per interval.
 
-    counter   transmissions that are left (SL_RESOURCE_RESELECTION_COUNTER)
+    counter   remaining transmissions (SL_RESOURCE_RESELECTION_COUNTER)
     used      subframe of the last transmission on it; None before the first
     """
 
@@ -55,10 +58,11 @@ class Sending:
 
 
 class Sidelink(MediumAccess):
-    """Resources are (subframe of the interval, subchannels); no station receives in a subframe in which it transmits.
+    """Sidelink of C-V2X Mode 4. Stations are half-duplex: they do not receive in subframes in which they transmit.
 
-    Subframe k lasts from k to k + 1 milliseconds. A station that has no resource for its first message selects one
-    when the message may be sent, from what it has sensed in the second before.
+    A resource is a subframe of the interval and a range of subchannels. Subframe k lasts from k to k + 1 milliseconds.
+    A station without a resource for its first message selects one when the message may be sent, based on its sensing
+    results of the preceding second.
 
     noise_dbm  noise in 10 MHz
     """
@@ -82,17 +86,17 @@ class Sidelink(MediumAccess):
         self._history = SensingHistory(len(names), settings.subchannels, settings.interval_subframes)
         self._grants: list[Grant | None] = [None] * len(names)
         self._sent: list[deque[range]] = [deque() for _ in names]
-        """Subframes in which each station transmitted of late."""
+        """Subframes of the recent transmissions of each station."""
         self._choices: dict[str, int] = {}
-        """By name, how often each station has drawn a reselection counter, also before it left and came back."""
+        """Number of drawn reselection counters by station, including the time before a re-entry."""
         self._next_event = np.full(len(names), math.inf)
-        """When each station selects a resource, or starts its first message if it has one [s]."""
+        """Time at which each station selects a resource, or starts its first message on a reserved one [s]."""
         self._scheduled = np.zeros(len(names), dtype=np.bool_)
         """Whether the event is the start of a message."""
         self._sending: list[Sending] = []
-        """Transmissions that have not been sensed to their end."""
-        self._deaf_time, self._period_deaf = np.zeros(len(names)), np.zeros(len(names))
-        """Time in which each station could not measure, as it transmitted itself [s]."""
+        """Transmissions that are not sensed up to their end."""
+        self._unmeasured_time, self._period_unmeasured = np.zeros(len(names)), np.zeros(len(names))
+        """Time in which each station could not measure because it transmitted [s]."""
         self._keys = self._sci_keys()
         self._power = np.zeros((len(names), len(names)))
 
@@ -105,10 +109,10 @@ class Sidelink(MediumAccess):
         while True:
             row = int(np.argmin(self._next_event))
             event = float(self._next_event[row])
-            if self._arrivals and self._arrivals[0].ready <= min(event, until - EARLY):
+            if self._arrivals and self._arrivals[0].ready <= min(event, until - TOLERANCE):
                 dropped += self._arrive(self._arrivals.popleft())
                 continue
-            if not event < until - EARLY:
+            if not event < until - TOLERANCE:
                 break
             self._measure(event)
             if not self._scheduled[row]:
@@ -129,23 +133,23 @@ class Sidelink(MediumAccess):
         return transmission.bands / self._settings.subchannels
 
     def channel_busy_ratio(self, row: int, span: float) -> float:
-        """The channel busy ratio of a station: the mean over all subchannels of the subframes that it could measure."""
-        measured = span - float(self._deaf_time[row] + self._period_deaf[row])
+        """Return the channel busy ratio of a station: mean over all subchannels of the measured subframes."""
+        measured = span - float(self._unmeasured_time[row] + self._period_unmeasured[row])
         return super().channel_busy_ratio(row, measured) if measured > 0.0 else 0.0
 
     def reorder(self, rows: Sequence[int | None]) -> None:
         former = {old: row for row, old in enumerate(rows) if old is not None}
         self._grants = [None if old is None else self._grants[old] for old in rows]
         self._sent = [deque() if old is None else self._sent[old] for old in rows]
-        self._scheduled = moved(self._scheduled, rows, 0.0).astype(np.bool_)
-        for field, fresh in (("_next_event", math.inf), ("_deaf_time", 0.0), ("_period_deaf", 0.0)):
-            setattr(self, field, moved(getattr(self, field), rows, fresh))
+        self._scheduled = reorder_rows(self._scheduled, rows, 0.0).astype(np.bool_)
+        for field, fresh in (("_next_event", math.inf), ("_unmeasured_time", 0.0), ("_period_unmeasured", 0.0)):
+            setattr(self, field, reorder_rows(getattr(self, field), rows, fresh))
         self._sending = [sending for sending in self._sending if sending.row in former]
         for sending in self._sending:
             sending.row = former[sending.row]
         for entry in self.on_air:
             if entry.control is not None:
-                entry.control = moved(entry.control, rows, PROPAGATION).astype(np.int8)
+                entry.control = reorder_rows(entry.control, rows, PROPAGATION).astype(np.int8)
         self._history.rearrange(rows)
         self._keys = self._sci_keys()
 
@@ -169,7 +173,7 @@ class Sidelink(MediumAccess):
         return transmission
 
     def _occasion(self, row: int) -> int:
-        """The subframe of the first message of a station: the next use of its resource, or of a new one."""
+        """Return the subframe of the first message of a station, on its reserved resource or a new one."""
         head, grant = self._head[row], self._grants[row]
         assert head is not None
         settings, ready = self._settings, float(self.ready[row])
@@ -177,26 +181,26 @@ class Sidelink(MediumAccess):
         free = self._sent[row][-1].stop if self._sent[row] else now
         width, length = settings.extent(head.message.size)
         if grant is not None and grant.counter > 0 and grant.width >= width and grant.length >= length:
-            # a message that waits for congestion control to let it go has been processed meanwhile
+            # A message that is delayed by congestion control is processed in the meantime.
             processed = max(ready, head.ready + settings.processing)
             earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
             occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
-            in_time = occasion * SUBFRAME <= ready + settings.latency + EARLY
-            if in_time and not self._given_up(grant, now, occasion):
+            in_time = occasion * SUBFRAME <= ready + settings.latency + TOLERANCE
+            if in_time and not self._is_released(grant, now, occasion):
                 return occasion
         earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
         self._grants[row] = grant = self._select(row, now, earliest, width, length)
         return grant.subframe
 
-    def _given_up(self, grant: Grant, now: int, occasion: int) -> bool:
-        """Whether a resource has not been used for too long."""
+    def _is_released(self, grant: Grant, now: int, occasion: int) -> bool:
+        """Return True if a resource is released because it was not used."""
         used = grant.subframe - self._settings.interval_subframes if grant.used is None else grant.used
         unused = (occasion - used) // self._settings.interval_subframes - 1
         limit = self._settings.reselect_after
         return (now - used) * SUBFRAME > UNUSED or (limit is not None and unused >= limit)
 
     def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
-        """A new resource among those that sensing leaves, and how often it is used."""
+        """Select a new resource among the candidates after sensing, and draw its reselection counter."""
         settings = self._settings
         self._sense(now * SUBFRAME)
         counter = self._new_counter(row)
@@ -228,8 +232,8 @@ class Sidelink(MediumAccess):
         return low + math.floor(self._draw("counter", row) * (high - low + 1))
 
     def _sense(self, until: float) -> None:
-        """Let the stations receive the subframes that end by `until` [s]."""
-        ended = math.inf if math.isinf(until) else math.floor((until + EARLY) / SUBFRAME + 1e-9)
+        """Evaluate sensing of the subframes that end by `until` [s]."""
+        ended = math.inf if math.isinf(until) else math.floor((until + TOLERANCE) / SUBFRAME + 1e-9)
         while self._sending:
             first = min(sending.subframe for sending in self._sending)
             if first >= ended:
@@ -237,7 +241,7 @@ class Sidelink(MediumAccess):
             self._receive(int(min(ended, first + WINDOW)))
 
     def _receive(self, ended: int) -> None:
-        """Let the stations receive what is transmitted before subframe `ended`, at most one sensing window."""
+        """Evaluate sensing of transmissions before subframe `ended`, at most one sensing window."""
         due = [
             Pdu(subframe, sending.row, sending.transmission)
             for sending in self._sending
@@ -256,9 +260,11 @@ class Sidelink(MediumAccess):
                 power[place] += pdu.transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
         self._history.proceed(due[-1].subframe + 1)
-        busy, deaf = self._history.busy(self._history.receive(due, milliwatts / widths[:, None]), self._busy_above)
+        busy, unmeasured = self._history.busy(
+            self._history.receive(due, milliwatts / widths[:, None]), self._busy_above
+        )
         self._period_busy += SUBFRAME * busy
-        self._period_deaf += SUBFRAME * deaf
+        self._period_unmeasured += SUBFRAME * unmeasured
         codes = self._control.decode(due, milliwatts / blocks, self._keys)
         for pdu, code in zip(due, codes, strict=True):
             before = pdu.transmission.control
@@ -273,17 +279,17 @@ class Sidelink(MediumAccess):
 
     def _measure(self, now: float) -> None:
         period = self.gate.control.period
-        while self._period is not None and now >= (self._period + 1) * period - EARLY:
+        while self._period is not None and now >= (self._period + 1) * period - TOLERANCE:
             end = (self._period + 1) * period
             self._sense(end)
             super()._measure(end)
         super()._measure(now)
 
     def _period_ratio(self, period: float) -> Array:
-        measured = period - self._period_deaf
-        ratio: Array = np.where(measured > EARLY, self._period_busy / np.maximum(measured, EARLY), 1.0)
-        self._deaf_time += self._period_deaf
-        self._period_deaf = np.zeros(len(self.names))
+        measured = period - self._period_unmeasured
+        ratio: Array = np.where(measured > TOLERANCE, self._period_busy / np.maximum(measured, TOLERANCE), 1.0)
+        self._unmeasured_time += self._period_unmeasured
+        self._period_unmeasured = np.zeros(len(self.names))
         return ratio
 
     def _sci_keys(self) -> Keys:

@@ -1,4 +1,4 @@
-"""Reception of sidelink control information (SCI) on the PSCCH, without which a station receives no data."""
+"""Reception of sidelink control information (SCI) on the PSCCH, which is required for the reception of data."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATI
 Rows = NDArray[np.int64]
 
 BOOST = 2.0
-"""Power of a resource element of the control channel over one of the data: 3 dB (3GPP TS 36.213, 14.2)."""
+"""Power ratio of resource elements of the control channel and of the data: 3 dB (3GPP TS 36.213, 14.2)."""
 
 
 @dataclass(frozen=True)
 class Pdu:
-    """The part of a transmission in one subframe."""
+    """Part of a transmission in one subframe."""
 
     subframe: int
     row: int
@@ -31,21 +31,22 @@ class Pdu:
 
 @dataclass(frozen=True)
 class ControlChannel:
-    """Decodes the control channel.
+    """Decoder of the control channel.
 
-    block_noise  noise in one resource block [mW];  curve  errors by the ratio of signal to interference and noise
+    block_noise  noise in one resource block [mW]
+    curve        packet error rate by signal-to-interference-and-noise ratio
     """
 
     block_noise: float
     curve: ErrorCurve
 
     def decode(self, pdus: Sequence[Pdu], per_block: Array, keys: Keys) -> Codes:
-        """(T, N) whether each station decodes the SCI of each PDU: DELIVERED, PROPAGATION or COLLISION.
+        """Return the outcome of the SCI of each PDU at each station (T, N): DELIVERED, PROPAGATION or COLLISION.
 
-        The control channel lies in the first subchannel of its transmission; others that use this subchannel interfere.
+        The control channel is in the first subchannel of its transmission; other users of this subchannel interfere.
 
         per_block  (T, N) received power of each PDU in one resource block of its data [mW]
-        keys       (N, N) of the links, by sender and receiver
+        keys       (N, N) keys of the links, by sender and receiver
         """
         subframes, rows = (np.array([getattr(pdu, name) for pdu in pdus]) for name in ("subframe", "row"))
         first = np.array([pdu.transmission.first_band for pdu in pdus])

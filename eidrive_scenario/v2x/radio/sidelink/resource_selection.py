@@ -1,4 +1,4 @@
-"""Sensing-based resource selection of C-V2X Mode 4: which resources a station may choose (3GPP TS 36.213, 14.1.1.6)."""
+"""Sensing-based resource selection of C-V2X Mode 4: candidate resources of a station (3GPP TS 36.213, 14.1.1.6)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from eidrive_scenario.arrays import Array, Bools
 Rows = NDArray[np.int64]
 
 SHARE = 0.2
-"""Least share of the candidate resources that remain after exclusion, and share that is reported (steps 7 and 9)."""
+"""Minimum share of candidate resources after exclusion, and share that is reported (steps 7 and 9)."""
 STEP_DB = 3.0
-"""By which the threshold rises while less remain (step 7) [dB]."""
+"""Increment of the threshold while fewer candidates remain (step 7) [dB]."""
 PSTEP = 100
 """Subframes between the averaged S-RSSI of longer resource reservation intervals."""
 WINDOW = 10 * PSTEP
@@ -30,7 +30,7 @@ class Request:
     first, last    selection window, from n + T1 to n + T2 [subframes]
     width, length  subchannels and subframes of a resource
     interval       resource reservation interval [subframes]
-    uses           C_resel, how often the resource is reserved at most
+    uses           C_resel, maximum number of reserved uses
     threshold      SL-ThresPSSCH-RSRP [dBm]
     """
 
@@ -69,9 +69,9 @@ class Sensed:
 
 
 def candidates(request: Request, sensed: Sensed, order: Array) -> Rows:
-    """The resources that are reported to higher layers, by (start subframe, first subchannel) in one index.
+    """Return the resources that are reported to higher layers, as indices of (start subframe, first subchannel).
 
-    order  (starts · (S - width + 1),) random numbers: which comes first of those with the same average S-RSSI
+    order  (starts · (S - width + 1),) random numbers that order candidates with the same average S-RSSI
     """
     bands = sensed.rssi.shape[1]
     subframes = request.starts + request.length - 1
@@ -83,24 +83,27 @@ def candidates(request: Request, sensed: Sensed, order: Array) -> Rows:
     average = _over(_average_rssi(request, sensed, subframes), request).mean(axis=(2, 3)).ravel()
 
     least = math.ceil(SHARE * len(highest) - 1e-9)
-    places = np.flatnonzero(highest <= _raised(highest, request.threshold, least))
+    places = np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
     best = np.lexsort((order[places], average[places]))[:least]
     return np.sort(places[best])
 
 
 def _mark(
-    level: Array, request: Request, announced_in: Rows, bands: Rows, widths: Rows, power: NDArray[np.float32] | float
+    level: Array, request: Request, reserved_in: Rows, bands: Rows, widths: Rows, power: NDArray[np.float32] | float
 ) -> None:
-    """Steps 5 and 6: note the largest `power` in each subframe and subchannel of the window whose use by this station,
-    now or within `uses` intervals, meets what was announced in the subframes `announced_in`."""
-    if not len(announced_in):
+    """Store the maximum `power` of reservations in each subframe and subchannel of the window (steps 5 and 6).
+
+    A reservation from the subframes `reserved_in` counts if it overlaps with a use by this station, now or within
+    `uses` intervals.
+    """
+    if not len(reserved_in):
         return
     interval = request.interval
     repeats = -(-PSTEP // interval) if interval < PSTEP else 1  # Q
-    recent = request.now - announced_in <= interval
-    powers = np.broadcast_to(np.asarray(power, dtype=np.float64), announced_in.shape)
+    recent = request.now - reserved_in <= interval
+    powers = np.broadcast_to(np.asarray(power, dtype=np.float64), reserved_in.shape)
     for repeat in range(1, repeats + 1):
-        use = announced_in + repeat * interval
+        use = reserved_in + repeat * interval
         counts = recent if repeat > 1 else np.ones_like(recent)
         start = (use - request.first) % interval
         for place in range(0, len(level), interval):
@@ -113,7 +116,10 @@ def _mark(
 
 
 def _average_rssi(request: Request, sensed: Sensed, subframes: int) -> Array:
-    """(subframes, S) step 8: mean S-RSSI of the monitored subframes that lie whole intervals or 100 ms before [mW]."""
+    """Return the mean S-RSSI of monitored subframes at multiples of the interval or 100 ms before [mW] (step 8).
+
+    The shape is (subframes, S).
+    """
     apart = min(request.interval, PSTEP)
     phases = sensed.rssi.reshape(-1, apart, sensed.rssi.shape[1])
     counts = sensed.monitored.reshape(-1, apart).sum(axis=0)
@@ -123,15 +129,14 @@ def _average_rssi(request: Request, sensed: Sensed, subframes: int) -> Array:
 
 
 def _over(values: Array, request: Request) -> Array:
-    """(starts, S - width + 1, length, width) the values of the subframes and subchannels of each candidate resource."""
+    """Return the values of each candidate resource (starts, S - width + 1, length, width)."""
     return sliding_window_view(values, (request.length, request.width))
 
 
-def _raised(level: Array, threshold: float, least: int) -> float:
-    """Step 7: the threshold, raised in steps of 3 dB until at least so many candidates do not exceed it.
+def _raise_threshold(level: Array, threshold: float, least: int) -> float:
+    """Return the threshold, raised in steps of 3 dB until at least `least` candidates do not exceed it (step 7).
 
-    Subframes that the station has not monitored have the level infinity: no threshold brings them back, unless nothing
-    else is left.
+    Subframes that the station did not monitor have level infinity. They stay excluded unless no others remain.
     """
     finite = np.sort(level)
     needed = float(finite[least - 1])

@@ -1,4 +1,4 @@
-"""Sensing results of the stations of C-V2X Mode 4 in the last second: S-RSSI, and decoded control information."""
+"""Sensing results of C-V2X Mode 4 stations over the last second: S-RSSI and decoded control information."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 NOT_DECODED = -np.inf
 CAPACITY = 256
-"""Reservations for which there is room at first."""
+"""Initial capacity for reservations."""
 
 
 @dataclass
 class Reservations:
-    """Decoded control information of the last `span` subframes that announces another use: columns of R entries.
+    """Decoded control information of the last `span` subframes that reserves resources, in columns of R entries.
 
-    subframes, bands, widths  (R,) when and where it was sent;  rsrp  (R, N) PSSCH-RSRP [dBm], -inf where not decoded
+    subframes, bands, widths  (R,) subframe, first subchannel and number of subchannels
+    rsrp                      (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
     """
 
     stations: int
@@ -44,14 +45,14 @@ class Reservations:
         """Append entries, in the order of their subframes."""
         count = len(subframes)
         if self.end + count > len(self.subframes):
-            self._make_room(count, int(subframes[0]))
+            self._grow(count, int(subframes[0]))
         rows = slice(self.end, self.end + count)
         self.subframes[rows], self.bands[rows], self.widths[rows] = subframes, bands, widths
         self.rsrp[rows] = rsrp
         self.end += count
 
     def of(self, row: int, now: int) -> tuple[Rows, Rows, Rows, NDArray[np.float32]]:
-        """Subframes, subchannels, widths and PSSCH-RSRP of what a station decoded in the span before subframe `now`."""
+        """Return subframes, bands, widths and PSSCH-RSRP decoded by a station in the span before subframe `now`."""
         self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
         rsrp = self.rsrp[self.begin : self.end, row]
         decoded = np.flatnonzero(rsrp > NOT_DECODED)
@@ -59,11 +60,11 @@ class Reservations:
         return self.subframes[rows], self.bands[rows], self.widths[rows], rsrp[decoded]
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
-        """Keep the columns of these former rows; None: a station that has decoded nothing yet."""
+        """Keep the columns of these former rows; None: a new station."""
         self.rsrp = _columns(self.rsrp, rows, NOT_DECODED)
         self.stations = len(rows)
 
-    def _make_room(self, count: int, now: int) -> None:
+    def _grow(self, count: int, now: int) -> None:
         self.begin += int(np.searchsorted(self.subframes[self.begin : self.end], now - self.span))
         live = slice(self.begin, self.end)
         kept = self.end - self.begin
@@ -80,9 +81,9 @@ class Reservations:
 
 
 class SensingHistory:
-    """The sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2).
+    """Sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2).
 
-    rssi       (WINDOW, S, N) S-RSSI by subframe mod WINDOW [mW]; 0 where a station transmits itself
+    rssi       (WINDOW, S, N) S-RSSI by subframe mod WINDOW [mW]; 0 while a station transmits
     monitored  (WINDOW, N) whether a station received in the subframe
     """
 
@@ -93,7 +94,7 @@ class SensingHistory:
         self._until: int | None = None
 
     def proceed(self, until: int) -> None:
-        """Open the subframes up to `until`, exclusive, in which nothing has been received so far."""
+        """Append empty subframes up to `until`, exclusive."""
         if self._until is None:
             self._until = until
         gap = min(until - self._until, WINDOW)
@@ -105,7 +106,7 @@ class SensingHistory:
             self._until = until
 
     def receive(self, pdus: Sequence[Pdu], per_subchannel: Array) -> Rows:
-        """Add what is transmitted in subframes that are open; returns those subframes.
+        """Add transmissions in appended subframes; return these subframes.
 
         per_subchannel  (T, N) received power of each PDU in each of its subchannels [mW]
         """
@@ -119,22 +120,25 @@ class SensingHistory:
         return np.array(sorted({pdu.subframe for pdu in pdus}), dtype=np.int64)
 
     def busy(self, subframes: Rows, threshold: float) -> tuple[Array, Rows]:
-        """Over these subframes: (N,) the sum of the shares of the subchannels whose S-RSSI exceeds the threshold [mW],
-        and (N,) in how many subframes a station transmitted itself and could not measure."""
+        """Return the busy time and the unmeasured time of each station over these subframes (N,) [subframes].
+
+        The busy time sums the shares of subchannels whose S-RSSI exceeds the threshold [mW]. A station does not
+        measure while it transmits.
+        """
         rows = subframes % WINDOW
         monitored = self.monitored[rows]
         counts = ((self.rssi[rows] > threshold) & monitored[:, None]).sum(axis=(0, 1))
         return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
     def reserve(self, pdus: Sequence[Pdu], codes: Codes, rsrp: Array) -> None:
-        """Note the decoded control information of PDUs that announce another use."""
+        """Add the decoded control information of PDUs that reserve resources."""
         subframes = np.array([pdu.subframe for pdu in pdus], dtype=np.int64)
         bands, widths = (
             np.array([getattr(pdu.transmission, name) for pdu in pdus], dtype=np.int64)
             for name in ("first_band", "bands")
         )
-        heard = (codes == DELIVERED) & self.monitored[subframes % WINDOW]
-        self.reservations.add(subframes, bands, widths, np.where(heard, rsrp, NOT_DECODED))
+        decoded = (codes == DELIVERED) & self.monitored[subframes % WINDOW]
+        self.reservations.add(subframes, bands, widths, np.where(decoded, rsrp, NOT_DECODED))
 
     def of(self, row: int, now: int, own: Rows) -> Sensed:
         """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
@@ -142,14 +146,14 @@ class SensingHistory:
         return Sensed(self.rssi[:, :, row], self.monitored[:, row], own, *self.reservations.of(row, now))
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
-        """Keep the columns of these former rows; None: a station that has sensed nothing yet."""
+        """Keep the columns of these former rows; None: a new station."""
         self.rssi = _columns(self.rssi, rows, 0.0)
         self.monitored = _columns(self.monitored, rows, False)
         self.reservations.rearrange(rows)
 
 
 def _columns(values: NDArray[Scalar], rows: Sequence[int | None], fresh: float) -> NDArray[Scalar]:
-    """An array by station in its last axis, for other stations."""
+    """Return an array for reordered stations, which are its last axis."""
     columns = np.full((*values.shape[:-1], len(rows)), fresh, dtype=values.dtype)
     known = [(place, old) for place, old in enumerate(rows) if old is not None]
     columns[..., [place for place, _ in known]] = values[..., [old for _, old in known]]

@@ -15,21 +15,22 @@ from eidrive_scenario.v2x.radio.packet_error import CURVES, ErrorCurve
 INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Resource reservation intervals [s]."""
 BLOCKS = 50
-"""Resource blocks of 10 MHz."""
+"""Number of resource blocks in 10 MHz."""
 PSCCH_BLOCKS = 2
-"""Resource blocks of the control channel in the first subchannel of a transmission (3GPP TS 36.213, 14.2)."""
+"""Number of resource blocks of the control channel in the first subchannel (3GPP TS 36.213, 14.2)."""
 MAX_SELECTION_WINDOW = 0.1
-"""Largest T2 [s] (3GPP TS 36.213, 14.1.1.6)."""
+"""Maximum T2 [s] (3GPP TS 36.213, 14.1.1.6)."""
 
 
 class SidelinkSettings(Settings):
-    """Resource pool of C-V2X Mode 4 (10 MHz), and how stations select resources in it.
+    """Settings of the resource pool of C-V2X Mode 4 (10 MHz) and of the resource selection.
 
     interval      resource reservation interval [s]
-    subchannels   into which 10 MHz are divided, and
-    subchannel_bytes   what one of them carries in a subframe of 1 ms
-    resource_keep_probability   of keeping the resource when the reselection counter has reached 0 (probResourceKeep)
-    processing    from the message to the earliest subframe that can carry it [s]; T1 of the selection window
+    subchannels   number of subchannels in 10 MHz
+    subchannel_bytes   capacity of one subchannel in a subframe of 1 ms [bytes]
+    resource_keep_probability   probability of keeping the resource when the reselection counter reaches 0
+                  (probResourceKeep)
+    processing    time from the message to the earliest subframe that can carry it [s]; T1 of the selection window
     selection_window   T2, the end of the selection window, after the request [s]; None: the interval, at most 100 ms
     latency       latency requirement [s]: if the next reserved resource is later than this after the message could be
                   sent, the station selects a new one
@@ -38,7 +39,7 @@ class SidelinkSettings(Settings):
     pssch_rsrp_threshold_dbm   SL-ThresPSSCH-RSRP, above which a decoded reservation excludes resources; it is raised by
                   3 dB while less than 20 % remain [dBm per resource element]
     cbr_threshold_dbm  S-RSSI above which a subchannel counts as busy [dBm] (ETSI TS 103 574, 5.2)
-    pscch_errors  name of the curve of errors of the control channel
+    pscch_errors  name of the packet error curve of the control channel
     """
 
     interval: float = 0.1
@@ -57,11 +58,12 @@ class SidelinkSettings(Settings):
     def _standard(self) -> SidelinkSettings:
         if self.interval not in INTERVALS:
             raise ValueError(
-                f"interval is {self.interval:g} s; known: {', '.join(f'{known:g}' for known in INTERVALS)}"
+                f"interval is not supported (got {self.interval:g} s; "
+                f"expected one of {', '.join(f'{known:g}' for known in INTERVALS)})"
             )
         if self.pscch_errors not in CURVES:
             raise ValueError(
-                f"no curve of packet errors {self.pscch_errors!r}; {suggestion(self.pscch_errors, CURVES)}"
+                f"unknown packet error curve {self.pscch_errors!r}; {suggestion(self.pscch_errors, CURVES)}"
             )
         return self
 
@@ -78,24 +80,24 @@ class SidelinkSettings(Settings):
 
     @property
     def counter_range(self) -> tuple[int, int]:
-        """Smallest and largest reselection counter (3GPP TS 36.321, 5.14.1.1)."""
-        often = max(1, round(0.1 / self.interval))
-        return 5 * often, 15 * often
+        """Minimum and maximum reselection counter (3GPP TS 36.321, 5.14.1.1)."""
+        factor = max(1, round(0.1 / self.interval))
+        return 5 * factor, 15 * factor
 
     @property
     def control_curve(self) -> ErrorCurve:
-        """Errors of the control channel by its ratio of signal to interference and noise."""
+        """Packet error curve of the control channel."""
         return CURVES[self.pscch_errors]
 
     def extent(self, size: int) -> tuple[int, int]:
-        """Numbers of subchannels and of subframes that a message of `size` bytes takes."""
+        """Return the numbers of subchannels and of subframes that a message of `size` bytes occupies."""
         needed = max(1, math.ceil(size / self.subchannel_bytes))
         return min(needed, self.subchannels), math.ceil(needed / self.subchannels)
 
     def pssch_blocks(self, width: int) -> int:
-        """Resource blocks that carry the data of a transmission in `width` subchannels.
+        """Return the number of resource blocks for the data of a transmission in `width` subchannels.
 
-        3GPP TS 36.213, 14.1.1.4C: all but those of the control channel, the largest product of powers of 2, 3 and 5.
+        3GPP TS 36.213, 14.1.1.4C: largest product of powers of 2, 3 and 5 without the blocks of the control channel.
         """
         blocks = max(1, BLOCKS // self.subchannels * width - PSCCH_BLOCKS)
         while not _is_regular(blocks):

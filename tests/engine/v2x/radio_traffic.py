@@ -1,4 +1,4 @@
-"""Stations that talk over a radio channel, for the tests of it."""
+"""Message traffic of stations on a radio channel."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def message(sender: str, number: int, time: float, size: int = 300) -> Message:
     return Message(sender, number, time, StationState(time, 0, 0, 0, 0, 0), Detections(time), size)
 
 
-def talk(
+def exchange(
     carrier: RadioChannel,
     places: dict[str, Place],
     ticks: int,
@@ -39,19 +39,22 @@ def talk(
     per_tick: int = 1,
     dt: float = DT,
 ) -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
-    """Every station says something in each tick, in the order of `places`, which move along x."""
+    """Send one message per station and tick, in the order of `places`, which move along x.
+
+    Return the events, and the deliveries as (receiver, time, message).
+    """
     events: list[LinkEvent] = []
-    heard: list[tuple[str, float, ReceivedMessage]] = []
+    deliveries: list[tuple[str, float, ReceivedMessage]] = []
     for tick in range(ticks):
         now = tick * dt
         at = {name: (x + speed * now * (index + 1), y, z) for index, (name, (x, y, z)) in enumerate(places.items())}
         carrier.update_environment(RadioEnvironment(at, sight))
         for receiver in places:
-            heard += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
+            deliveries += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
         outbox = [
             (message(name, tick * per_tick + part, now, sizes[tick % len(sizes)]), [n for n in places if n != name])
             for name in places
             for part in range(per_tick)
         ]
         events += carrier.transmit(outbox, now)
-    return events, heard
+    return events, deliveries

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from radio_talk import QUIET, Place, message
+from radio_traffic import QUIET, Place, message
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.access import Transmission
@@ -17,26 +17,26 @@ TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
 
 
 class Air:
-    """Stations on one channel, each with messages of a given size and rate, and all that they transmit."""
+    """Stations on one channel with messages of given sizes and rates, and all their transmissions."""
 
     def __init__(
         self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05, listeners: int | None = None
     ) -> None:
-        """Only the first stations, `listeners` of them, receive messages; None: all do."""
+        """Limit the receivers to the first `listeners` stations; None: all stations receive."""
         self.carrier, self.places, self.dt, self.tick = carrier, dict(places), dt, 0
         self.listeners = list(places)[:listeners]
         self.events: list[LinkEvent] = []
         self.transmissions: list[Transmission] = []
         begin = carrier._access._begin
 
-        def note(row: int, transmission: Transmission, start: float) -> None:
+        def record(row: int, transmission: Transmission, start: float) -> None:
             begin(row, transmission, start)
             self.transmissions.append(transmission)
 
-        setattr(carrier._access, "_begin", note)  # noqa: B010
+        setattr(carrier._access, "_begin", record)  # noqa: B010
 
     def run(self, seconds: float, every: Mapping[str, int], sizes: Sequence[int] = (190,)) -> Air:
-        """Go on; station S has a message in each `every[S]`-th tick."""
+        """Simulate `seconds` [s]; station S has a message in each `every[S]`-th tick."""
         for _ in range(round(seconds / self.dt)):
             now = self.tick * self.dt
             self.carrier.update_environment(RadioEnvironment(self.places))
@@ -53,7 +53,7 @@ class Air:
         return [entry for entry in self.transmissions if entry.message.sender == name]
 
     def occupancy(self, since: float, until: float, subchannels: int = 4) -> float:
-        """Share of the subchannels of all subframes that some station uses, counted from the transmissions."""
+        """Return the share of used subchannels of all subframes, counted from the transmissions."""
         used = {
             (round(1000 * entry.start) + part, band)
             for entry in self.transmissions
